@@ -11,7 +11,6 @@ import train
 from edge.classifier import Classifier, stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
-from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.teaching import taught
 from edge.model.verify import first_series, verify
@@ -21,33 +20,32 @@ from export.__main__ import main as export
 from export.api import save as save_model
 from export.graph import to_onnx
 from tests.conftest import PAPER, save_touches
+from tests.sequential import fitted_model
 from train.dataset import load_trials
-from train.evaluate import stratified_folds
 from train.pipeline import Choice
-from train.stopping import SequentialClassifier
 
 POINTS = "0.3,0.6,1.2"
 
 
 @pytest.fixture(scope="module")
-def early(tmp_path_factory):
-    """A model with decision points, and the recordings that it was fitted on."""
+def folder(tmp_path_factory):
+    """A folder of recordings, data/, and of the model that was fitted on them, out/."""
     folder = tmp_path_factory.mktemp("early")
     given = ["--data", str(save_touches(folder / "data", 15)), "--out", str(folder / "out"), *PAPER]
     assert export([*given, "--decision-points", POINTS, "--scaling", "IV"]) == 0
-    return Model(folder / "out" / "model.onnx"), folder
+    return folder
+
+
+@pytest.fixture(scope="module")
+def early(folder):
+    """A model with decision points."""
+    return Model(folder / "out" / "model.onnx")
 
 
 @pytest.fixture
 def error(early):
     """The smallest error that is certified for category."""
-    return early[0].info.stopping["category"].smallest_error
-
-
-def written(path, data):
-    """The model of these bytes."""
-    path.write_bytes(data)
-    return Model(path)
+    return early.info.stopping["category"].smallest_error
 
 
 def decided(model, recording, error):
@@ -60,16 +58,11 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there are."""
     rng = np.random.default_rng(0)
     labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
-    width = early[0].info.samples * len(FEATURES)
+    width = early.info.samples * len(FEATURES)
     X, queries = rng.normal(size=(3, len(labels), width)), rng.normal(size=(9, width))
-    info = replace(early[0].info, tasks={"t": Task(("common", "known", "rare"), 3, 4, "none", 0.5)})
     choices = {"t": Choice("none", 4, 3)}
-    sequential = SequentialClassifier(choices, info.decision_points_s)
-    sequential.fit(X, {"t": labels}, stratified_folds(labels), [choices] * 10)
-    info = replace(
-        info, stopping=sequential.stopping_, novelty=sequential.novelty_, rows=132, trials=()
-    )
-    model = written(tmp_path / "model.onnx", to_onnx(sequential, info))
+    path = tmp_path / "model.onnx"
+    sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
     for point, fitted in enumerate(sequential.decision_points_):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
             own = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
@@ -79,49 +72,44 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
             assert given == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early):
-    model, folder = early
-    checks = {check.name: check for check in verify(model, folder / "out" / "golden.npz")}
+def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
+    checks = {check.name: check for check in verify(early, folder / "out" / "golden.npz")}
     assert all(check.passed for check in checks.values())
     named = {name for name in checks if "decision_point" in name}
-    assert {f"{task}_decision_point_label" for task in model.info.tasks} <= named
+    assert {f"{task}_decision_point_label" for task in early.info.tasks} <= named
 
 
 def test_the_board_stops_where_the_rule_does(early, make_touch, error):
-    model, _ = early
-    rule = stopping_rules(model, error)["category"]
+    rule = stopping_rules(early, error)["category"]
     for seed in (50, 51, 52):
-        decision = decided(model, make_touch(kind="soft", seed=seed), error)["category"].to_dict()
-        assert decision["window_s"] in model.decision_points_s[: rule.last + 1]
+        decision = decided(early, make_touch(kind="soft", seed=seed), error)["category"].to_dict()
+        assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
         assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
 
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early, make_touch, error):
-    model, _ = early
-    events = decided(model, make_touch(kind="soft", seed=50, seconds=0.25), error)
-    assert list(events) == list(model.info.tasks)
+    events = decided(early, make_touch(kind="soft", seed=50, seconds=0.25), error)
+    assert list(events) == list(early.info.tasks)
     assert all("short" in event.flags for event in events.values())
 
 
 def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule(
     early, make_touch, monkeypatch, error
 ):
-    model, _ = early
-    rule = replace(stopping_rules(model, error)["category"], confidence=2.0, last=1)
-    waits = replace(model.info.stopping["category"], rules=(rule,))
-    monkeypatch.setitem(model.info.stopping, "category", waits)
-    category = decided(model, make_touch(seed=50), error)["category"]
-    assert (category.window_s, category.stopped_by) == (model.decision_points_s[1], "window")
+    rule = replace(stopping_rules(early, error)["category"], confidence=2.0, last=1)
+    waits = replace(early.info.stopping["category"], rules=(rule,))
+    monkeypatch.setitem(early.info.stopping, "category", waits)
+    category = decided(early, make_touch(seed=50), error)["category"]
+    assert (category.window_s, category.stopped_by) == (early.decision_points_s[1], "window")
 
 
 def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch, error):
-    model, _ = early
-    stopping = model.info.stopping["object"]
+    stopping = early.info.stopping["object"]
     never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
-    monkeypatch.setitem(model.info.stopping, "object", never)
-    events = decided(model, make_touch(seed=50), error)
+    monkeypatch.setitem(early.info.stopping, "object", never)
+    events = decided(early, make_touch(seed=50), error)
     flags = {task: "uncertified" in event.flags for task, event in events.items()}
     assert flags == {"category": False, "object": True}
 
@@ -129,20 +117,19 @@ def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch,
 def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is_like(
     early, make_touch, monkeypatch
 ):
-    model, _ = early
-    for task, stopping in model.info.stopping.items():
+    for task, stopping in early.info.stopping.items():
         hasty = replace(stopping.rules[0], confidence=0.0)
-        monkeypatch.setitem(model.info.stopping, task, replace(stopping, rules=(hasty,)))
+        monkeypatch.setitem(early.info.stopping, task, replace(stopping, rules=(hasty,)))
     known = make_touch(kind="hard", seed=50)
     strange = replace(known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535))
-    error = max(stopping.smallest_error for stopping in model.info.stopping.values())
+    error = max(stopping.smallest_error for stopping in early.info.stopping.values())
     met, unmet, waited = (
-        decided(model, touch, asked)
+        decided(early, touch, asked)
         for touch, asked in ((known, error), (strange, error), (strange, None))
     )
     at = [{event.window_s for event in events.values()} for events in (met, unmet, waited)]
     assert at == [{0.3}, {1.2}, {1.2}]
-    assert model.info.novelty.task == "object"
+    assert early.info.novelty.task == "object"
     assert all("unknown" in event.flags for event in (*unmet.values(), *waited.values()))
     assert not any("unknown" in event.flags for event in met.values())
     assert unmet["object"].label == "unknown" != waited["object"].label
@@ -150,20 +137,18 @@ def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
-    model, _ = early
     with pytest.raises(InputError, match="cannot be certified; category: the smallest error that"):
-        Classifier(model, error=0.001)
+        Classifier(early, error=0.001)
 
 
-def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early):
+def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early, folder):
     """At every level of optimisation: the default is no constant to be folded."""
-    model, folder = early
-    X = load_trials([folder / "data"]).features(model.info.window_s)
-    expected = model.run(X)
+    X = load_trials([folder / "data"]).features(early.info.window_s)
+    expected = early.run(X)
     for level in ("ORT_DISABLE_ALL", "ORT_ENABLE_ALL"):
         options = onnxruntime.SessionOptions()
         options.graph_optimization_level = getattr(onnxruntime.GraphOptimizationLevel, level)
-        session = onnxruntime.InferenceSession(model.path, options)
+        session = onnxruntime.InferenceSession(early.path, options)
         names = [output.name for output in session.get_outputs()]
         seen = session.run(names, {"features": X})
         assert [v.tolist() for v in seen] == [expected[name].tolist() for name in names]
@@ -235,25 +220,12 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
     """
     rng = np.random.default_rng(1)
     y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
-    width = early[0].info.samples * len(FEATURES)
+    width = early.info.samples * len(FEATURES)
     X, more, queries = (rng.normal(size=(3, n, width)) for n in (45, 3, 9))
     choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1)}
-    sequential = SequentialClassifier(choices, early[0].info.decision_points_s)
-    sequential.fit(X, y, stratified_folds(y["t"]), [choices] * 10)
-    info = replace(
-        early[0].info,
-        tasks={
-            task: Task(tuple(sorted(set(y[task]))), c.k, c.components, "none", 0.5)
-            for task, c in choices.items()
-        },
-        stopping=sequential.stopping_,
-        novelty=sequential.novelty_,
-        rows=45,
-        trials=(),
-    )
-    model = written(tmp_path / "model.onnx", to_onnx(sequential, info))
+    sequential, before = fitted_model(tmp_path / "model.onnx", early.info, choices, X, y)
     labels = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
-    data = taught(model, ["one", "two", "three"], more, labels, new_labels=new)
+    data = taught(before, ["one", "two", "three"], more, labels, new_labels=new)
     counted = {"t": [1], "u": [0, 2]}
     if new:
         counted = {"t": [0, 1, 2], "u": [0, 1, 2]}
@@ -262,20 +234,22 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
     for point, vectors in zip(sequential.decision_points_, more, strict=True):
         for task, known in counted.items():
             classes = sorted(set(y[task]))
-            before, after = point.spaces_[task], (*point.spaces_[task], task)
-            point.spaces_[task], point.n_trials_ = after, 48
+            space, own = point.spaces_[task], (*point.spaces_[task], task)
+            point.spaces_[task], point.n_trials_ = own, 48
             for of_space in (point.projections_, point.columns_):
-                of_space[after] = of_space[before]
-            rows = point.project(after, vectors[known])
-            point.rows_[after] = np.vstack([point.rows_[before], rows])
-            point.members_[after] = np.array([*range(45), *(45 + i for i in known)])
+                of_space[own] = of_space[space]
+            rows = point.project(own, vectors[known])
+            point.rows_[own] = np.vstack([point.rows_[space], rows])
+            point.members_[own] = np.array([*range(45), *(45 + i for i in known)])
             further = [classes.index(labels[i][task]) for i in known]
             point.labels_[task] = np.array([*point.labels_[task], *further])
             point.classes_[task] = np.array(classes)
-        del point.projections_[before]
-    model = written(tmp_path / "taught.onnx", data)
-    described = replace(info, rows=48, tasks=model.info.tasks)
-    oracle = written(tmp_path / "oracle.onnx", to_onnx(sequential, described))
+        del point.projections_[space]
+    (tmp_path / "taught.onnx").write_bytes(data)
+    model = Model(tmp_path / "taught.onnx")
+    described = replace(before.info, rows=48, tasks=model.info.tasks)
+    (tmp_path / "oracle.onnx").write_bytes(to_onnx(sequential, described))
+    oracle = Model(tmp_path / "oracle.onnx")
     for point in range(3):
         for vectors in (queries[point], more[point]):
             expected = oracle.run(vectors, point)

@@ -21,6 +21,7 @@ from edge.errors import InputError
 from edge.model.explanation import Space
 from edge.model.model import Model
 from edge.touch.arm import Chain
+from tests.edge.touch.test_urdf import ARM
 from tests.fuzz import mutate
 from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import FRAMES, STORES, array, write_bag, write_mcap
@@ -131,18 +132,11 @@ def skins() -> list[bytes]:
 def read_chain(path: Path) -> None:
     """Load an arm and compute a pose."""
     urdf = path.suffix == ".urdf"
-    chain = Chain.from_urdf(path, "base", "tip") if urdf else Chain.from_toml(path)
+    chain = Chain.from_urdf(path, "base", "lower") if urdf else Chain.from_toml(path)
     if not np.isfinite(chain.pose(np.full(chain.dof, 0.5))).all():
         raise Wrong("a pose is not finite")
 
 
-URDF = b"""<?xml version="1.0"?>
-<robot name="r"><link name="base"/><link name="upper"/><link name="tip"/>
-<joint name="a" type="revolute"><parent link="base"/><child link="upper"/>
-<origin xyz="0.1 0 -0.2" rpy="0 1.5 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="2.5"/></joint>
-<joint name="b" type="continuous"><parent link="upper"/><child link="tip"/>
-<axis xyz="0 1 0"/></joint></robot>
-"""
 HEAD = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
 TOUCH = {
     **{"event": "decision", "task": "object", "contact": 1, "onset_s": 1.5, "label": "cup"},
@@ -222,7 +216,7 @@ READERS = (
            lambda path: command(edge_main, "verify", "--model", MODEL, "--golden", path)),
     Reader("skin", ".toml", skins, mutate.of_text, lambda path: command(edge_main, "check", path)),
     Reader("arm", ".toml", files("edge/arms/cody.toml"), mutate.of_text, read_chain),
-    Reader("urdf", ".urdf", lambda: [URDF], mutate.of_text, read_chain),
+    Reader("urdf", ".urdf", lambda: [ARM.encode()], mutate.of_text, read_chain),
     Reader("map", ".jsonl", lambda: [MAP.encode()], mutate.of_text,
            lambda path: list(TouchMap(path))),
     Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, load_scene,

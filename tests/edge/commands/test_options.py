@@ -9,13 +9,7 @@ import pytest
 from edge import recording
 from edge.cli import main
 from edge.touch.arm import Chain
-
-URDF = """<robot name="two"><link name="base"/><link name="upper"/><link name="skin"/>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
-    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
-  <joint name="elbow" type="revolute"><parent link="upper"/><child link="skin"/>
-    <origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+from tests.edge.touch.test_urdf import ARM
 
 
 @pytest.mark.parametrize(
@@ -37,7 +31,7 @@ def test_a_value_that_an_option_does_not_take_is_refused(options, said, capsys):
 @pytest.fixture
 def files(tmp_path, make_touch):
     """A URDF of two joints, and a recording of as many angles that names no arm."""
-    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "arm.urdf").write_text(ARM)
     (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
     trial = make_touch()
     swing = np.linspace(0.0, 0.2, len(trial.t))
@@ -53,7 +47,7 @@ def record(folder, *options):
 
 
 def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, capsys):
-    assert record(files, "--arm", files / "arm.urdf", "--base", "base", "--tip", "skin") == 0
+    assert record(files, "--arm", files / "arm.urdf", "--base", "base", "--tip", "lower") == 0
     assert json.loads(capsys.readouterr().out)["joints"] is True
     kept = Chain.from_dict(recording.load(files / "out.npz").meta["arm"])
     assert (kept.names, kept.pose([0.0, 0.0])[0, 3]) == (("shoulder", "elbow"), 0.3)

@@ -108,10 +108,7 @@ def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (
-            lambda t: labelled(t),
-            "odd.npz: has no label that the model knows (category: rigid-fixed",
-        ),
+        (labelled, "odd.npz: has no label that the model knows (category: rigid-fixed"),
         (
             lambda t: labelled(t, object="sotf 1"),
             "label it, or teach it with --new-labels; did you mean 'soft 1'?",

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from edge.model.explanation import Change, Explanation, Near, Space, explain
-from edge.model.info import Task
 from edge.model.model import Model
-from export.graph import to_onnx
-from train.evaluate import stratified_folds
+from tests.sequential import fitted_model
 from train.pipeline import Choice
-from train.stopping import SequentialClassifier
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 
@@ -105,26 +102,20 @@ def test_a_trial_without_a_label_is_no_rival():
     assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
 
 
-def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(exported, tmp_path):
+def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(model, tmp_path):
     """Three decision points; one task takes one feature, the other lacks labels."""
-    info = replace(Model(exported / "model.onnx").info, decision_points_s=(0.3, 0.6, 1.2))
-    tasks = {
-        "of_area": Task(("a", "b", "c"), 3, 4, "none", 0.5, features=("contact_area",)),
-        "partial": Task(("d", "e"), 3, 4, "none", 0.5),
+    info = replace(model.info, decision_points_s=(0.3, 0.6, 1.2))
+    choices = {
+        "of_area": Choice("none", 4, 3, features=("contact_area",)),
+        "partial": Choice("none", 4, 3),
     }
-    choices = {name: Choice("none", 4, 3, features=task.features) for name, task in tasks.items()}
     rng = np.random.default_rng(0)
     X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
     vectors[-1] *= 1e3  # beyond the reach of the coordinates
     y = {"of_area": np.array(["a", "b", "c"] * 20), "partial": np.array(["d", "e", "", "d"] * 15)}
-    fitted = SequentialClassifier(choices, info.decision_points_s, info.features)
-    fitted.fit(X, y, stratified_folds(y["of_area"]), [choices] * 10)
-    calibration = {"stopping": fitted.stopping_, "novelty": fitted.novelty_}
-    info = replace(info, tasks=tasks, rows=60, trials=(), **calibration)
-    (tmp_path / "model.onnx").write_bytes(to_onnx(fitted, info))
-    model = Model(tmp_path / "model.onnx")
+    _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range
-    for name, task in tasks.items():
+    for name, task in model.info.tasks.items():
         space = Space.of(model, name)
         for vector in vectors:
             decision = model.decide(vector)[name]
@@ -136,8 +127,7 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(ex
                 assert task.labels[near.label] == y[name][near.row]
 
 
-def test_features_and_coordinates_are_cut_off_as_in_the_graph(exported):
-    model = Model(exported / "model.onnx")
+def test_features_and_coordinates_are_cut_off_as_in_the_graph(model, exported):
     vector = np.load(exported / "golden.npz")["vectors"][0]
     vector[3] = 1e9
     decision = model.decide(vector)["category"]

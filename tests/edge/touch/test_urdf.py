@@ -6,7 +6,8 @@ from edge.errors import InputError
 from edge.touch.arm import Chain
 from edge.touch.urdf import joints_between
 
-ARM = """<robot name="r">
+ARM = """<?xml version="1.0"?>
+<robot name="r">
   <link name="base"/><link name="upper"/><link name="lower"/><link name="aside"/>
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
     <origin xyz="0.3 0 -1e-3" rpy="0 1.5 0"/><axis xyz="0 1 0"/>
