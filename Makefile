@@ -40,7 +40,7 @@ help:
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
 	@echo "  make soak          ten minutes of the loop in virtual time: memory and schedule"
-	@echo "  make soak-day      24 hours of the same at 30 Hz"
+	@echo "  make soak-day      24 hours of the same at 15 Hz"
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
 	@echo "  make hard-cases-versions   the same answers from another ONNX Runtime"
@@ -207,7 +207,7 @@ soak: $(READY)
 	$(BIN)/python -m bench.soak
 
 soak-day: $(READY)
-	$(BIN)/python -m bench.soak --minutes 1440 --every 60 --rate 30
+	$(BIN)/python -m bench.soak --minutes 1440 --every 60 --rate 15
 
 $(VENV)/.upkeep: $(READY)
 	$(PIP) --group upkeep

@@ -5,7 +5,7 @@ of all transactions failing, decides on each contact with the model that comes w
 writes events, map and datagrams as `edge-classify run` does, and prints memory, descriptors,
 schedule and lost lines. The exit status is 1 where memory has grown after the first tenth of the
 time, a descriptor or a line was lost, or a tick left out. A virtual minute at 100 Hz takes about
-nine seconds of one core; a day at 30 Hz takes a little more than an hour.
+nine seconds of one core; a day at 15 Hz takes about an hour.
 """
 
 from __future__ import annotations
