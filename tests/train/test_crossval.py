@@ -85,15 +85,7 @@ def test_votes_for_every_k_at_once_are_those_one_by_one():
             assert (right[i, :, k - 1] == (winners == truth[i])).all()
 
 
-def test_equal_distances_and_duplicates_go_to_the_earlier_row():
-    rng = np.random.default_rng(1)
-    X = rng.normal(size=(4, 120))[[0, 1, 0, 2, 0, 3]]
-    rows = neighbours(X, max_components=2, max_k=3)
-    assert rows[0, :, :2].tolist() == [[2, 4], [2, 4]]
-    assert rows[4, :, :2].tolist() == [[0, 2], [0, 2]]
-
-
-@pytest.mark.parametrize(("distinct", "copies"), [(4, 30), (3, 41)])
+@pytest.mark.parametrize(("distinct", "copies"), [(3, 3), (4, 30), (3, 41)])
 def test_of_many_equal_distances_the_earlier_rows_are_taken(distinct, copies):
     """With 123 rows a matrix product rounds its last rows otherwise than the others."""
     n = distinct * copies
@@ -102,7 +94,7 @@ def test_of_many_equal_distances_the_earlier_rows_are_taken(distinct, copies):
     rows = neighbours(X, max_components=3, max_k=5)
     for i in range(n):
         same = [j for j in range(n) if j != i and (X[j] == X[i]).all()]
-        assert (rows[i] == same[:5]).all()
+        assert (rows[i, :, : len(same)] == same[:5]).all()
 
 
 def test_components_beyond_the_rank_add_nothing():

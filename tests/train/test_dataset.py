@@ -224,3 +224,9 @@ def test_angles_are_measured_by_the_names_of_their_joints(recordings, make_touch
     save(tmp_path / "b" / "one.npz", replace(trial, joints=shuffled, meta=meta))
     straight, reordered = load_trials([tmp_path / "a"]), load_trials([tmp_path / "b"], arm=arm)
     np.testing.assert_array_equal(reordered.features(), straight.features())
+
+
+def test_joint_angles_are_called_for_by_motion_alone(recordings):
+    assert load_trials([recordings]).chain is not None
+    assert load_trials([recordings], features=["force_motion"]).chain is not None
+    assert load_trials([recordings], features=["max_force", "skin_force"]).chain is None

@@ -204,16 +204,6 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
         series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=joints)
 
 
-def test_every_nth_frame_of_a_series_has_all_that_was_measured():
-    wanted = [*SETS["moments"], "taxel_force", "joint_angle", "skin_force", "force_motion"]
-    every_frame = series_of(touch(PEAKS, joints=np.arange(10.0).reshape(5, 2)), wanted, joints=2)
-    thin = every_frame._frames(slice(None, None, 2))
-    assert thin.integers.tolist() == every_frame.integers[::2].tolist()
-    assert thin.joints.tolist() == [[0.0, 1.0], [4.0, 5.0], [8.0, 9.0]]
-    assert thin.t.tolist() == [0.0, 0.5, 1.0]
-    assert len(feature_vector(thin, 1.0, 5, wanted)) == sum(widths(wanted, 5, SKIN, 2))
-
-
 @settings(max_examples=30)
 @given(
     peaks=st.lists(st.integers(10, 65535), min_size=5, max_size=5),

@@ -64,3 +64,33 @@ def test_method_iv_standardises_at_any_scale(scale):
     X = np.abs(np.random.default_rng(0).normal(size=(60, 120)))
     usual, far = (Projection("IV", 5).fit(v).transform(v) for v in (X, X * scale))
     assert far == pytest.approx(usual, rel=1e-3, abs=1e-3)
+
+
+SIX = ("skin_force", "contact_motion", "left_length", "max_force", "skin_area", "contact_area")
+
+
+def vectors(types):
+    """30 of so many feature types, with 4 samples of each."""
+    rng = np.random.default_rng(0)
+    scale = 10.0 ** rng.integers(-3, 4, types)
+    walks = rng.normal(size=(30, types, 4)).cumsum(axis=2)
+    return np.abs(walks * scale[:, None]).reshape(30, -1)
+
+
+def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stands():
+    X = vectors(6)
+    blocks = X.reshape(30, 6, 4)
+    largest = blocks.max(axis=(0, 2))
+    gain = scale_of(X, "V", SIX)
+    assert np.delete(gain, 1).tolist() == [1.0] * 5
+    assert gain[1] * largest[1] == pytest.approx(max(largest[3], largest[5]))
+
+
+@pytest.mark.parametrize("names", [("skin_force", "skin_area"), ("contact_motion", "skin_area")])
+def test_method_v_without_the_papers_features_is_no_scaling(names):
+    assert scale_of(vectors(2), "V", names).tolist() == [1.0, 1.0]
+
+
+def test_columns_that_are_no_whole_number_of_samples_are_refused():
+    with pytest.raises(InputError, match="10 columns are no whole number of samples of 3"):
+        scale_of(np.zeros((2, 10)), "IV")
