@@ -8,6 +8,8 @@ import train
 from edge.recording import save
 from train.thresholds import count_contacts, proposed
 
+GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
+
 
 def noisy(recording, seed):
     """With noise of up to 40 counts on every taxel."""
@@ -66,19 +68,17 @@ def saved(folder, make_touch, **skin):
 def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_path):
     high = {"threshold_counts": 150, "onset_counts": 200}
     data = saved(tmp_path, make_touch, **high)
-    given = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
-    fitted = train.fit(data, **given)
+    fitted = train.fit(data, **GIVEN)
     assert fitted.dataset.layout.threshold_counts < 150
     assert "recordings show no contact; in cross-validation" in fitted.notes[0]
     assert not fitted.dataset.untouched
-    held = train.fit(data, **given, threshold=150)
+    held = train.fit(data, **GIVEN, threshold=150)
     assert held.dataset.layout.threshold_counts == 150
     assert held.dataset.untouched
 
 
 def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
     data = saved(tmp_path, make_touch, threshold_counts=None, onset_counts=None)
-    given = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
-    fitted = train.fit(data, **given)
+    fitted = train.fit(data, **GIVEN)
     assert "warning: the skin was saved without thresholds" in fitted.notes[0]
     assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)

@@ -21,10 +21,10 @@ def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch)
     assert back.frames.dtype == np.uint16
 
 
-def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, capsys):
-    given = str(tmp_path / f"{'n' * 300}.csv")
-    assert main(["import", "csv", given, "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == f"train: {given}: no such file or folder\n"
+def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
+    given = tmp_path / f"{'n' * 300}.csv"
+    said = refusal("import", "csv", given, "--out", tmp_path / "out")
+    assert said == f"train: {given}: no such file or folder"
 
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):

@@ -29,10 +29,8 @@ def test_a_touch_is_drawn_over_the_trials_that_a_model_finds_nearest(
     assert np.all(np.diff(np.abs(widths)) <= 0)
 
 
-def test_a_folder_without_the_trials_is_one_sentence(exported, tmp_path, make_touch, capsys):
+def test_a_folder_without_the_trials_is_one_sentence(exported, tmp_path, make_touch, refusal):
     save(tmp_path / "new.npz", make_touch(kind="soft", seed=9))
-    words = ["show", str(tmp_path / "new.npz"), "--model", str(exported / "model.onnx")]
-    assert main(words) == 2
-    said = capsys.readouterr().err
+    said = refusal("show", tmp_path / "new.npz", "--model", exported / "model.onnx")
     assert "holds none of the nearest trials, such as soft_" in said
-    assert said.endswith("name their folder by --data\n")
+    assert said.endswith("name their folder by --data")

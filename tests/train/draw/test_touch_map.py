@@ -50,11 +50,10 @@ def test_a_map_is_drawn_beside_its_file(path, capsys):
         ("hello", [], "not a map"),
     ],
 )
-def test_what_cannot_be_drawn_is_one_sentence(path, capsys, text, options, sentence):
+def test_what_cannot_be_drawn_is_one_sentence(path, refusal, text, options, sentence):
     if text is not None:
         path.write_text(text + "\n")
-    assert main(["show", str(path), *options]) == 2
-    assert sentence in capsys.readouterr().err
+    assert sentence in refusal("show", path, *options)
     assert not path.with_suffix(".png").exists()
 
 

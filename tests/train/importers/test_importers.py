@@ -114,10 +114,9 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa(angles=[(40, [0.0] * 7), (0, [0.0] * 7)]), "go back"),
     ],
 )
-def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, capsys):
+def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, refusal):
     file = written(tmp_path, content)
-    assert main(["import", "sdh2", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err.strip().splitlines()[-1]
+    said = refusal("import", "sdh2", tmp_path, "--out", tmp_path / "out")
     assert word in said
     assert "cup" in said
     assert file.exists()

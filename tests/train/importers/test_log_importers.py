@@ -35,14 +35,14 @@ def header(types, t):
     return types.types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **more)
 
 
-def image(types, t, frame, *, encoding="mono16", big=False, padding=3):
+def image(types, t, frame, *, big=False, padding=3):
     raw = frame.astype(">u2" if big else "<u2").view(np.uint8).reshape(ROWS, -1)
     lines = np.pad(raw, ((0, 0), (0, padding)))
     return types.types["sensor_msgs/msg/Image"](
         header=header(types, t),
         height=ROWS,
         width=COLS,
-        encoding=encoding,
+        encoding="mono16",
         is_bigendian=int(big),
         step=lines.shape[1],
         data=lines.reshape(-1),
@@ -161,19 +161,18 @@ def test_angles_are_told_apart_by_the_names_of_their_joints(tmp_path, arm, capsy
     ("names", "said"),
     [
         (("a", *NAMES[1:]), "has no angle of the arm's joint j0; there are a, j1, j2, j3, j4"),
-        ((), None),
         (("j0", *NAMES[:-1]), "names a joint twice"),
         (NAMES[:3], "names are 3 and angles 5"),
     ],
 )
-def test_joints_that_do_not_suit_the_arm(tmp_path, arm, capsys, names, said):
+def test_joints_that_do_not_suit_the_arm(tmp_path, arm, refusal, names, said):
     path = bag_of(tmp_path, every(names, list(range(DOF))))
-    status = main(["import", "rosbag", str(path), "--out", str(tmp_path / "out"), *map(str, arm)])
-    if said is None:  # angles without names are taken in the arm's order
-        assert status == 0
-    else:
-        assert status == 2
-        assert said in capsys.readouterr().err
+    assert said in refusal("import", "rosbag", path, "--out", tmp_path / "out", *arm)
+
+
+def test_angles_without_names_are_taken_in_the_arms_order(tmp_path, arm):
+    path = bag_of(tmp_path, every((), list(range(DOF))))
+    assert differences(imported(tmp_path, "rosbag", path, *arm)) == []
 
 
 @pytest.mark.parametrize("dims", [True, False])
@@ -193,7 +192,7 @@ def test_a_bag_may_be_the_current_folder(tmp_path, monkeypatch):
     assert (tmp_path / "out" / "grasp.npz").exists()
 
 
-def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
+def test_of_two_topics_of_frames_one_must_be_named(tmp_path, refusal):
     messages = [array(STORES[2], f) for f in FRAMES]
     path = write_bag(tmp_path / "grasp", 2, messages, topics=("/left", "/right"))
     for beside, said in (
@@ -201,8 +200,7 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
         ('{"frames_topic": {}}', "frames_topic in grasp.json must be one of ['/left', '/right']"),
     ):
         (tmp_path / "grasp.json").write_text(beside)
-        assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refusal("import", "rosbag", path, "--out", tmp_path / "out")
     (tmp_path / "grasp.json").write_text('{"frames_topic": "/left"}')
     assert np.array_equal(imported(tmp_path, "rosbag", path).frames, FRAMES)
 
@@ -217,12 +215,11 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, capsys):
     ],
 )
 def test_a_file_beside_the_log_that_cannot_be_used_is_one_sentence(
-    tmp_path, capsys, beside, sentence
+    tmp_path, refusal, beside, sentence
 ):
     path = write_bag(tmp_path / "grasp", 2, [array(STORES[2], f) for f in FRAMES], joints=False)
     (tmp_path / "grasp.json").write_text(beside)
-    assert main(["import", "rosbag", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert sentence in capsys.readouterr().err
+    assert sentence in refusal("import", "rosbag", path, "--out", tmp_path / "out")
 
 
 def write_mcap(path, *, cdr, **options):
@@ -287,9 +284,6 @@ def not_a_bag(tmp_path):
         (not_a_bag, "not a readable bag"),
     ],
 )
-def test_what_cannot_be_used_is_one_sentence(tmp_path, capsys, make, sentence):
+def test_what_cannot_be_used_is_one_sentence(tmp_path, refusal, make, sentence):
     kind, path = make(tmp_path)
-    assert main(["import", kind, str(path), "--out", str(tmp_path / "out")]) == 2
-    error = capsys.readouterr().err.replace("\r", "\n").strip().splitlines()[-1]
-    assert error.startswith("train: ")
-    assert sentence in error
+    assert sentence in refusal("import", kind, path, "--out", tmp_path / "out")
