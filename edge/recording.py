@@ -303,11 +303,8 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     for key in ("t", "frames"):
         if key not in arrays:
             raise InputError(f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}")
-    meta = load_meta(name, arrays)
-    recording = Recording(
-        arrays["t"], arrays["frames"], arrays.get("joints"), arrays.get("valid"), meta
-    )
-    recording = _checked(name, recording)
+    fields: dict[str, Any] = {**arrays, "meta": load_meta(name, arrays)}
+    recording = _checked(name, Recording(**fields))
     _warn_of_another_unit(name, recording.t)
     return recording
 
@@ -360,9 +357,8 @@ def save(
     name = os.fspath(path)
     recording = _checked(name, recording, scale)
     _warn_of_another_unit(name, recording.t)
-    why = doubt(
-        recording.t, recording.frames, recording.meta.get("skin", {}), recording.layout.onset
-    )
+    skin = recording.meta.get("skin", {})
+    why = doubt(recording.t, recording.frames, skin, recording.layout.onset)
     if why is not None:
         LOG.warning(f"{name}: {why}")
     arrays = {key: getattr(recording, key) for key in KEYS[:-1]}

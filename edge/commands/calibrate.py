@@ -17,7 +17,6 @@ from edge.commands.options import add_skin, within
 from edge.commands.output import LOG, Output
 from edge.commands.source import open_skin
 from edge.errors import InputError
-from edge.i2c.chip import UNUSED
 from edge.skin.calibration import save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
@@ -107,7 +106,7 @@ def unusable(
     rest, bad = baseline.ravel(), share.ravel() < MIN_SHARE
     served = np.zeros(rest.size, dtype=bool)
     for chip in file.chips:
-        taxels = [taxel for taxel in chip.taxels if taxel != UNUSED]
+        taxels = chip.served
         served[taxels] = True
         bad[taxels] |= rest[taxels] >= chip.highest
         if not chip.kind.rests_at_zero:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 
 from edge.commands.options import within
-from edge.commands.output import Output
+from edge.commands.output import Output, counted
 from edge.fake.player import frame_bits
 from edge.skin.file import SkinFile, frame_rate, load
 
@@ -40,15 +40,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def faults(file: SkinFile) -> Iterator[str]:
     """Reasons why the skin cannot work, each a sentence."""
     top = min(chip.highest for chip in file.chips)
-    if file.layout.onset >= top:
-        yield (
-            f"no contact can begin: onset_counts is {file.layout.onset}, but a taxel gives at "
-            f"most {top}"
-        )
+    onset = file.layout.onset
+    if onset >= top:
+        yield f"no contact can begin: onset_counts is {onset}, but a taxel gives at most {top}"
     if any(chip.kind.name == "mpr121" and chip.sign == 1 for chip in file.chips):
         yield "sign = 1, but a touch lowers an MPR121's values: leave sign out, or set it to -1"
     silent = file.signal.dead_band_sigma == 0.0 and file.signal.dead_band_counts == 0
-    if file.layout.onset == 0 and silent:
+    if onset == 0 and silent:
         yield (
             "noise of one count begins a contact: set threshold_counts and onset_counts, or "
             "dead_band_sigma"
@@ -63,10 +61,7 @@ def remarks(file: SkinFile) -> Iterator[str]:
             "threshold_counts and onset_counts"
         )
     if file.layout.pitch_m is None:
-        yield (
-            "pitch_m is missing: contact motion is measured in taxels, and joint angles cannot "
-            "be used"
-        )
+        yield "pitch_m is missing: motion is measured in taxels, and joint angles cannot be used"
     if file.uncovered:
         yield f"taxels without a chip, which are never valid: {file.uncovered}"
     if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
@@ -122,12 +117,12 @@ def run(arguments: argparse.Namespace) -> int:
         "asked_hz": asked,
         "remarks": wrong + remarked,
     }
-    rows, cols = file.layout.shape
+    (rows, cols), chips = file.layout.shape, counted(len(file.chips), "chip")
     lines = [
-        f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {_chips(len(file.chips))}",
+        f"{arguments.skin}: {file.name}, {rows} x {cols} taxels on {chips}",
         *(
-            f"  {bus.device:<16} {_chips(len(bus.chips), 3):<9}  {count:>8.0f} bits a frame at "
-            f"{bus.clock_hz / 1000:g} {'kbit/s' if bus.serial else 'kHz'}"
+            f"  {bus.device:<16} {counted(len(bus.chips), 'chip'):>9}  {count:>8.0f} bits a frame "
+            f"at {bus.clock_hz / 1000:g} {'kbit/s' if bus.serial else 'kHz'}"
             for bus, count in zip(file.buses, bits, strict=True)
         ),
         f"The wires carry {rate:.1f} frames a second, with {arguments.overhead:g} us of software "
@@ -137,7 +132,3 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     output.event(event, "\n".join(lines))
     return 1 if wrong else 0
-
-
-def _chips(count: int, width: int = 0) -> str:
-    return f"{count:>{width}} chip{'s' * (count != 1)}"

@@ -10,7 +10,7 @@ import argparse
 from collections.abc import Iterator
 from typing import Any
 
-from edge.commands.output import Output, wrapped
+from edge.commands.output import Output, counted, wrapped
 from edge.commands.replay import contact_of
 from edge.model.explanation import Near, Space, explain
 from edge.model.info import ModelInfo
@@ -76,8 +76,7 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
     """An explanation for a person."""
     label, nearest, rival = line["label"], line["nearest"], line["rival"]
     votes = round(line["confidence"] * len(nearest))
-    plural = "s" * (len(nearest) != 1)
-    lines = [f"{line['task']}: {label}, by {votes} of {len(nearest)} vote{plural}"]
+    lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
     lines += ["  The nearest training trials, each with its distance:", *map(trial_text, nearest)]
     if rival:
         lines += ["  The nearest one with another label:", trial_text(rival)]

@@ -8,7 +8,7 @@ import argparse
 import json
 from typing import Any
 
-from edge.commands.output import Output, wrapped
+from edge.commands.output import Output, counted, wrapped
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 
@@ -87,9 +87,9 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
     for name, task in info.tasks.items():
         lines += wrapped(
-            f"{name}: {task.accuracy:.1%} accurate (nested), {task.components} "
-            f"component{'s' * (task.components != 1)}, {task.k} "
-            f"neighbour{'s' * (task.k != 1)}, scaling {task.scaling}"
+            f"{name}: {task.accuracy:.1%} accurate (nested), "
+            f"{counted(task.components, 'component')}, {counted(task.k, 'neighbour')}, "
+            f"scaling {task.scaling}"
         )
         lines += wrapped(", ".join(task.labels), "  ")
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())

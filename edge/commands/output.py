@@ -61,6 +61,15 @@ def bar(share: float) -> str:
     return "█" * full + "·" * (BAR - full)
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "chip"), counted(2, "chip")
+    ('1 chip', '2 chips')
+    """
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def wrapped(text: str, indent: str = "") -> list[str]:
     """The text in lines as wide as the terminal, and at most `LONGEST_LINE`."""
     columns = min(shutil.get_terminal_size().columns, LONGEST_LINE)
@@ -97,9 +106,7 @@ def event_text(line: Mapping[str, Any]) -> str:
         return f"{line['frames']} frames{median if period else ''}, {line['missed_ticks']} missed"
     if kind == "saved":
         labels = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
-        cut = (
-            "" if line["complete"] else "; incomplete, as reading stopped before the contact's end"
-        )
+        cut = "" if line["complete"] else "; incomplete: reading stopped before the contact's end"
         return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {labels}{cut}"
     if kind == "unknown_touches":
         return f"{line['unknown']} of the last {line['touches']} touches are unknown to the model"

@@ -11,7 +11,7 @@ from typing import Any
 
 from edge.classifier import AS_TRAINED, Classifier, suited
 from edge.commands.options import add_error, check_error
-from edge.commands.output import LOG, Output
+from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, printable
 from edge.model.info import Task
 from edge.model.model import Model
@@ -123,7 +123,7 @@ class Summary:
 
     def text(self) -> str:
         """One table for each task: a row for each true label, a column for each decided one."""
-        recordings = f"{self.recordings} recording{'s' * (self.recordings != 1)}"
+        recordings = counted(self.recordings, "recording")
         paragraphs = [recordings]
         if self.as_trained:
             paragraphs.append(

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from edge.commands.options import add_skin
 from edge.commands.output import Output
 from edge.commands.source import chip_event, open_skin
-from edge.i2c.chip import UNUSED
 from edge.skin.loop import Loop
 from edge.skin.skin import ChipStatus
 
@@ -31,9 +30,8 @@ def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
     """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
     marks = np.full(invalid.shape, " ")
     for status in statuses:
-        for taxel in status.spec.taxels:
-            if taxel != UNUSED:
-                marks.flat[taxel] = "." if invalid.flat[taxel] else "#"
+        for taxel in status.spec.served:
+            marks.flat[taxel] = "." if invalid.flat[taxel] else "#"
     return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
 
@@ -49,10 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
         silent = 0
         for status in statuses:
             spec = status.spec
-            taxels = set(spec.taxels) - {UNUSED}
-            bad = int(invalid.flat[list(taxels)].sum())
+            bad = int(invalid.flat[spec.served].sum())
             fault = status.error or (f"{spec.route}: {SILENT}: {bad}" if bad else "")
-            silent += status.state != "running" or bad == len(taxels)
+            silent += status.state != "running" or bad == len(spec.served)
             if output.as_json or fault:
                 event = chip_event(status, kind=spec.kind.name, invalid=bad)
                 output.event(event, f"{spec.kind.name}: {fault}")

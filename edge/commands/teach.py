@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.commands.output import LOG, Output
+from edge.commands.output import LOG, Output, counted
 from edge.commands.replay import contact_of
 from edge.files import write_whole
 from edge.model.model import Model
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         text = f"{task}: {count} of {len(names)} trials taught"
         output.event({**line, "file": str(target)}, text)
         for label, trials in unknown[task].items():
-            of_label = f"{trials} trial{'s' * (trials != 1)} of the new label {label!r}"
+            of_label = f"{counted(trials, 'trial')} of the new label {label!r}"
             if not new:
                 of_label = f"left out {of_label}; --new-labels adds it"
             LOG.warning(f"{task}: {of_label}{spelled_like(label, model.info.tasks[task].labels)}")

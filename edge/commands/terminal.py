@@ -13,6 +13,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.commands.output import counted
 from edge.skin.loop import Stop
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -79,7 +80,7 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
         scale = layout.counts_per_newton
         force = f"{region.peak} counts" if scale is None else f"{region.peak / scale:.2f} N"
         row, col = region.centroid
-        taxels = f"{region.area} taxel{'s' * (region.area != 1)}"
+        taxels = counted(region.area, "taxel")
         items.append(f"{force} on {taxels} at row {row:.1f}, column {col:.1f}")
     if len(regions) != 1:
         items.append(f"{len(regions) - 1} more" if regions else "no contact")

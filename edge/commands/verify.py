@@ -29,9 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     for check in checks:
         line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
         line["passed"] = check.passed
-        text = (
-            f"{'ok' if check.passed else 'DIFFERS':<8} {check.name:<{width}} {check.rows:>6} rows"
-        )
+        verdict = "ok" if check.passed else "DIFFERS"
+        text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
         if check.worst < float("inf"):
             line["share_of_bound"] = round(check.worst, 6)
         if check.row is not None:

@@ -89,7 +89,7 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
         return file
     baseline = np.zeros(file.layout.shape, dtype=np.uint16)
     for chip in file.chips:
-        baseline.flat[[taxel for taxel in chip.taxels if taxel != UNUSED]] = chip.kind.rest(chip)
+        baseline.flat[chip.served] = chip.kind.rest(chip)
     noise = np.full(baseline.shape, noise_counts)
     return replace(file, calibration=TaxelCalibration(baseline, noise))
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from edge import demo
 from edge.fake.player import calibrated
-from edge.i2c.chip import UNUSED
 from edge.recording import Recording, load
 from edge.skin.decoder import Decoder
 from edge.skin.file import SkinFile
@@ -81,10 +80,10 @@ def reach(file: SkinFile) -> int:
     calibration = calibrated(file).calibration
     assert calibration is not None
     at_rest = calibration.baseline.ravel().tolist()
-    places = [(chip, taxel) for chip in file.chips for taxel in chip.taxels if taxel != UNUSED]
     return min(
         at_rest[taxel] - 1 if chip.sign < 0 else chip.highest - at_rest[taxel]
-        for chip, taxel in places
+        for chip in file.chips
+        for taxel in chip.served
     )
 
 

@@ -153,6 +153,11 @@ class ChipSpec:
         return self.options.get(name, self.kind.options[name].default)
 
     @property
+    def served(self) -> list[int]:
+        """The flat indices of the taxels that it serves."""
+        return [taxel for taxel in self.taxels if taxel != UNUSED]
+
+    @property
     def route(self) -> str:
         """Mux, channel and address for a person to read."""
         way = "" if self.mux is None else f"mux {self.mux:#04x} channel {self.channel} "

@@ -185,8 +185,9 @@ def _labels(action: dict[str, Any]) -> dict[str, str]:
     if not isinstance(labels, dict) or not 1 <= len(labels) <= MOST_LABELS:
         raise InputError(f"give 1 to {MOST_LABELS} labels, each as TASK=LABEL")
     for text in (*labels, *labels.values()):
-        if not (isinstance(text, str) and text.strip().isprintable()):
-            raise InputError(f"{text!r} is no label; give printable text")
-        if not 0 < len(text.strip()) <= LONGEST_LABEL:
-            raise InputError(f"a task and a label have 1 to {LONGEST_LABEL} characters each")
+        printable = isinstance(text, str) and text.strip().isprintable()
+        if not printable or not 0 < len(text.strip()) <= LONGEST_LABEL:
+            raise InputError(
+                f"{text!r} is no label; give 1 to {LONGEST_LABEL} printable characters"
+            )
     return {task.strip(): label.strip() for task, label in labels.items()}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
-from edge.i2c.chip import UNUSED, ChipSpec, Defaults
+from edge.i2c.chip import ChipSpec, Defaults
 from edge.skin.kinds import defaults_of
 from edge.skin.wiring import BusSpec, read_buses, taxel_at
 from edge.touch.layout import SkinLayout
@@ -100,7 +100,7 @@ class SkinFile:
     def uncovered(self) -> int:
         """Number of taxels that no chip serves."""
         taxels = self.layout.rows * self.layout.cols
-        return taxels - len({taxel for chip in self.chips for taxel in chip.taxels} - {UNUSED})
+        return taxels - len({taxel for chip in self.chips for taxel in chip.served})
 
 
 def load(path: str | os.PathLike[str]) -> SkinFile:
@@ -206,7 +206,7 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
 def _tellable(buses: Sequence[BusSpec], baseline: NDArray[np.uint16], where: str) -> None:
     """Refuse the calibration of a skin with other chips."""
     for chip in (chip for bus in buses for chip in bus.chips):
-        highest = max(baseline[[taxel for taxel in chip.taxels if taxel != UNUSED]], default=0)
+        highest = max(baseline[chip.served], default=0)
         if highest > chip.highest:
             raise InputError(
                 f"{where}: calibration.baseline is {highest} for a taxel of a {chip.kind.name}, "

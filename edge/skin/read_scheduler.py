@@ -8,7 +8,6 @@ overdue. A taxel that was not read keeps its last value and its own time (`Frame
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.chip import UNUSED
 from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
 from edge.skin.file import SkinFile
 from edge.touch.frame import Frame
@@ -41,7 +40,7 @@ class ReadScheduler:
         for bus in file.buses:
             taxels_of_chip = np.zeros((len(bus.chips), *file.layout.shape), dtype=np.bool_)
             for i, chip in enumerate(bus.chips):
-                taxels_of_chip[i].flat[[taxel for taxel in chip.taxels if taxel != UNUSED]] = True
+                taxels_of_chip[i].flat[chip.served] = True
             # A chip is near a contact on its own taxels or on those next to them.
             near = with_neighbours(taxels_of_chip, file.layout.wraps)
             self._near.append(near.reshape(len(near), -1))

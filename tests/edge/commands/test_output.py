@@ -86,8 +86,8 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
         (
             {"event": "saved", "file": "a/box-001.npz", "labels": {"object": "box"}, "frames": 150,
              "seconds": 1.5, "complete": False},
-            "a/box-001.npz: 1.5 s, 150 frames, object=box; incomplete, as reading stopped before "
-            "the contact's end",
+            "a/box-001.npz: 1.5 s, 150 frames, object=box; incomplete: reading stopped before the "
+            "contact's end",
         ),
     ],
 )  # fmt: skip
