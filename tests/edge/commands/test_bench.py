@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from pathlib import Path
 
 import pytest
 
@@ -9,7 +10,6 @@ from edge import __version__
 from edge.cli import main
 from edge.commands import bench
 from edge.commands.bench import summary, touch
-from edge.model.model import Model
 from edge.touch.track import ContactTracker, first_contact
 
 
@@ -31,14 +31,14 @@ def test_every_stage_has_a_median_and_a_99th_percentile(board):
         assert stage["n"] >= 4
 
 
-def test_a_busy_machine_is_named_and_the_fastest_round_counts(exported, monkeypatch, caplog):
+def test_a_busy_machine_is_named_and_the_fastest_round_counts(model, monkeypatch, caplog):
     """The process gets a quarter of the time; each of its rounds is slower than the one before."""
     rounds = iter(range(1, 6))
     monkeypatch.setattr(bench.time, "process_time", iter((0.0, 0.25)).__next__)
     monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
     monkeypatch.setattr(bench, "time_stages", lambda *_: {"answer": {"median_us": next(rounds)}})
     monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
-    board = bench.measure(Model(exported / "model.onnx"))
+    board = bench.measure(model)
     assert board["stages"] == {"answer": {"median_us": 1}}
     assert board["load"]["waited"] == 0.75
     assert "this machine is busy: bench waited 75% of the time" in caplog.text
@@ -53,11 +53,11 @@ def test_memory_cold_start_and_machine_are_named(board):
     assert machine["edge-classify"] == __version__
 
 
-def test_the_model_is_named_by_its_digest(board, exported):
-    data = (exported / "model.onnx").read_bytes()
+def test_the_model_is_named_by_its_digest(board, model):
+    data = Path(model.path).read_bytes()
     assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
     assert board["model"]["bytes"] == len(data)
-    assert board["model"]["data_digest"] == Model(exported / "model.onnx").info.data_digest
+    assert board["model"]["data_digest"] == model.info.data_digest
 
 
 def test_percentiles_are_by_nearest_rank():
@@ -65,9 +65,9 @@ def test_percentiles_are_by_nearest_rank():
     assert summary([float(i) for i in range(1, 201)]) == expected
 
 
-def test_the_touch_is_a_contact_that_grows_over_the_whole_window(exported):
-    info = Model(exported / "model.onnx").info
-    frames = touch(Model(exported / "model.onnx"), info.window_s)
+def test_the_touch_is_a_contact_that_grows_over_the_whole_window(model):
+    info = model.info
+    frames = touch(model, info.window_s)
     tracker = ContactTracker(info.layout, info.debounce, chain=info.chain, horizon_s=info.window_s)
     onset, series = first_contact(frames, tracker)
     assert onset == 0.0

@@ -13,7 +13,6 @@ from edge.fake.player import Playback, play, skin_file
 from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
-from edge.touch.layout import SkinLayout
 
 
 def noise(shape, n=20, top=65536):
@@ -32,9 +31,8 @@ def test_a_skin_of_any_shape_gives_back_its_recording(shape):
 
 
 def test_raw_values_saturate_as_a_chip_does():
-    layout = SkinLayout(rows=16, cols=24)
     recording = noise((16, 24))
-    file = skin_file(layout)
+    file = skin_file(recording.layout)
     file = replace(file, signal=replace(file.signal, saturation_counts=65535))
     skin, _ = play(file, recording)
     with skin:

@@ -36,8 +36,8 @@ def test_labels_follow_from_a_category_and_the_reverse():
     assert joined({"category": "none", "object": "cup"}) == {"category": "none", "object": "cup"}
 
 
-def test_labels_that_are_not_known_are_counted_and_become_the_last_ones(exported):
-    info = Model(exported / "model.onnx").info
+def test_labels_that_are_not_known_are_counted_and_become_the_last_ones(model):
+    info = model.info
     info = replace(info, tasks={task: replace(e, k=5) for task, e in info.tasks.items()})
     labels = [{"object": "mug"}, {"object": "cup"}, {"object": "mug", "lid": "x"}, {}]
     unknown = unknown_labels(info, [*labels, {"category": "soft-fixed"}])
@@ -47,8 +47,8 @@ def test_labels_that_are_not_known_are_counted_and_become_the_last_ones(exported
     assert {task: entry.k for task, entry in after.items()} == {"category": 5, "object": 1}
 
 
-def test_no_label_is_added_to_tasks_that_are_decided_together(exported):
-    info = Model(exported / "model.onnx").info
+def test_no_label_is_added_to_tasks_that_are_decided_together(model):
+    info = model.info
     category = info.tasks["category"]
     factors = {"softness": (0, 1), "mobility": (0, 0)}
     pair = {
@@ -67,7 +67,7 @@ def test_a_misspelled_label_is_asked_about_and_another_one_is_not():
     assert spelled_like("blue cup", ("red cup", "tool box")) == ""
 
 
-def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(exported, tmp_path):
+def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(model, exported, tmp_path):
     data = (exported / "model.onnx").read_bytes()
     contents = onnx_file.read(data, "model")
     assert onnx_file.rewritten(data, {}, {}) == data
@@ -75,7 +75,6 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(exported, tmp
     again = onnx_file.rewritten(data, same, {})
     (tmp_path / "model.onnx").write_bytes(again)
     assert len(again) == len(data)
-    model = Model(tmp_path / "model.onnx")
     vectors = np.random.default_rng(0).normal(size=(5, model.info.width))
-    before = Model(exported / "model.onnx").run(vectors)
-    assert all((values == before[key]).all() for key, values in model.run(vectors).items())
+    before, after = model.run(vectors), Model(tmp_path / "model.onnx").run(vectors)
+    assert all((values == before[key]).all() for key, values in after.items())

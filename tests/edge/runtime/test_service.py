@@ -14,14 +14,14 @@ import pytest
 
 from edge import demo
 from edge.cli import parser
+from tests.conftest import ROOT
 from train.touch_map import TouchMap
 
-ROOT = Path(__file__).parents[3]
 UNIT = ROOT / "board" / "edge-classify.service"
 TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
 
 
-def start(manager, tmp_path, *arguments):
+def start(manager, *arguments):
     fake = ("--fake", str(TOUCH), "--loop")
     return subprocess.Popen(
         [sys.executable, "-m", "edge", "run", "--model", str(demo.MODEL), *fake, *arguments],
@@ -35,7 +35,7 @@ def start(manager, tmp_path, *arguments):
 
 def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, tmp_path):
     place = tmp_path / "map.jsonl"
-    with start(manager, tmp_path, "--map", str(place)) as process:
+    with start(manager, "--map", str(place)) as process:
         assert manager.recv(4096) == f"READY=1\nSTATUS=reading fake {TOUCH}".encode()
         for _ in range(3):
             assert manager.recv(4096) == b"WATCHDOG=1"

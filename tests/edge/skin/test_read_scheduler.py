@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from edge.fake.player import Playback, fake_skin
-from edge.model.model import Model
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
@@ -138,8 +137,8 @@ def felt(file, recording, info):
 
 
 @pytest.mark.parametrize("name", ["hard_0", "soft_2"])
-def test_features_and_decisions_agree_with_full_reading(recordings, exported, name):
-    model, trial = Model(exported / "model.onnx"), load(recordings / f"{name}.npz")
+def test_features_and_decisions_agree_with_full_reading(recordings, model, name):
+    trial = load(recordings / f"{name}.npz")
     (full, full_onset_s), (near, onset_s) = (felt(f, trial, model.info) for f in (CODY, SCHEDULED))
     # While nothing touches, all chips are read once in three frames.
     assert abs(onset_s - full_onset_s) < 0.03

@@ -135,24 +135,16 @@ def test_the_centroid_is_that_of_the_cut_with_the_least_variance(active):
     assert Fraction(region.sums[1], region.area) in centres
 
 
-def test_equal_areas_go_to_the_overlap_then_the_peak_then_the_lowest_index():
-    counts = frame((1, 3), (1, 4), (8, 3), (8, 4), (12, 10), (12, 11))
+@pytest.mark.parametrize("width", [1, 2], ids=["single taxels", "pairs"])
+def test_equal_areas_go_to_the_overlap_then_the_peak_then_the_lowest_index(width):
+    places = [(row, col) for row in (1, 8, 12) for col in range(3, 3 + width)]
+    counts = frame(*places)
     assert largest_region(counts, 50).index == 1 * 24 + 3
-    counts[8, 4] = 200
-    counts[12, 11] = 200
+    counts[8, 3] = counts[12, 3] = 200
     assert largest_region(counts, 50).index == 8 * 24 + 3
-    before = largest_region(frame((12, 11), (12, 12)), 50)
-    assert largest_region(counts, 50, previous=before).index == 12 * 24 + 10
-
-
-def test_equal_single_taxels_follow_the_same_rule():
-    counts = frame((1, 3), (5, 9), (9, 20))
-    counts[5, 9] = counts[9, 20] = 101
-    assert largest_region(counts, 50).index == 5 * 24 + 9
-    before = largest_region(frame((1, 3), (1, 4)), 50)
-    assert largest_region(counts, 50, previous=before).index == 1 * 24 + 3
-    elsewhere = largest_region(frame((15, 0)), 50)
-    assert largest_region(counts, 50, previous=elsewhere).index == 5 * 24 + 9
+    for row, expected in ((12, 12), (1, 1), (15, 8)):
+        before = largest_region(frame((row, 2), (row, 3)), 50)
+        assert largest_region(counts, 50, previous=before).index == expected * 24 + 3
 
 
 @pytest.mark.parametrize(
