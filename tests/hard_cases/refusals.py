@@ -110,6 +110,8 @@ SIZES: dict[str, Callable[[float], object]] = {
     "a vector, infinite once scaled": lambda size: small_model().model.decide(np.full(120, size)),
     "units of training vectors": lambda size: Projection("none", 3).fit(features(20) * size),
 }
+BEYOND = [("a vector, infinite once scaled", size) for size in (1e303, -1e305, 1.7e308)]
+BEYOND += [("units of training vectors", size) for size in (1e-300, 1e-40, 1e105, 1e300)]
 
 
 def let_in(entry: str, bad: float) -> float:
@@ -149,12 +151,6 @@ CASES = [
         "one sentence, no result",
         "let in",
         let_in,
-        [
-            {"entry": entry, "bad": size}
-            for entry, sizes in zip(
-                SIZES, [(1e303, -1e305, 1.7e308), (1e-300, 1e-40, 1e105, 1e300)], strict=True
-            )
-            for size in sizes
-        ],
+        [{"entry": entry, "bad": size} for entry, size in BEYOND],
     ),
 ]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.train.test_evaluate import trials
 from train.crossval import accuracies, neighbours
 from train.evaluate import stratified_folds
 from train.report.score import (
@@ -22,17 +23,15 @@ from train.search import SearchGrid
 ONE = ("max_force",)
 
 
-def overlapping(n=26, seed=0, spread=1.0):
-    rng = np.random.default_rng(seed)
-    y = np.array(["a", "b", "c"])[np.arange(n) % 3]
-    X = rng.normal(size=(n, 24)) * spread
-    X[:, :8] += (y == "a")[:, None] * 0.8
-    X[:, 8:16] += (y == "b")[:, None] * 0.6
-    return X, y
+def clear():
+    """Trials of three classes that lie far apart."""
+    y = np.array(["a", "b", "c"])[np.arange(60) % 3]
+    middle = 20.0 * ((y == "a").astype(float) - (y == "b"))
+    return np.random.default_rng(0).normal(size=(60, 30)) + middle[:, None], y
 
 
 def test_the_best_cell_is_reported_with_its_answers():
-    X, y = overlapping()
+    X, y = trials(26)
     best = grid_search(X, {"t": y})["t"]
     table = accuracies(neighbours(X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
@@ -51,17 +50,15 @@ def test_a_changed_trial_is_never_recognised_by_its_own_twin():
 
 
 def test_a_change_that_moves_trials_among_others_costs():
-    X, y = overlapping(30, spread=0.2)
+    X, y = clear()
     best = grid_search(X, {"t": y})
     assert transfer(X, {"t": y}, best, X + 0.01)["t"].accuracy > 0.8
-    others = X[np.roll(np.arange(30), 1)]
+    others = np.roll(X, 1, axis=0)
     assert transfer(X, {"t": y}, best, others)["t"].accuracy < 0.3
 
 
 def test_nested_accuracy_of_clear_classes_is_one():
-    rng = np.random.default_rng(0)
-    y = np.repeat(["a", "b", "c"], 20)
-    X = rng.normal(size=(60, 30)) + 20.0 * (y == "a")[:, None] - 20.0 * (y == "b")[:, None]
+    X, y = clear()
     result = nested(X, {"t": y}, stratified_folds(y), grid=SearchGrid("IV"), features=ONE)["t"]
     assert (result.right, result.total, result.components, result.k) == (60, 60, 1, 1)
 
