@@ -94,17 +94,16 @@ def run(arguments: argparse.Namespace) -> int:
     for name, recording in touches(file, trials=arguments.trials, seed=arguments.seed):
         paths.append(folder / f"{name}.npz")
         save(paths[-1], recording)
-    event = {
-        "event": "faked",
-        "skin": arguments.skin,
-        "touches": str(folder),
-        "trials": len(paths),
-        "still": str(rest),
-    }
     skin, first = arguments.skin, paths[0]
     frames = round(STILL_S * file.reading.rate_hz)
     output.event(
-        event,
+        {
+            "event": "faked",
+            "skin": skin,
+            "touches": str(folder),
+            "trials": len(paths),
+            "still": str(rest),
+        },
         f"{folder}: {len(paths)} labelled touches of 4 objects\n{rest}: no touch\n\n"
         "Rehearse with them:\n"
         f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames}\n"

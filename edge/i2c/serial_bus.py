@@ -139,9 +139,7 @@ class SerialBus:
         try:
             import serial
         except ImportError:
-            raise InputError(
-                f"{self.name}: serial ports need pyserial; run `pip install pyserial`"
-            ) from None
+            raise InputError(f"{self.name}: needs pyserial; run `pip install pyserial`") from None
         self._received.clear()
         try:
             if self._port is None:
