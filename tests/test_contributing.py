@@ -6,7 +6,6 @@
 import json
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +15,12 @@ import train
 import train.importers
 from edge import cli
 from edge.recording import load
+from tests.conftest import ROOT
 from train.__main__ import main
 from train.feature_sets import SETS
 from train.report.section import Section, Table
 from train.study import run as study
 
-ROOT = Path(__file__).parents[1]
 TABLE = re.findall(r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M)
 
 

@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from edge.i2c import block
 from edge.i2c.chip import MOST_TAXELS
 from edge.model.info import FORMAT
 from export.__main__ import main as export
+from tests.conftest import ROOT
 
-ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
 

@@ -5,7 +5,6 @@ import re
 import shlex
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -14,10 +13,10 @@ from edge.i2c import bus
 from edge.recording import Recording, load, save
 from edge.skin import file as skinfile
 from export.cli import parser as export_parser
+from tests.conftest import ROOT
 from train.__main__ import main as train
 from train.importers import sdh2
 
-ROOT = Path(__file__).parents[1]
 GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)

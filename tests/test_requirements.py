@@ -1,9 +1,8 @@
 """requirements-board.txt pins the board's packages as constraints.txt does, with their hashes."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from tests.conftest import ROOT
 
 
 def test_the_versions_are_those_of_the_constraints():
