@@ -75,12 +75,8 @@ def test_units_are_those_of_the_skin():
 
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
-    assert expand(["contact_area", "paper", "skin_force"]) == (
-        "contact_area",
-        "max_force",
-        "contact_motion",
-        "skin_force",
-    )
+    given = ["contact_area", "paper", "skin_force"]
+    assert expand(given) == ("contact_area", "max_force", "contact_motion", "skin_force")
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])

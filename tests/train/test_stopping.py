@@ -7,13 +7,7 @@ from edge.errors import InputError
 from edge.model.stopping import NOVELTY_RATE
 from train.evaluate import stratified_folds
 from train.pipeline import Choice
-from train.stopping import (
-    SequentialClassifier,
-    answers,
-    confidences,
-    logistic,
-    unlike,
-)
+from train.stopping import SequentialClassifier, answers, confidences, logistic, unlike
 
 
 class TestLogistic:

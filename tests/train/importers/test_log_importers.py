@@ -56,6 +56,14 @@ def array(types, frame, *, dims=True):
     return types.types["std_msgs/msg/UInt16MultiArray"](layout=layout, data=frame.reshape(-1))
 
 
+def images(version=2, *, big=False):
+    return [image(STORES[version], t, frame, big=big) for t, frame in zip(T, FRAMES, strict=True)]
+
+
+def arrays(*, dims=True):
+    return [array(STORES[2], frame, dims=dims) for frame in FRAMES]
+
+
 def joint_state(types, t, q, names=NAMES):
     empty = np.zeros(0)
     q = np.asarray(q, dtype=np.float64)
@@ -107,10 +115,8 @@ def differences(recording, *, joints=True):
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("big", [False, True])
 def test_a_bag_of_images_with_joint_states(tmp_path, version, big):
-    types = STORES[version]
     name = "grasp.bag" if version == 1 else "grasp"
-    messages = [image(types, t, f, big=big) for t, f in zip(T, FRAMES, strict=True)]
-    path = write_bag(tmp_path / name, version, messages)
+    path = write_bag(tmp_path / name, version, images(version, big=big))
     (tmp_path / "grasp.json").write_text(json.dumps(BESIDE))
     recording = imported(tmp_path, "rosbag", path)
     assert differences(recording) == []
@@ -129,8 +135,7 @@ def arm(tmp_path):
 
 
 def bag_of(tmp_path, states):
-    messages = [image(STORES[2], t, f) for t, f in zip(T, FRAMES, strict=True)]
-    return write_bag(tmp_path / "grasp", 2, messages, states=states)
+    return write_bag(tmp_path / "grasp", 2, images(), states=states)
 
 
 def every(names, columns, t=JOINT_T):
@@ -177,8 +182,7 @@ def test_angles_without_names_are_taken_in_the_arms_order(tmp_path, arm):
 
 @pytest.mark.parametrize("dims", [True, False])
 def test_a_bag_of_arrays_takes_the_shape_from_the_layout_or_from_beside(tmp_path, dims):
-    messages = [array(STORES[2], f, dims=dims) for f in FRAMES]
-    path = write_bag(tmp_path / "grasp", 2, messages, joints=False)
+    path = write_bag(tmp_path / "grasp", 2, arrays(dims=dims), joints=False)
     if not dims:
         beside = {"skin": {"rows": ROWS, "cols": COLS}}
         (tmp_path / "grasp.json").write_text(json.dumps(beside))
@@ -186,15 +190,13 @@ def test_a_bag_of_arrays_takes_the_shape_from_the_layout_or_from_beside(tmp_path
 
 
 def test_a_bag_may_be_the_current_folder(tmp_path, monkeypatch):
-    messages = [array(STORES[2], f) for f in FRAMES]
-    monkeypatch.chdir(write_bag(tmp_path / "grasp", 2, messages, joints=False))
+    monkeypatch.chdir(write_bag(tmp_path / "grasp", 2, arrays(), joints=False))
     imported(tmp_path, "rosbag", ".")
     assert (tmp_path / "out" / "grasp.npz").exists()
 
 
 def test_of_two_topics_of_frames_one_must_be_named(tmp_path, refusal):
-    messages = [array(STORES[2], f) for f in FRAMES]
-    path = write_bag(tmp_path / "grasp", 2, messages, topics=("/left", "/right"))
+    path = write_bag(tmp_path / "grasp", 2, arrays(), topics=("/left", "/right"))
     for beside, said in (
         ("{}", 'frames are on /left, /right; name one of them as "frames_topic"'),
         ('{"frames_topic": {}}', "frames_topic in grasp.json must be one of ['/left', '/right']"),
@@ -217,7 +219,7 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, refusal):
 def test_a_file_beside_the_log_that_cannot_be_used_is_one_sentence(
     tmp_path, refusal, beside, sentence
 ):
-    path = write_bag(tmp_path / "grasp", 2, [array(STORES[2], f) for f in FRAMES], joints=False)
+    path = write_bag(tmp_path / "grasp", 2, arrays(), joints=False)
     (tmp_path / "grasp.json").write_text(beside)
     assert sentence in refusal("import", "rosbag", path, "--out", tmp_path / "out")
 
@@ -229,8 +231,8 @@ def write_mcap(path, *, cdr, **options):
         return types.serialize_cdr(message, kind) if cdr else json.dumps(fields).encode()
 
     frames = [
-        data("sensor_msgs/msg/Image", image(types, t, f), {"counts": f.tolist()})
-        for t, f in zip(T, FRAMES, strict=True)
+        data("sensor_msgs/msg/Image", message, {"counts": frame.tolist()})
+        for message, frame in zip(images(), FRAMES, strict=True)
     ]
     poses = [
         data("sensor_msgs/msg/JointState", joint_state(types, t, q), {"q": q.tolist()})
