@@ -21,8 +21,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.cli import dispatch
+from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import candidates
 from train.choose import Chosen
 from train.dataset import DataSet, load_trials
@@ -54,20 +55,39 @@ SEEDS, COUNT = 5, 20
 """Batches, each of a seed of its own; trials of each object and condition in a batch."""
 
 
-def vectors(
-    drawn: DataSet, X: NDArray[np.float64], others: NDArray[np.int64], names: Sequence[str]
-) -> NDArray[np.float64]:
-    """(windows, m, features * samples) vectors of the trials that were not drawn.
+@dataclass(frozen=True, kw_only=True)
+class DrawnSet(DataSet):
+    """A data set of trials drawn from a pool, whose vectors are measured once for all sets.
 
-    Args:
-        drawn: a data set of the pool's trials.
-        X: (windows, trials, p) vectors of the pool, measured once for all data sets.
-        others: (m,) rows of the pool.
-        names: some of the features that were measured.
+    Attributes:
+        rows: (n,) of its trials in the pool.
+        pool: (windows, trials, p) vectors of the pool's trials at each of `POINTS_S`.
+        columns: {feature: its columns in the vectors}.
     """
-    ends = np.cumsum(drawn.widths())
-    columns = dict(zip(drawn.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
-    return X[:, others[:, None], np.concatenate([columns[name] for name in names])]
+
+    rows: NDArray[np.int64]
+    pool: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.int64]]
+
+    def others(
+        self, labels: NDArray[np.str_]
+    ) -> tuple[NDArray[np.int64], dict[str, NDArray[np.str_]]]:
+        """The rows of the pool that were not drawn, and their labels for each task."""
+        rows = np.setdiff1d(np.arange(labels.shape[1]), self.rows)
+        return rows, dict(zip(self.tasks, labels[:, rows], strict=True))
+
+    def vectors(
+        self, windows_s: Sequence[float], rows: NDArray[np.int64], names: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """(windows, m, features * samples) vectors of some rows of the pool."""
+        columns = np.concatenate([self.columns[name] for name in names])
+        return np.stack([self.pool[POINTS_S.index(w)][rows[:, None], columns] for w in windows_s])
+
+    def features(
+        self, window_s: float = WINDOW_S, samples: int = SAMPLES, names: Sequence[str] | None = None
+    ) -> NDArray[np.float64]:
+        """(n, features * samples) vectors at one of `POINTS_S`."""
+        return self.vectors([window_s], self.rows, self.names if names is None else names)[0]
 
 
 def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
@@ -85,21 +105,18 @@ def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
     return replace(dataset, trials=tuple(trials)), X
 
 
-def certified(
-    drawn: DataSet, X: NDArray[np.float64], others: NDArray[np.int64], labels: NDArray[np.str_]
-) -> NDArray[np.float64]:
+def certified(drawn: DrawnSet, labels: NDArray[np.str_]) -> NDArray[np.float64]:
     """(tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean seconds.
 
     They are NaN where the request is refused. The first request is the smallest error that is
-    certified. They are judged on the trials that were not drawn, `others` (m,) of the pool's
-    vectors X (windows, trials, p), with the labels (tasks, m).
+    certified. The trials are those that were not drawn; labels (tasks, trials) are the pool's.
     """
     fitted = fit(drawn, decision_points_s=POINTS_S, quick=True, jobs=1)
-    y = dict(zip(drawn.tasks, labels, strict=True))
+    others, y = drawn.others(labels)
     model, seconds = fitted.sequential, np.array(POINTS_S)
     assert model is not None
     outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
-    _, _, courses = model.judged(vectors(drawn, X, others, fitted.dataset.names), y)
+    _, _, courses = model.judged(drawn.vectors(POINTS_S, others, fitted.dataset.names), y)
     for task, out in zip(y, outcomes, strict=True):
         stopping = model.stopping_[task]
         for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
@@ -110,20 +127,18 @@ def certified(
     return outcomes
 
 
-def shown(
-    drawn: DataSet, X: NDArray[np.float64], others: NDArray[np.int64], labels: NDArray[np.str_]
-) -> NDArray[np.float64]:
+def shown(drawn: DrawnSet, labels: NDArray[np.str_]) -> NDArray[np.float64]:
     """(tasks, names, 5) window, accuracy, its interval and the realised accuracy of the front.
 
-    The last is that of the trials that were not drawn (see `certified`).
+    The last is that of the trials that were not drawn; labels (tasks, trials) are the pool's.
     """
-    y = dict(zip(drawn.tasks, labels, strict=True))
+    others, y = drawn.others(labels)
     points: dict[float, dict[str, Chosen]] = {}
     right: dict[float, dict[str, float]] = {}
-    for window, at_window in zip(POINTS_S, X, strict=True):
+    for window in POINTS_S:
         fitted = fit(drawn, window_s=window, decision_points_s=(), quick=True, jobs=1)
-        asked = vectors(drawn, at_window[None], others, fitted.dataset.names)
-        answered = answers([fitted.classifier], asked)
+        vectors = drawn.vectors([window], others, fitted.dataset.names)
+        answered = answers([fitted.classifier], vectors)
         points[window] = fitted.chosen
         right[window] = {task: float((answered[task][0][0] == y[task]).mean()) for task in y}
     rows = []
@@ -150,10 +165,13 @@ def run(arguments: argparse.Namespace) -> int:
     X, first = np.concatenate([x for _, x in batches], axis=1), batches[0][0]
     y = np.array([[trial.labels[task] for trial in trials] for task in first.tasks])
     rng = np.random.default_rng(arguments.seed)
+    ends = np.cumsum(first.widths())
+    columns = dict(zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
     cases = []
     for _ in range(arguments.sets):
-        rows, others = map(np.sort, np.split(rng.permutation(len(trials)), [arguments.trials]))
-        cases.append((replace(first, trials=tuple(trials[rows])), X, others, y[:, others]))
+        rows = np.sort(rng.permutation(len(trials))[: arguments.trials])
+        drawn = {**vars(first), "trials": tuple(trials[rows])}
+        cases.append((DrawnSet(**drawn, rows=rows, pool=X, columns=columns), y))
     outcomes = np.array(work(certified, cases, "certified errors"))
     fronts = np.array(work(shown, cases[: arguments.fronts], "fronts"))
     return int(report(first.tasks, outcomes, fronts) > 0)
