@@ -260,11 +260,13 @@ def test_plug_puts_a_skin_on_the_bus_until_ctrl_c(pad, edge):
     seen = []
 
     def look():
-        while not (devices := list(Path("/sys/class/i2c-dev").glob("i2c-*"))):
-            time.sleep(0.05)
-        with closing(LinuxBus(f"/dev/{devices[0].name}")) as bus:
-            seen.append(fetch(bus, OTHER_CHIP, CONFIGURATION, 1))
-        os.kill(os.getpid(), signal.SIGINT)
+        try:
+            while not (devices := list(Path("/dev").glob("i2c-*"))):
+                time.sleep(0.05)
+            with closing(LinuxBus(str(devices[0]))) as bus:
+                seen.append(fetch(bus, OTHER_CHIP, CONFIGURATION, 1))
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
 
     looking = threading.Thread(target=look)
     looking.start()
