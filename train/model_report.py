@@ -29,7 +29,7 @@ from train.report.work import Workers
 QUARTERS = 4
 """The learning curve has a point for each of these parts of the training trials."""
 EXPLAINED = 60
-"""About so many trials are explained beside the wrong answers."""
+"""About this many trials are explained beside the wrong answers."""
 UNTOUCHED = "(no contact)"
 
 
@@ -182,8 +182,8 @@ def _accuracy(exported: Exported, task: str) -> Section:
     untouched = exported.fitted.dataset.untouched_labels(task)
     tested = answer.truth != ""
     truth = np.array([*answer.truth[tested], *untouched], dtype=str)
-    missed = [label if label == NO_CONTACT else UNTOUCHED for label in untouched]
-    answers = np.array([*answer.answers[-1][tested], *missed], dtype=str)
+    untouched_answers = [label if label == NO_CONTACT else UNTOUCHED for label in untouched]
+    answers = np.array([*answer.answers[-1][tested], *untouched_answers], dtype=str)
     text = f"{accuracy(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."

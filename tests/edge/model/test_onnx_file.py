@@ -41,10 +41,10 @@ def a_sparse_constant():
     return proto
 
 
-def weights_elsewhere(**told):
+def weights_elsewhere(**fields):
     tensor = numpy_helper.from_array(np.ones(2), "w")
     tensor.external_data.add(key="location", value="/etc/passwd")
-    tensor.MergeFrom(TensorProto(**told))
+    tensor.MergeFrom(TensorProto(**fields))
     tensor.ClearField("raw_data")
     return model([add()], [tensor])
 
@@ -79,7 +79,8 @@ def test_what_no_exported_model_has_is_refused(proto, sentence):
 
 @pytest.mark.parametrize("value", [0.5, 3, "text", [0.5, 1.5], [1, 2]], ids=str)
 def test_an_attribute_may_be_numbers_or_a_text(value):
-    check(model([add(own=value)]).SerializeToString(), "m.onnx")
+    contents = check(model([add(own=value)]).SerializeToString(), "m.onnx")
+    assert (contents.foreign, [node.operator for node in contents.nodes]) == ([], ["Add"])
 
 
 OTHER_ATTRIBUTES = {
