@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.projection import Grid, Spectrum, on_grid
 from train.scaling import centred_and_scaled, finite
+from train.threads import single_thread
 
 MAX_COMPONENTS = 20
 MAX_K = 20
@@ -74,8 +74,7 @@ def neighbours(
     if n < 2:
         raise InputError(f"leave-one-out needs at least 2 trials, not {n}")
     rows = np.empty((n, max_components, min(max_k, n - 1)), dtype=np.int64)
-    # On matrices this small several threads are slower than one.
-    with threadpool_limits(1):
+    with single_thread():
         for i, query in enumerate(X if tested is None else tested):
             others = np.delete(np.arange(n), i)
             mean, gain, known = centred_and_scaled(X[others], scaling, features)

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.statistics import wilson
@@ -26,6 +25,7 @@ from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
 from train.scaling import centred_and_scaled, finite, widths_of
 from train.search import Decomposition, SearchGrid
+from train.threads import single_thread
 
 FOLDS = 10
 SEED = 2012
@@ -119,7 +119,7 @@ def _answers(
     """{task: (candidates, test)} whether each candidate, fitted on `train`, is right."""
     answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
     fitted_for = None
-    with threadpool_limits(1):
+    with single_thread():
         for grid in grids:
             for tasks, counts in _counted(grid, classes, own, train):
                 if fitted_for != (grid.scaling, grid.features, counts.tobytes()):

@@ -29,7 +29,6 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.special import expit
-from threadpoolctl import threadpool_limits
 
 from edge.errors import InputError
 from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, margin
@@ -37,6 +36,7 @@ from edge.touch.features import FEATURES
 from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
+from train.threads import single_thread
 
 FEWEST = 20
 """Trials that calibration needs."""
@@ -111,7 +111,7 @@ def _fold(
     others = {task: y[task][~left_out] for task in y}
     owned = None if own is None else own[~left_out]
     models = _models(X[:, ~left_out], others, choices, features, widths, owned)
-    with threadpool_limits(1):
+    with single_thread():
         return answers(models, X[:, left_out])
 
 
@@ -281,7 +281,7 @@ class SequentialClassifier:
             X: (points, m, p).
             y: {task: (m,) labels}.
         """
-        with threadpool_limits(1):
+        with single_thread():
             answered = answers(self.decision_points_, X)
         confidence = {
             task: confidences(self.stopping_[task].slopes, self.stopping_[task].intercepts, margins)
@@ -327,8 +327,7 @@ def _models(
     widths: Sequence[int] | None,
     own: NDArray[np.bool_] | None,
 ) -> list[ContactClassifier]:
-    # Decompositions this small are slower on several threads than on one.
-    with threadpool_limits(1):
+    with single_thread():
         return [ContactClassifier(choices, features, widths).fit(x, y, own) for x in X]
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
 from train.progress import bar
+from train.threads import single_thread
 
 
 @dataclass(frozen=True)
@@ -39,5 +39,5 @@ class Workers:
 
 
 def _single(function: Callable[..., Any], case: tuple[Any, ...]) -> Any:
-    with threadpool_limits(1):
+    with single_thread():
         return function(*case)
