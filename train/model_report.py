@@ -188,8 +188,8 @@ def _accuracy(exported: Exported, task: str) -> Section:
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     text += (
-        " The intervals are for the exported model on other trials: Wilson's for half as many "
-        "trials, because that model differs from those of the folds. Where entire groups are left "
+        " The intervals are for the exported model on other trials: Wilson's for two fifths "
+        "of the trials, because that model differs from those of the folds. Where entire groups are left "
         "out they count groups, whose trials are right or wrong together."
     )
     labels = sorted(set(truth))

@@ -102,9 +102,9 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
     assert table.nested("t").right == right
 
 
-def test_a_promise_is_as_wide_as_half_of_its_trials_make_it():
+def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
     assert Result(90, 100).interval == wilson(90, 100)
-    assert Promise(90, 100).interval == wilson(45, 50)
+    assert Promise(90, 100).interval == wilson(36, 40)
     assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
 
 

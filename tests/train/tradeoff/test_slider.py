@@ -30,7 +30,7 @@ def test_the_interval_is_that_which_the_front_promises():
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
     text = slider(ANSWERS)
-    assert '<td class="share">97 %</td><td class="interval">(88 to 99)</td>' in text
+    assert '<td class="share">97 %</td><td class="interval">(86 to 99)</td>' in text
     assert text.count('<td class="unseen">73 %</td>') == 1
     assert "make export EXPORT='--quick --window" in text
     assert text.index("<label hidden>") < text.index("<script>")
