@@ -31,7 +31,7 @@ def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     assert sum(row.count("*") for row in rows) == 2  # one a task
     answers = [line for line in lines if line.startswith(("category:", "object:"))]
     assert all("of 16 trials are classified correctly (95 % interval " in line for line in answers)
-    low, high = wilson(8, 8)
+    low, high = wilson(6.4, 6.4)
     shown = f"(95 % interval {100 * low:.0f} to {100 * high:.0f})"
     assert shown in answers[0]
     info = Model(tmp_path / "model.onnx").info
