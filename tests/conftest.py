@@ -1,14 +1,18 @@
-"""Recordings small enough to read, and a model fitted on them."""
+"""Recordings small enough to read, a model fitted on them, and the command as a user runs it."""
 
+import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
+import train
+from edge.cli import main as edge_classify
 from edge.recording import Recording, save
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
@@ -79,10 +83,11 @@ def make_touch():
 
 
 def save_touches(folder: Path, count: int, **more) -> Path:
-    """The folder, with so many hard and so many soft touches."""
+    """The folder, with so many hard and so many soft touches, in the order of their seeds."""
+    digits = len(str(count - 1))
     for kind in ("hard", "soft"):
         for seed in range(count):
-            save(folder / f"{kind}_{seed:02d}.npz", touch(kind=kind, seed=seed, **more))
+            save(folder / f"{kind}_{seed:0{digits}}.npz", touch(kind=kind, seed=seed, **more))
     return folder
 
 
@@ -95,11 +100,34 @@ def forearm() -> SkinLayout:
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory) -> Path:
     """A folder of 16 labelled recordings, 4 objects in 2 categories, with joint angles."""
-    folder = tmp_path_factory.mktemp("recordings")
-    for kind in ("hard", "soft"):
-        for seed in range(8):
-            save(folder / f"{kind}_{seed}.npz", touch(kind=kind, seed=seed))
-    return folder
+    return save_touches(tmp_path_factory.mktemp("recordings"), 8)
+
+
+def in_a_row(*touches: Recording, rest: int = 50) -> Recording:
+    """Touches one after another at 100 Hz, each with so many frames of rest after it."""
+    still = np.zeros((rest, *touches[0].frames.shape[1:]), np.uint16)
+    frames = np.concatenate([part for each in touches for part in (each.frames, still)])
+    ends = [np.repeat(each.joints[-1:], rest, axis=0) for each in touches]
+    joints = [part for each, end in zip(touches, ends, strict=True) for part in (each.joints, end)]
+    t = np.arange(len(frames)) / 100.0
+    return replace(touches[0], t=t, frames=frames, joints=np.concatenate(joints))
+
+
+def lines(text: str) -> list[dict]:
+    """The JSON objects of a text, one a line."""
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture
+def edge(capsys):
+    """Run `edge-classify`; returns status, stdout's lines as JSON, and stderr."""
+
+    def run(*arguments, text=False):
+        status = edge_classify([str(a) for a in arguments])
+        out = capsys.readouterr()
+        return status, out.out if text else lines(out.out), out.err
+
+    return run
 
 
 def python(*arguments, **options) -> subprocess.CompletedProcess:
@@ -120,6 +148,12 @@ def exported(recordings, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("exported")
     assert main(["--data", str(recordings), "--out", str(out), *PAPER]) == 0
     return out
+
+
+@pytest.fixture(scope="session")
+def fitted(recordings):
+    """What training makes of those recordings with the paper's features, before its export."""
+    return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
 
 
 @pytest.fixture(scope="session")

@@ -1,38 +1,36 @@
 """The demo in the wheel, and the golden outputs of its model."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 from edge import demo
-from edge.cli import main
 from edge.model.model import Model
 from edge.recording import load, save
 
 GOLDEN = Path(__file__).parent / "golden" / "demo.npz"
 
 
-def test_the_demo_touches_one_of_each_category_and_gets_them_right(capsys):
-    assert main(["demo"]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_the_demo_touches_one_of_each_category_and_gets_them_right(edge):
+    status, lines, _ = edge("demo")
+    assert status == 0
     decided = {line["label"] for line in lines if line.get("task") == "category"}
     assert decided == {"rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"}
     assert all(line["label"] == line["expected"] for line in lines if line["event"] == "decision")
 
 
-def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, capsys):
+def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, edge):
     other = load(demo.recordings()[0])
     labels = {**other.labels, "mobility": "movable"}
     save(tmp_path / "wrong.npz", replace(other, meta={**other.meta, "labels": labels}))
     monkeypatch.setattr(demo, "recordings", lambda: [tmp_path / "wrong.npz"])
-    assert main(["demo"]) == 1
+    status, _, err = edge("demo")
     tasks = len(Model(demo.MODEL).info.tasks)
     sentence = f"edge-classify: {tasks - 1} of {tasks} decisions are right\n"
-    assert capsys.readouterr().err == sentence
+    assert (status, err) == (1, sentence)
 
 
-def test_the_committed_golden_outputs_are_met(capsys):
-    assert main(["verify", "--model", str(demo.MODEL), "--golden", str(GOLDEN)]) == 0
-    checks = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_the_committed_golden_outputs_are_met(edge):
+    status, checks, _ = edge("verify", "--model", demo.MODEL, "--golden", GOLDEN)
+    assert status == 0
     assert {check["name"] for check in checks} >= {"series counts", "object_neighbours"}
     assert min(check["rows"] for check in checks) >= len(demo.recordings())

@@ -5,7 +5,6 @@ import pty
 import shutil
 import subprocess
 import tty
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +15,8 @@ from edge.i2c.chip import WrongChip
 from edge.i2c.serial_bus import SerialBus
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
+from tests.conftest import ROOT
 
-ROOT = Path(__file__).parents[1]
 MATRIX = ROOT / "examples" / "firmware" / "matrix"
 TAXELS = 100
 
@@ -33,7 +32,7 @@ def host(tmp_path_factory):
         program = folder / f"host{bits}"
         if not program.exists():
             command = ["g++", "-std=c++11", "-O1", "-Wall", "-Wextra", "-Werror", f"-DWIDTH={bits}"]
-            source = str(Path(__file__).with_name("firmware_host.cpp"))
+            source = str(ROOT / "tests" / "firmware_host.cpp")
             subprocess.run([*command, f"-I{MATRIX}", "-o", str(program), source], check=True)
         return program
 

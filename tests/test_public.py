@@ -2,13 +2,12 @@
 
 import doctest
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
 import edge
+from tests.conftest import ROOT
 
-ROOT = Path(__file__).parents[1]
 WITH_EXAMPLES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for path in (ROOT / "edge").rglob("*.py")

@@ -11,7 +11,7 @@ from edge.errors import InputError
 from edge.events import Decided, Onset, Release
 from edge.fake.player import play, skin_file
 from edge.model.model import Model, require_joints
-from edge.recording import Recording
+from tests.conftest import in_a_row
 
 
 def watch(model, recording):
@@ -156,17 +156,14 @@ def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(
 
 
 def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(model, make_touch):
-    touch = make_touch(seconds=0.5, lead_s=0.2)
-    t = np.concatenate([touch.t, touch.t + 1.0, [2.5]])
-    frames = np.concatenate([touch.frames, touch.frames, np.zeros((1, 16, 24), dtype=np.uint16)])
-    joints = np.concatenate([touch.joints, touch.joints, touch.joints[-1:]])
-    events = watch(model, Recording(t, frames, joints, None, touch.meta))
+    touch = make_touch(seconds=0.5)
+    events = watch(model, in_a_row(touch, touch, rest=40))
     kinds = [type(e) for _, e in events]
     assert kinds == [Onset, Release, Onset, Decided, Decided, Release, Decided, Decided]
     assert events[1][1].onset_s == 0.2
-    assert events[1][1].release_s == pytest.approx(1.0)
+    assert events[1][1].release_s == pytest.approx(0.99)
     onsets = [e.onset_s for _, e in events if isinstance(e, Decided)]
-    assert onsets == pytest.approx([0.2, 0.2, 1.2, 1.2])
+    assert onsets == pytest.approx([0.2, 0.2, 1.3, 1.3])
 
 
 @pytest.mark.parametrize(

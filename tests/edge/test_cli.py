@@ -120,16 +120,6 @@ def test_an_error_of_the_program_is_not_hidden():
         cli.dispatch(top(raising(ZeroDivisionError())), [])
 
 
-def test_only_the_command_that_is_asked_for_is_loaded():
-    code = (
-        "import sys; from edge import cli; cli.parser(['check']); "
-        "print(*sorted(m for m in sys.modules if m.startswith('edge.commands.')))"
-    )
-    said = python("-c", code).stdout.split()
-    assert "edge.commands.check" in said
-    assert not {"edge.commands.run", "edge.commands.replay", "edge.commands.bench"} & set(said)
-
-
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_path):
     """Nor does a file that is opened later take its descriptor, and get what is printed."""

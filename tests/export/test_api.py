@@ -3,8 +3,6 @@
 import hashlib
 from dataclasses import replace
 
-import pytest
-
 import export
 import train
 from edge.classifier import Classifier
@@ -13,11 +11,6 @@ from edge.model.verify import verify
 from edge.recording import load, save
 from export.api import measure
 from train.report.summary import names, warnings
-
-
-@pytest.fixture(scope="module")
-def fitted(recordings):
-    return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
 
 
 def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):

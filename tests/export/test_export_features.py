@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from edge.cli import main as edge_classify
 from edge.errors import InputError
 from edge.model.model import Model
 from export.__main__ import main
@@ -38,23 +37,23 @@ def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six):
         Model(six / "model.onnx").decide(vector)
 
 
-def test_its_golden_file_holds(six, capsys):
-    files = ["--model", str(six / "model.onnx"), "--golden", str(six / "golden.npz")]
-    assert edge_classify(["verify", *files]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_its_golden_file_holds(six, edge):
+    files = ("--model", six / "model.onnx", "--golden", six / "golden.npz")
+    status, lines, _ = edge("verify", *files)
+    assert status == 0
     counts = next(line for line in lines if line["name"] == "series counts")
     assert counts["passed"]
     assert counts["rows"] > 1000
 
 
-def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(recordings, tmp_path, capsys):
+def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(recordings, tmp_path, edge):
     given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
     assert main([*given, "--features", "kernels", "zone_kernels", "--tasks", "object"]) == 0
     model = Model(tmp_path / "model.onnx")
     assert sum(len(table.biases) for table in model.info.kernels.values()) == model.info.width
     assert len(json.dumps(model.info.to_json())) < 20_000
-    files = ["--model", str(model.path), "--golden", str(tmp_path / "golden.npz")]
-    assert edge_classify(["verify", *files]) == 0
+    files = ("--model", model.path, "--golden", tmp_path / "golden.npz")
+    assert edge("verify", *files, text=True)[0] == 0
     dataset = load_trials([recordings], features=model.info.features).with_kernels(1.2)
     own = [model.info.vector(trial.series) for trial in dataset.trials]
     assert (np.stack(own) == dataset.features(1.2)).all()

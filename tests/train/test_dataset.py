@@ -12,6 +12,7 @@ from edge.model.model import Model
 from edge.recording import load, save
 from edge.touch.arm import Chain, Joint
 from edge.touch.features import feature_vector
+from tests.conftest import in_a_row
 from train.dataset import load_trials
 
 
@@ -77,8 +78,7 @@ def test_one_threshold_for_all(folder):
 
 
 def test_recordings_that_are_never_touched_are_left_out_and_named(folder, make_touch):
-    quiet = make_touch()
-    save(folder / "quiet.npz", replace(quiet, frames=np.zeros_like(quiet.frames)))
+    save(folder / "quiet.npz", make_touch(seconds=0.0))
     data = load_trials([folder])
     assert [path.name for path, _ in data.untouched] == ["quiet.npz"]
     assert len(data.trials) == 4
@@ -107,24 +107,18 @@ def test_a_label_that_a_few_lack_stays_a_task_without_them(folder, make_touch):
     assert [path.name for path in data.left_out["a label for object"]] == ["odd.npz"]
 
 
-def twice(recording):
+@pytest.fixture
+def two(make_touch):
     """Two contacts, half a second apart."""
-    n = len(recording.t)
-    gap = np.zeros((50, *recording.frames.shape[1:]), dtype=np.uint16)
-    return replace(
-        recording,
-        t=np.arange(2 * n + 50) / 100.0,
-        frames=np.concatenate([recording.frames, gap, recording.frames]),
-        joints=None,
-    )
+    touch = make_touch(seconds=0.6)
+    return in_a_row(touch, touch)
 
 
 def with_contacts(recording, contacts):
     return replace(recording, meta={**recording.meta, "contacts": contacts})
 
 
-def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(make_touch, tmp_path):
-    two = twice(make_touch(seconds=0.6))
+def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, tmp_path):
     save(tmp_path / "two.npz", two)
     data = load_trials([tmp_path])
     assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
@@ -145,8 +139,8 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(make_t
         ([1, 2], 'must be "alike" or a list'),
     ],
 )
-def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, make_touch, tmp_path):
-    save(tmp_path / "two.npz", with_contacts(twice(make_touch(seconds=0.6)), contacts))
+def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, two, tmp_path):
+    save(tmp_path / "two.npz", with_contacts(two, contacts))
     with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
         load_trials([tmp_path])
 

@@ -4,20 +4,20 @@ import signal
 from contextlib import contextmanager
 
 from edge import demo
-from edge.cli import main
 from edge.commands import fake
 from edge.commands.output import Output
 from edge.recording import load
 from edge.skin import file as skinfile
 
 
-def test_what_to_rehearse_next_is_said_at_a_terminal(tmp_path, monkeypatch, capsys):
+def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch):
     monkeypatch.setattr(Output, "of", classmethod(lambda cls, arguments: cls(arguments.json)))
-    skin = str(skinfile.shipped("matrix"))
-    assert main(["fake", "--skin", skin, "--out", str(tmp_path), "--trials", "1"]) == 0
+    skin = skinfile.shipped("matrix")
+    status, out, _ = edge("fake", "--skin", skin, "--out", tmp_path, "--trials", 1, text=True)
+    assert status == 0
     still = tmp_path / "still.npz"
     asked = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
-    (frames,) = (s for s in capsys.readouterr().out.splitlines() if s.strip().startswith(asked))
+    (frames,) = (s for s in out.splitlines() if s.strip().startswith(asked))
     assert int(frames.split()[-1]) == len(load(still).t)
 
 

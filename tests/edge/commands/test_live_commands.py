@@ -9,8 +9,7 @@ from edge import recording
 from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
-from tests.conftest import python
-from tests.edge.commands.conftest import lines
+from tests.conftest import lines, python
 
 
 def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):

@@ -1,6 +1,5 @@
 """Options that several commands share: numbers with limits, and the arm that carries the skin."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -40,22 +39,24 @@ def files(tmp_path, make_touch):
     return tmp_path
 
 
-def record(folder, *options):
-    given = {"--fake": "two.npz", "--out": "out.npz"}
-    paths = [str(part) for name, file in given.items() for part in (name, folder / file)]
-    return main(["record", "--label", "object=a", *paths, *map(str, options)])
+@pytest.fixture
+def record(edge, files):
+    """Record the fake touch as a user does; returns status, stdout's lines and stderr."""
+    given = ("--label", "object=a", "--fake", files / "two.npz", "--out", files / "out.npz")
+    return lambda *options: edge("record", *given, *options)
 
 
-def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, capsys):
-    assert record(files, "--arm", files / "arm.urdf", "--base", "base", "--tip", "lower") == 0
-    assert json.loads(capsys.readouterr().out)["joints"] is True
+def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, record):
+    given = ("--arm", files / "arm.urdf", "--base", "base", "--tip", "lower")
+    status, (event,), _ = record(*given)
+    assert (status, event["joints"]) == (0, True)
     kept = Chain.from_dict(recording.load(files / "out.npz").meta["arm"])
     assert (kept.names, kept.pose([0.0, 0.0])[0, 3]) == (("shoulder", "elbow"), 0.3)
     (files / "out.npz").unlink()
     (files / "arm.toml").write_text(
         '[[joint]]\nname="a"\naxis=[0,0,1]\n[[joint]]\nname="b"\naxis=[0,1,0]\n'
     )
-    assert record(files, "--arm", files / "arm.toml") == 0
+    assert record("--arm", files / "arm.toml")[0] == 0
     assert Chain.from_dict(recording.load(files / "out.npz").meta["arm"]).names == ("a", "b")
 
 
@@ -71,8 +72,8 @@ def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, capsys):
         (["--tip", "skin"], "--base and --tip need --arm arm.urdf"),
     ],
 )
-def test_an_arm_that_cannot_be_used_is_refused(files, options, said, capsys, monkeypatch):
+def test_an_arm_that_cannot_be_used_is_refused(files, record, options, said, monkeypatch):
     monkeypatch.chdir(files)
-    assert record(files, *options) == 2
-    assert said in capsys.readouterr().err
+    status, _, err = record(*options)
+    assert (status, said in err) == (2, True)
     assert not (files / "out.npz").exists()

@@ -10,7 +10,6 @@ import pytest
 
 from edge import demo
 from edge.classifier import Classifier
-from edge.cli import main
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import load, save
@@ -103,12 +102,12 @@ def both():
     return replace(a, t=t, frames=frames, joints=joints, meta={**a.meta, "labels": {}})
 
 
-def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, capsys):
+def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
     save(tmp_path / "both.npz", both)
     place = tmp_path / "touches.jsonl"
-    command = ["run", "--model", str(demo.MODEL), "--fake", str(tmp_path / "both.npz")]
-    assert main([*command, "--map", str(place)]) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    given = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz", "--map", place)
+    status, lines, _ = edge("run", *given)
+    assert status == 0
     decisions = [line for line in lines if line["event"] == "decision"]
     assert len({line["contact"] for line in decisions}) == 2
     found = TouchMap(place)

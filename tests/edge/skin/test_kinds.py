@@ -1,11 +1,8 @@
 """The list of chips: a further chip is one entry. The defaults that a skin file need not give."""
 
-import json
-
 import numpy as np
 import pytest
 
-from edge.cli import main
 from edge.errors import InputError
 from edge.fake.player import fake_skin
 from edge.i2c.bus import fetch
@@ -108,7 +105,7 @@ chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
 """
 
 
-def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, capsys):
+def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
     """The file, the skin, the fake, `scan` and `calibrate` know it from its descriptor."""
     monkeypatch.setitem(KINDS, "toy", TOY)
     file = parse(TOY_SKIN)
@@ -120,11 +117,11 @@ def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, capsys):
     path, recording = tmp_path / "toy.toml", tmp_path / "rest.npz"
     path.write_text(TOY_SKIN)
     save(recording, Recording(np.arange(50) / 100.0, np.zeros((50, 2, 4), np.uint16)))
-    fake = ["--skin", str(path), "--fake", str(recording)]
-    assert main(["scan", *fake, "--json"]) == 0
-    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    fake = ("--skin", path, "--fake", recording)
+    status, events, _ = edge("scan", *fake)
+    assert status == 0
     assert [(event["kind"], event["state"]) for event in events] == [("toy", "running")] * 2
-    assert main(["calibrate", *fake, "--frames", "40"]) == 0
+    assert edge("calibrate", *fake, "--frames", 40)[0] == 0
     assert (skinfile.load(path).calibration.baseline == 20).all()
 
 

@@ -9,6 +9,7 @@ from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import DEBOUNCE, ContactTracker, first_contact
+from tests.conftest import in_a_row
 from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(4, 6, threshold_counts=10, onset_counts=20, pitch_m=0.01)
@@ -174,14 +175,12 @@ def test_another_skin_is_refused(device, word):
 
 
 def test_the_first_of_two_contacts_is_given_whole(make_touch, forearm):
-    one = make_touch(seconds=0.5, arm=False)
-    gap = np.zeros((30, *forearm.shape), dtype=np.uint16)
-    frames = np.concatenate([one.frames, gap, 2 * one.frames])
-    twice = replace(one, t=np.arange(len(frames)) / 100.0, frames=frames)
-    onset_s, series = first_contact(twice, ContactTracker(forearm))
+    first = make_touch(seconds=0.5)
+    both = in_a_row(first, replace(first, frames=2 * first.frames), rest=30)
+    onset_s, series = first_contact(both, ContactTracker(forearm))
     assert onset_s == 0.2
     assert series.ended
-    assert series.peak.max() == one.frames.max()
+    assert series.peak.max() == first.frames.max()
 
 
 def test_a_recording_without_a_contact_gives_none(make_touch, forearm):

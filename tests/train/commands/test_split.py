@@ -4,13 +4,13 @@ from dataclasses import replace
 
 from edge.recording import load, save
 from edge.touch.track import ContactTracker
-from tests.train.test_dataset import twice
+from tests.conftest import in_a_row
 from train.__main__ import main
 from train.dataset import contacts
 
 
 def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_path, capsys):
-    two = twice(make_touch(seconds=0.6))
+    two = in_a_row(*[make_touch(seconds=0.6)] * 2)
     each = [{"object": "one"}, {"object": "other"}]
     save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))
     assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0

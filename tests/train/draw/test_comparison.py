@@ -6,7 +6,7 @@ from matplotlib import image
 from edge import demo
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.recording import Recording, load
+from edge.recording import load
 from train.__main__ import main
 from train.draw import comparison
 
@@ -42,8 +42,7 @@ def test_a_dark_page_gets_light_lines_on_a_dark_background(tmp_path):
 def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
     with pytest.raises(InputError, match="give 6"):
         comparison.draw([("a", make_touch())] * 7, tmp_path / "a.png")
-    quiet = make_touch()
-    quiet = Recording(quiet.t, 0 * quiet.frames, meta=quiet.meta)
+    quiet = make_touch(seconds=0.0, arm=False)
     with pytest.raises(InputError, match=r"quiet.npz: holds no contact"):
         comparison.draw([("quiet.npz", quiet)], tmp_path / "a.png", model=Model(demo.MODEL))
 

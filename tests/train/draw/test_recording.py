@@ -6,7 +6,7 @@ import pytest
 
 from edge import demo
 from edge.errors import InputError
-from edge.recording import Recording, load, save
+from edge.recording import load, save
 from train.__main__ import main
 from train.draw.recording import draw
 
@@ -21,9 +21,7 @@ def test_the_sketch_is_drawn_below_the_curves(tmp_path):
 
 
 def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(make_touch, tmp_path):
-    touch = make_touch()
-    quiet = Recording(touch.t, 0 * touch.frames, meta=touch.meta)
-    save(tmp_path / "quiet.npz", quiet)
+    save(tmp_path / "quiet.npz", make_touch(seconds=0.0, arm=False))
     assert main(["show", str(tmp_path / "quiet.npz")]) == 0
     assert (tmp_path / "quiet.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="there is no arm to sketch"):

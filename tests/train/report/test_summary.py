@@ -19,11 +19,6 @@ from train.report.summary import (
 )
 
 
-@pytest.fixture(scope="module")
-def fitted(recordings):
-    return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
-
-
 def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     lines = summary(fitted, [(162.04, 31.46)] * len(fitted.candidates)).splitlines()
     heads = ["features", "projection", *fitted.chosen, "us per decision", "kB"]

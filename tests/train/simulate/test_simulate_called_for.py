@@ -1,15 +1,14 @@
 """An effect that is not called for costs nothing and changes nothing: six proofs."""
 
 import json
-import subprocess
 import sys
 import types
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
+from tests.conftest import python
 from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run_batch
 from train.simulate.convergence import kinds
@@ -18,7 +17,6 @@ from train.simulate.plan import INSTEAD, STAGES, make_plan, module_of, required_
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
 
-ROOT = Path(__file__).parents[3]
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
 
@@ -61,10 +59,7 @@ def test_1_an_effect_not_called_for_is_not_loaded():
         "assert len(list(simulate(from_dict(table)))) == 1\n"
         "print(json.dumps([m for m in sys.modules if m.startswith('train.simulate.effects.')]))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert json.loads(done.stdout) == ["train.simulate.effects.base"]
+    assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
 
 
 @pytest.mark.parametrize("add", [(), ("noise", "tilt")])
