@@ -1,5 +1,7 @@
 """The contents of a golden file."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -35,9 +37,13 @@ def test_trimming_keeps_every_frame_that_the_window_uses(exported, data):
 def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_finite(exported):
     golden = np.load(exported / "golden.npz")
     trials, vectors = len(golden["onset_s"]), golden["vectors"]
+    assert len(golden["start"]) == trials + 1 == 17
     finite = np.isfinite(vectors).all(axis=1)
     assert finite[:-2].all()
     assert not finite[-2:].any()
     for task in ("category", "object"):
-        assert (golden[f"{task}_label"] == np.where(finite, golden[f"{task}_label"], -1)).all()
+        assert ((golden[f"{task}_label"] == -1) == ~finite).all()
     assert (golden["object_distances"][: trials + 16, 0] == 0.0).all()
+    assert golden["frames"].dtype == np.uint16
+    bounds = json.loads(str(golden["meta"]))["bounds"]
+    assert set(bounds) == {"scores", "features", "time_s"}

@@ -8,7 +8,6 @@ from sklearn.pipeline import Pipeline
 
 from edge.errors import InputError
 from train.crossval import accuracies, neighbours, votes_right
-from train.dataset import load_trials
 from train.pipeline import vote
 from train.projection import Projection, Spectrum, on_grid, principal_axes
 
@@ -58,19 +57,6 @@ def test_the_table_is_that_of_grid_search(scaling):
     picked = ours[np.ix_([c - 1 for c in components], [k - 1 for k in ks])]
     assert np.abs(picked - theirs).max() < 1e-12
     assert len(np.unique(picked)) > 3
-
-
-def test_the_table_is_that_of_grid_search_on_real_grasps(real, tmp_path):
-    from edge.recording import save
-    from train.importers import sdh2
-
-    for file in sdh2.files(real / "sdh2_grasps")[::30]:
-        save(tmp_path / f"{file.stem}.npz", sdh2.grasp(file))
-    data = load_trials([tmp_path])
-    X, y = data.features(), np.array([label[:4] for label in data.labels("object")])
-    ours = accuracies(neighbours(X, max_components=5, max_k=6, scaling="IV"), y)
-    theirs = sklearn_table(X, y, "IV", [1, 5], [1, 2, 6])
-    assert np.abs(ours[np.ix_([0, 4], [0, 1, 5])] - theirs).max() < 1e-12
 
 
 def test_votes_for_every_k_at_once_are_those_one_by_one():

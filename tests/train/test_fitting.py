@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import train
-from edge.errors import InputError
 from edge.recording import Recording, save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE
@@ -68,14 +67,6 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     alone = train.fit(paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1)
     seen, before = (f.chosen["category"].accuracy for f in (both, alone))
     assert (seen.right, seen.total) == (before.right + 1, before.total + 2)
-
-
-@pytest.mark.parametrize(
-    ("given", "word"), [({"k": 99}, "k must be 1 to 15"), ({"tasks": ["colour"]}, "label 'colour'")]
-)
-def test_what_cannot_be_fitted_is_one_sentence(given, word, recordings):
-    with pytest.raises(InputError, match=word):
-        train.fit(str(recordings), features=["paper"], quick=True, jobs=1, **given)
 
 
 def test_names_of_train_are_loaded_when_they_are_asked_for():

@@ -48,15 +48,6 @@ def test_a_classifier_answers_every_task_by_the_rules():
     assert (model.predict(X)["object"] == y["object"]).all()
 
 
-def test_tasks_of_one_space_share_its_projection_and_take_as_many_components_as_each_wants():
-    X, y = features(30), np.repeat(["a", "b"], 15)
-    choices = {"few": Choice("none", 2, 1), "many": Choice("none", 5, 1)}
-    model = ContactClassifier(choices).fit(X, {"few": y, "many": y})
-    (projection,) = model.projections_.values()
-    assert projection.weights_.shape == (120, 5)
-    assert model.components_ == {"few": 2, "many": 5}
-
-
 @pytest.mark.parametrize(
     ("choice", "word"),
     [

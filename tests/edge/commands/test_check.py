@@ -7,19 +7,11 @@ from edge import __version__
 from edge.model.info import FORMAT
 from edge.runtime import board as board_module
 from edge.skin import file as skinfile
-
-PAD = """[skin]
-rows = 3
-cols = 4
-[[bus]]
-device = 1
-kind = "mpr121"
-chips = [{ address = 0x5A, first = [0, 0], block = [3, 4] }]
-"""
+from tests.edge.skin.small import mpr121, one_chip
 
 
 def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
-    (tmp_path / "skin.toml").write_text(PAD)
+    (tmp_path / "skin.toml").write_text(mpr121())
     status, (event,), _ = edge("check", tmp_path / "skin.toml")
     assert status == 0
     assert [r.split(":")[0] for r in event["remarks"]] == [
@@ -29,31 +21,23 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("text", "status", "said"),
     [
-        ("[[bus]]", "[signal]\nsign = 1\n[[bus]]", "a touch lowers an MPR121's values"),
+        (mpr121(signal="sign = 1"), 1, "a touch lowers an MPR121's values"),
         (
-            "cols = 4",
-            "cols = 4\nthreshold_counts = 2000",
+            mpr121(skin="threshold_counts = 2000"),
+            1,
             "no contact can begin: onset_counts is 2000, but a taxel gives at most 1022",
         ),
-        (
-            'kind = "mpr121"',
-            'kind = "block"\nbits = 8',
-            "threshold_counts is missing: anything above the noise",
-        ),
-        (
-            '[[bus]]\ndevice = 1\nkind = "mpr121"',
-            '[signal]\ndead_band_sigma = 0\n[[bus]]\ndevice = 1\nkind = "block"',
-            "noise of one count begins a contact",
-        ),
+        (one_chip(3, 4), 0, "threshold_counts is missing: anything above the noise"),
+        (one_chip(3, 4, signal="dead_band_sigma = 0"), 1, "noise of one count begins a contact"),
     ],
 )
-def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, old, new, said):
-    (tmp_path / "skin.toml").write_text(PAD.replace(old, new, 1))
-    status, (event,), _ = edge("check", tmp_path / "skin.toml")
+def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, said):
+    (tmp_path / "skin.toml").write_text(text)
+    got, (event,), _ = edge("check", tmp_path / "skin.toml")
     assert said in " ".join(event["remarks"])
-    assert status == (0 if "missing" in said else 1)
+    assert got == status
 
 
 def test_check_counts_what_the_wire_carries(edge, skin):
@@ -100,7 +84,7 @@ def test_a_skin_file_that_comes_with_the_program_works(edge, name):
 def test_a_person_is_told_each_thing_once(edge, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     path = tmp_path / "skin.toml"
-    path.write_text(PAD)
+    path.write_text(mpr121())
     status, text, err = edge("check", path, text=True)
     assert (status, err) == (0, "")
     first, *_, last = text.splitlines()

@@ -8,6 +8,7 @@ from edge.commands import fake
 from edge.commands.output import Output
 from edge.recording import load
 from edge.skin import file as skinfile
+from tests.edge.skin.small import one_chip
 
 
 def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch):
@@ -40,10 +41,7 @@ def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeyp
 
 def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(edge, tmp_path):
     skin = tmp_path / "serial.toml"
-    skin.write_text(
-        "[skin]\nname = 'x'\nrows = 1\ncols = 2\nthreshold_counts = 5\n[[bus]]\n"
-        "serial = '/dev/ttyACM0'\nkind = 'block'\nchips = [{ first = [0, 0], block = [1, 2] }]\n"
-    )
+    skin.write_text(one_chip(1, 2, bus='serial = "/dev/ttyACM0"', at=""))
     status, _, err = edge("fake", "--skin", skin, "--plug")
     assert (status, "/dev/ttyACM0 is a serial port" in err) == (2, True)
     given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])

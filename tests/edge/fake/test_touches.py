@@ -9,24 +9,17 @@ from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.file import parse
 from edge.touch.track import ContactTracker, first_contact
+from tests.edge.skin.small import one_chip
 
-WIDE = """[skin]
-rows = 120
-cols = 30
-pitch_m = {pitch}
-counts_per_newton = 1000.0
-wraps = {wraps}
-threshold_counts = 1
-[[bus]]
-device = 1
-kind = "block"
-chips = [{{ address = 0x28, first = [0, 0], block = [120, 30] }}]
-"""
+
+def wide(pitch=0.01, wraps="false"):
+    """The file of a skin of 120 x 30 taxels."""
+    known = "counts_per_newton = 1000.0\nthreshold_counts = 1"
+    return one_chip(120, 30, skin=f"pitch_m = {pitch}\nwraps = {wraps}\n{known}")
 
 
 def made(pitch, *, wraps="false", trials=1, seed=0):
-    file = parse(WIDE.format(pitch=pitch, wraps=wraps))
-    return dict(touches.touches(file, trials=trials, seed=seed))
+    return dict(touches.touches(parse(wide(pitch, wraps)), trials=trials, seed=seed))
 
 
 @pytest.mark.parametrize("pitch", [0.004, 0.01, 0.02])
@@ -72,7 +65,7 @@ def test_trials_differ_and_the_same_seed_gives_the_same():
 
 
 def test_taxels_without_a_chip_are_not_valid():
-    text = WIDE.format(pitch=0.01, wraps="false").replace("block = [120, 30]", "block = [120, 20]")
+    text = wide().replace("block = [120, 30]", "block = [120, 20]")
     recording = next(iter(touches.touches(parse(text), trials=1)))[1]
     assert recording.valid[:, :20].all()
     assert not recording.valid[:, 20:].any()

@@ -29,6 +29,7 @@ from edge.i2c.bus import (
 )
 from edge.i2c.serial_bus import SerialBus, decode, encode, serial_bits
 from edge.skin.skin import Skin
+from tests.edge.skin.small import one_chip
 
 TAXELS = 6
 PATIENT_S, HASTY_S = 3.0, 0.05
@@ -220,11 +221,7 @@ def skin(board, tmp_path):
     """A skin whose microcontroller stands on a serial port, by a stable name."""
     path, link = tmp_path / "skin.toml", tmp_path / "port"
     link.symlink_to(board.port)
-    path.write_text(
-        f"[skin]\nrows = 2\ncols = 3\n[read]\ntimeout_s = 0.5\n"
-        f'[[bus]]\nserial = "{link}"\nkind = "block"\n'
-        "chips = [{ first = [0, 0], block = [2, 3] }]"
-    )
+    path.write_text(one_chip(2, 3, bus=f'serial = "{link}"', at="") + "[read]\ntimeout_s = 0.5\n")
     with Skin.open(path, calibrated=False) as skin:
         assert skin.read().valid.all()
         yield skin

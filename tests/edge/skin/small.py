@@ -1,4 +1,4 @@
-"""A skin of 24 taxels on two chips, for tests to change, and the sentence for a mistake in one."""
+"""Small skins for tests to change, and the sentence for a mistake in one."""
 
 import pytest
 
@@ -23,6 +23,26 @@ chips = [
   { channel = 0, address = 0x2D, first = [0, 3] },
 ]
 """
+
+
+def one_chip(rows, cols, kind="block", skin="", signal="", bus="device = 1", at="address = 40, "):
+    """A skin file of one chip that has all taxels, with further lines for its tables."""
+    return f"""[skin]
+rows = {rows}
+cols = {cols}
+{skin}
+[signal]
+{signal}
+[[bus]]
+{bus}
+kind = "{kind}"
+chips = [{{ {at}first = [0, 0], block = [{rows}, {cols}] }}]
+"""
+
+
+def mpr121(**more):
+    """A skin file of one MPR121 with 3 x 4 electrodes."""
+    return one_chip(3, 4, "mpr121", at="address = 0x5A, ", **more)
 
 
 def mistake(text):

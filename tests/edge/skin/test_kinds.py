@@ -11,27 +11,12 @@ from edge.recording import Recording, save
 from edge.skin import file as skinfile
 from edge.skin.file import Signal, parse
 from edge.skin.kinds import KINDS
-
-MPR121 = """[skin]
-rows = 3
-cols = 4
-{skin}
-[signal]
-{signal}
-[[bus]]
-device = 1
-kind = "mpr121"
-chips = [{{ address = 0x5A, first = [0, 0], block = [3, 4] }}]
-"""
-
-
-def mpr121(skin="", signal=""):
-    return parse(MPR121.format(skin=skin, signal=signal))
+from tests.edge.skin.small import mpr121
 
 
 def test_an_mpr121_works_without_a_single_setting():
     """Its values fall with a touch, and a touch takes some tens of its 10 bits."""
-    file = mpr121()
+    file = parse(mpr121())
     assert file.chips[0].sign == -1
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     assert file.signal == shipped.signal
@@ -40,13 +25,13 @@ def test_an_mpr121_works_without_a_single_setting():
 
 
 def test_values_of_the_file_replace_the_defaults():
-    file = mpr121("threshold_counts = 20", "sign = 1\ndead_band_counts = 1")
+    file = parse(mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1"))
     assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)
 
 
 def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
-    text = MPR121.format(skin="threshold_counts = 5", signal="").replace("rows = 3", "rows = 6")
+    text = mpr121(skin="threshold_counts = 5").replace("rows = 3", "rows = 6")
     more = '[[bus]]\ndevice = 2\nkind = "block"\n'
     file = parse(text + more + "chips = [{ address = 0x28, first = [3, 0], block = [3, 4] }]")
     assert [chip.sign for chip in file.chips] == [-1, 1]
@@ -130,4 +115,4 @@ def test_an_option_belongs_to_its_kind(monkeypatch):
     with pytest.raises(InputError, match="speed must be one of 1, 2, not 3"):
         parse(TOY_SKIN.replace("speed = 2", "speed = 3"))
     with pytest.raises(InputError, match="bus 0 chip 0: unknown key speed"):
-        parse(MPR121.format(skin="", signal="").replace("first", "speed = 1, first"))
+        parse(mpr121().replace("first", "speed = 1, first"))

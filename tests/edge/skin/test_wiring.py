@@ -6,7 +6,7 @@ import pytest
 
 from edge.i2c.chip import UNUSED
 from edge.skin import file as skinfile
-from tests.edge.skin.small import SMALL, mistake
+from tests.edge.skin.small import SMALL, mistake, one_chip
 
 
 def test_first_and_block_number_the_stages_row_by_row():
@@ -52,14 +52,7 @@ def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
     assert said in mistake(SMALL.replace(old, new, 1))
 
 
-SERIAL = """[skin]
-rows = 2
-cols = 3
-[[bus]]
-serial = "/dev/ttyACM0"
-kind = "block"
-chips = [{ first = [0, 0], block = [2, 3] }]
-"""
+SERIAL = one_chip(2, 3, bus='serial = "/dev/ttyACM0"', at="")
 
 
 @pytest.mark.parametrize("number", [0, 1, 1048575])
