@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -111,6 +112,18 @@ def in_a_row(*touches: Recording, rest: int = 50) -> Recording:
     joints = [part for each, end in zip(touches, ends, strict=True) for part in (each.joints, end)]
     t = np.arange(len(frames)) / 100.0
     return replace(touches[0], t=t, frames=frames, joints=np.concatenate(joints))
+
+
+def full_pipe() -> tuple[int, int]:
+    """The ends of a pipe, to read and to write, that takes no further byte until it is read."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    for size in (4096, 1):
+        with suppress(BlockingIOError):
+            while True:
+                os.write(writing, b"x" * size)
+    os.set_blocking(writing, True)
+    return reading, writing
 
 
 def lines(text: str) -> list[dict]:

@@ -50,11 +50,7 @@ KINDS = {
     "another program's mux channel": Fault("foreign"),
 }
 """Faults that the protocol can tell."""
-UNKNOWABLE = r"""
-\* The protocol cannot tell. An AD7147's words carry no check, so that a flipped bit is a value
-unless it gives 0, 0xFFFF or a count that no touch reaches; an MPR121's words have six spare bits of
-sixteen. A chip that serves old bytes is found after 100 frames if its calibration saw noise. A
-wrong channel is found by reading the mux back, which a skin file may switch off."""
+UNKNOWABLE = "\n\\* The protocol cannot tell: see `scripts` in tests/faults.py."
 
 
 def skins():
@@ -243,7 +239,13 @@ def models(buses):
 
 
 def scripts():
-    """Name, skin and faults for `run`; `*` marks faults that no protocol can tell."""
+    """Name, skin and faults for `run`; `*` marks faults that the protocol cannot tell.
+
+    An AD7147's words carry no check, so that a flipped bit is a value unless it gives 0, 0xFFFF or
+    a count that no touch reaches; an MPR121's words have six spare bits of sixteen. A chip that
+    serves old bytes is found after 100 frames if its calibration saw noise. A wrong channel is
+    found by reading the mux back, which a skin file may switch off.
+    """
     cody, pad = SKINS["cody"], SKINS["mpr121"]
     first = cody.buses[0].device
     lasting = {"during": (BEGIN_S, END_S)}
@@ -303,9 +305,8 @@ def campaign(overhead_us, every, seed):
     ]
     outcomes = Parallel(n_jobs=-1)(bar(jobs, desc=f"{overhead_us:g} us", unit=" scripts"))
     print(f"\nOverhead of {overhead_us:g} us a transaction:\n")
-    print(
-        f"{table(outcomes[:played], 'met')}{UNKNOWABLE}\n\n{table(outcomes[played:], 'positions')}"
-    )
+    print(f"{table(outcomes[:played], 'met')}{UNKNOWABLE}\n")
+    print(table(outcomes[played:], "positions"))
     known = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
     longest = max(known, key=lambda outcome: outcome.back_s)
     print(f"\nLongest time until all were back: {longest.back_s:.3f} s, {longest.name}", flush=True)

@@ -71,8 +71,9 @@ def test_a_task_that_some_trials_lack_names_its_neighbours_by_their_rows(export)
     X = features(30)
     choices = dict.fromkeys(("t", "some"), Choice("none", 2, 3))
     fitted, model = export(X, choices, labels=3, lack=["some"])
-    answers = model.run(X)
+    answers, known = model.run(X), np.arange(30) % 3 > 0
     assert differences(fitted, answers, X) == []
+    assert (answers["some_neighbours"][known, 0] == np.arange(30)[known]).all()
     assert (answers["some_neighbours"] % 3 > 0).all()
 
 

@@ -79,14 +79,3 @@ def test_a_weight_of_three_is_a_trial_that_stands_three_times():
     space = fitted.spaces_["t"]
     assert fitted.projections_[space].weights_.tobytes() == oracle.weights_.tobytes()
     assert (fitted.rows_[space] == oracle.transform(X)).all()
-
-
-def test_a_task_is_fitted_on_the_trials_that_have_a_label_and_names_them_by_their_rows():
-    X = np.arange(10.0)[:, None] * [1.0, 2.0]
-    labels = np.array(["", "a", "", "b"] + ["a", "b"] * 3)
-    fitted = ContactClassifier({"t": Choice("none", 1, 1)}, ("max_force", "contact_area")).fit(
-        X, {"t": labels}
-    )
-    _, rows = fitted.neighbours("t", X)
-    assert rows[:, 0].tolist() == [1, 1, 1, 3, 4, 5, 6, 7, 8, 9]
-    assert fitted.predict(X)["t"].tolist() == ["a", "a", "a", *labels[3:]]

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from edge.fake.clock import VirtualClock
 from edge.recording import load, save
 from edge.runtime.event_writer import Lines
 from edge.touch.frame import Frame
-from tests.conftest import ROOT
+from tests.conftest import ROOT, full_pipe
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -146,13 +146,7 @@ def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record
 
 
 def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
-    out, (reading, writing) = tmp_path / "trials", os.pipe()
-    os.set_blocking(writing, False)
-    for size in (4096, 1):
-        with suppress(BlockingIOError):
-            while True:
-                os.write(writing, b"x" * size)
-    os.set_blocking(writing, True)
+    out, (reading, writing) = tmp_path / "trials", full_pipe()
     process = subprocess.Popen(
         [sys.executable, "-m", "edge", "record", "--fake", str(parted),
          "--loop", "--label", "object=a", "--out", str(out)],

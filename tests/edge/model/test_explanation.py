@@ -102,6 +102,14 @@ def test_a_trial_without_a_label_is_no_rival():
     assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
 
 
+def why_of(model, task, vector, decision):
+    """The explanation of a model's decision, and the distances of the trials that voted."""
+    rows, label = decision.neighbours.tolist(), model.info.tasks[task].labels.index(decision.label)
+    named = (model.info.features, model.info.widths)
+    why = explain(Space.of(model, task), vector, rows, label, *named)
+    return why, [near.distance for near in why.voters]
+
+
 def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(model, tmp_path):
     """Three decision points; one task takes one feature, the other lacks labels."""
     info = replace(model.info, decision_points_s=(0.3, 0.6, 1.2))
@@ -116,12 +124,9 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(mo
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range
     for name, task in model.info.tasks.items():
-        space = Space.of(model, name)
         for vector in vectors:
             decision = model.decide(vector)[name]
-            label, rows = task.labels.index(decision.label), decision.neighbours.tolist()
-            why = explain(space, vector, rows, label, info.features, info.widths)
-            distances = [near.distance for near in why.voters]
+            why, distances = why_of(model, name, vector, decision)
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
@@ -132,12 +137,9 @@ def test_features_and_coordinates_are_cut_off_as_in_the_graph(model, exported):
     vector[3] = 1e9
     decision = model.decide(vector)["category"]
     assert decision.out_of_range
-    space, info = Space.of(model, "category"), model.info
-    why = explain(space, vector, decision.neighbours.tolist(), 0, info.features, info.widths)
-    distances = [near.distance for near in why.voters]
-    assert distances == pytest.approx(
-        decision.distances.tolist(), abs=1e-5 * np.abs(space.rows).max()
-    )
+    _, distances = why_of(model, "category", vector, decision)
+    reach = np.abs(Space.of(model, "category").rows).max()
+    assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5 * reach)
 
 
 def test_without_another_label_there_is_no_rival():

@@ -6,13 +6,14 @@ import os
 import socket
 import threading
 import time
-from contextlib import closing, suppress
+from contextlib import closing
 
 import pytest
 
 from edge.errors import InputError
 from edge.runtime import event_writer
 from edge.runtime.event_writer import Lines, LineWriter, parse_address
+from tests.conftest import full_pipe
 
 
 @pytest.fixture
@@ -61,18 +62,15 @@ def test_an_address_that_makes_no_sense_is_one_sentence(address):
 def test_each_line_that_nobody_reads_is_counted_once_and_costs_no_time(monkeypatch):
     monkeypatch.setattr(event_writer, "CLOSE_S", 0.05)
     monkeypatch.setattr(event_writer, "MOST_LINES", 100)
-    reading, writing = os.pipe()
-    os.set_blocking(writing, False)
-    with suppress(BlockingIOError):
-        while True:
-            os.write(writing, b"x")
-    os.set_blocking(writing, True)
+    reading, writing = full_pipe()
     with os.fdopen(writing, "w") as out:
         lines = Lines(out)
         lines.write({"n": n} for n in range(20_000))
         lines.close()
         assert lines.lost == {"stdout": 20_000}
         os.close(reading)
+        # Its thread has ended before another test's file has the same descriptor.
+        lines._writers[0]._thread.join()
 
 
 def test_a_line_that_comes_after_the_end_is_lost_and_counted():
