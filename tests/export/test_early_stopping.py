@@ -2,9 +2,9 @@
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
-import onnxruntime
 import pytest
 
 import train
@@ -20,6 +20,8 @@ from export.__main__ import main as export
 from export.api import save as save_model
 from export.graph import to_onnx
 from tests.conftest import PAPER, save_touches
+from tests.hard_cases.everywhere import LEVELS
+from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.dataset import load_trials
 from train.pipeline import Choice
@@ -145,12 +147,11 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early,
     """At every level of optimisation: the default is no constant to be folded."""
     X = load_trials([folder / "data"]).features(early.info.window_s)
     expected = early.run(X)
-    for level in ("ORT_DISABLE_ALL", "ORT_ENABLE_ALL"):
-        options = onnxruntime.SessionOptions()
-        options.graph_optimization_level = getattr(onnxruntime.GraphOptimizationLevel, level)
-        session = onnxruntime.InferenceSession(early.path, options)
-        names = [output.name for output in session.get_outputs()]
-        seen = session.run(names, {"features": X})
+    data = Path(early.path).read_bytes()
+    for level in (LEVELS.ORT_DISABLE_ALL, LEVELS.ORT_ENABLE_ALL):
+        runtime = session(data, level)
+        names = [output.name for output in runtime.get_outputs()]
+        seen = runtime.run(names, {"features": X})
         assert [v.tolist() for v in seen] == [expected[name].tolist() for name in names]
         assert set(names) == set(expected)
 

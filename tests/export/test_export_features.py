@@ -30,9 +30,10 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
     assert (info.chain, info.motion_frame) == (None, "skin")
 
 
-def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six):
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six, value):
     vector = np.zeros(110)
-    vector[105] = np.nan
+    vector[105] = value
     with pytest.raises(InputError, match="value 105 .*, of contact_area_rate@10, is not finite"):
         Model(six / "model.onnx").decide(vector)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import onnx
-import onnxruntime
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,7 +10,7 @@ from onnx.reference import ReferenceEvaluator
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
-from tests.hard_cases.models import describe, features, labels_for
+from tests.hard_cases.models import describe, features, labels_for, session
 from train.evaluate import stratified_folds
 from train.pipeline import Choice, ContactClassifier, vote
 from train.scaling import SCALINGS
@@ -41,9 +40,7 @@ def export(tmp_path):
 
 def engines(data, outputs):
     """Functions that run a model file and return these outputs, by name of the engine."""
-    options = onnxruntime.SessionOptions()
-    options.log_severity_level = 3
-    runtime = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    runtime = session(data)
     return {
         "ONNX Runtime": lambda X: runtime.run(outputs, {"features": X}),
         "onnx.reference": lambda X: ReferenceEvaluator(data).run(outputs, {"features": X}),
@@ -150,12 +147,12 @@ def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
     model = SequentialClassifier(choices, (0.4, 0.8, 1.2))
     model.fit(X, y, stratified_folds(y["t"]), [choices] * 10)
     data = to_onnx(model, describe(model.decision_points_[-1]))
-    session = onnxruntime.InferenceSession(data)
-    names = [output.name for output in session.get_outputs()]
+    runtime = session(data)
+    names = [output.name for output in runtime.get_outputs()]
     for point, fitted in enumerate(model.decision_points_):
         queries = features(20, seed=9)
         given = {"features": queries, "decision_point": np.array([point])}
-        answers = dict(zip(names, session.run(names, given), strict=True))
+        answers = dict(zip(names, runtime.run(names, given), strict=True))
         assert differences(fitted, answers, queries) == []
 
 

@@ -114,20 +114,20 @@ def two(make_touch):
     return in_a_row(touch, touch)
 
 
-def with_contacts(recording, contacts):
-    return replace(recording, meta={**recording.meta, "contacts": contacts})
+def described(recording, **meta):
+    return replace(recording, meta={**recording.meta, **meta})
 
 
 def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, tmp_path):
     save(tmp_path / "two.npz", two)
     data = load_trials([tmp_path])
     assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
-    save(tmp_path / "two.npz", with_contacts(two, "alike"))
+    save(tmp_path / "two.npz", described(two, contacts="alike"))
     data = load_trials([tmp_path])
     assert (len(data.trials), data.unused) == (2, ())
     assert data.trials[1].onset_s == data.trials[0].onset_s + 1.3
     assert data.trials[1].labels == data.trials[0].labels
-    save(tmp_path / "two.npz", with_contacts(two, [{"object": "one"}, {"object": "other"}]))
+    save(tmp_path / "two.npz", described(two, contacts=[{"object": "one"}, {"object": "other"}]))
     assert load_trials([tmp_path]).labels("object").tolist() == ["one", "other"]
 
 
@@ -140,13 +140,20 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, t
     ],
 )
 def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, two, tmp_path):
-    save(tmp_path / "two.npz", with_contacts(two, contacts))
+    save(tmp_path / "two.npz", described(two, contacts=contacts))
     with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
         load_trials([tmp_path])
 
 
 def skinned(recording, **skin):
-    return replace(recording, meta={**recording.meta, "skin": {**recording.meta["skin"], **skin}})
+    return described(recording, skin={**recording.meta["skin"], **skin})
+
+
+def with_angles(recording, count):
+    return replace(recording, joints=np.zeros((len(recording.t), count)))
+
+
+ONE_JOINT = {"joint": [{"axis": [0, 0, 1]}]}
 
 
 @pytest.mark.parametrize(
@@ -154,22 +161,9 @@ def skinned(recording, **skin):
     [
         (lambda r: skinned(r, wraps=False), "odd.npz: this skin has 16 x 24 taxels, flat"),
         (lambda r: skinned(r, counts_per_newton=None), "closed around, with forces in counts"),
-        (
-            lambda r: replace(r, joints=np.zeros((len(r.t), 3))),
-            "odd.npz: has 3 joint angles and names no arm",
-        ),
-        (
-            lambda r: replace(
-                r,
-                joints=np.zeros((len(r.t), 1)),
-                meta={**r.meta, "arm": {"joint": [{"axis": [0, 0, 1]}]}},
-            ),
-            "is not that of",
-        ),
-        (
-            lambda r: replace(r, meta={**r.meta, "arm": {"joint": [{"axis": [0, 0, 1]}]}}),
-            "odd.npz: has 5 joint angles, its arm takes 1",
-        ),
+        (lambda r: with_angles(r, 3), "odd.npz: has 3 joint angles and names no arm"),
+        (lambda r: described(with_angles(r, 1), arm=ONE_JOINT), "is not that of"),
+        (lambda r: described(r, arm=ONE_JOINT), "odd.npz: has 5 joint angles, its arm takes 1"),
     ],
 )
 def test_recordings_that_do_not_belong_together_are_refused(change, word, folder, make_touch):

@@ -6,8 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -46,16 +46,13 @@ def frames(*poses):
 
 
 def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_path):
-    def record():
+    def record(_):
         with recorder(tmp_path) as mine:
             for _ in range(20):
                 mine.save(frames(None), complete=True)
 
-    recorders = [threading.Thread(target=record) for _ in range(2)]
-    for recorder_thread in recorders:
-        recorder_thread.start()
-    for recorder_thread in recorders:
-        recorder_thread.join()
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(record, range(2)))
     assert len(list(tmp_path.glob("box-*.npz"))) == 40
 
 

@@ -66,14 +66,6 @@ def test_decisions_do_not_share_their_arrays(model, golden):
     assert (first.distances == before).all()
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_value_that_is_not_finite_is_refused_with_its_place(model, golden, value):
-    vector = golden["vectors"][0].copy()
-    vector[43] = value
-    with pytest.raises(InputError, match="value 43 of the features, of contact_area, is"):
-        model.decide(vector)
-
-
 def test_a_value_far_outside_the_training_set_is_cut_off_and_flagged(model, golden):
     vector = golden["vectors"][0].copy()
     vector[39] = 1e290

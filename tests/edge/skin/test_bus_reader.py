@@ -106,31 +106,32 @@ def test_a_frame_that_breaks_off_before_its_last_byte_is_read_again():
     assert (met, wrong) == (15, 0)
 
 
-def chip_and_slot(skin):
-    """The model of one chip, and its slot."""
-    return skin.readers[0].bus.chips[0x70].channels[1][0x2D], skin.readers[0].slots[5]
+@pytest.fixture
+def running():
+    """A skin, the model of one of its chips, and the chip's slot."""
+    with faulty_skin(CODY, Pattern(CODY)) as skin:
+        first = skin.readers[0]
+        yield skin, first.bus.chips[0x70].channels[1][0x2D], first.slots[5]
 
 
-def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn():
+def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running):
     """13 rows of 12 chips, one every 4 frames; the values meanwhile look plausible."""
-    with faulty_skin(CODY, Pattern(CODY)) as skin:
-        model, slot = chip_and_slot(skin)
-        model.write(b"\0\x81\x12\x34", 0.0)
-        for _ in range(13 * 12 * 4):
-            skin.read()
-        assert slot.running
-        assert model.registers[0x81] == 0x1FFF
+    skin, model, slot = running
+    model.write(b"\0\x81\x12\x34", 0.0)
+    for _ in range(13 * 12 * 4):
+        skin.read()
+    assert slot.running
+    assert model.registers[0x81] == 0x1FFF
 
 
-def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then():
-    with faulty_skin(CODY, Pattern(CODY)) as skin:
-        model, slot = chip_and_slot(skin)
-        model._sense = lambda t: np.zeros(12, dtype=np.uint16)
-        set_up_in = []
-        for frame in range(1, SET_UP_AFTER + SET_UP_EVERY + 10):
-            driver = slot.chip
-            skin.read()
-            set_up_in += [] if slot.chip is driver else [frame]
+def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then(running):
+    skin, model, slot = running
+    model._sense = lambda t: np.zeros(12, dtype=np.uint16)
+    set_up_in = []
+    for frame in range(1, SET_UP_AFTER + SET_UP_EVERY + 10):
+        driver = slot.chip
+        skin.read()
+        set_up_in += [] if slot.chip is driver else [frame]
     assert set_up_in == [SET_UP_AFTER + 1, SET_UP_AFTER + SET_UP_EVERY + 1]
 
 
