@@ -1,5 +1,6 @@
 """Recordings small enough to read, a model fitted on them, and the command as a user runs it."""
 
+import csv
 import json
 import os
 import subprocess
@@ -17,6 +18,7 @@ from edge.cli import main as edge_classify
 from edge.recording import Recording, save
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
+from export.__main__ import main as export_main
 
 # Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1` draws others.
 # There are no deadlines, because a busy machine must not turn a test red.
@@ -131,6 +133,11 @@ def lines(text: str) -> list[dict]:
     return [json.loads(line) for line in text.splitlines()]
 
 
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file, by their columns."""
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
 @pytest.fixture
 def edge(capsys):
     """Run `edge-classify`; returns status, stdout's lines as JSON, and stderr."""
@@ -149,18 +156,20 @@ def python(*arguments, **options) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, **options)
 
 
-PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40", "--jobs", "1")
+PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
 """Options of `make export` that fix the paper's features, for tests that need no choice."""
+
+
+def export(out: Path, *options: object) -> Path:
+    """Run `make export`, with `--data` among the options; the model's folder."""
+    assert export_main(["--out", str(out), "--jobs", "1", *map(str, options)]) == 0
+    return out
 
 
 @pytest.fixture(scope="session")
 def exported(recordings, tmp_path_factory) -> Path:
     """A folder with the model.onnx and golden.npz of those recordings."""
-    from export.__main__ import main
-
-    out = tmp_path_factory.mktemp("exported")
-    assert main(["--data", str(recordings), "--out", str(out), *PAPER]) == 0
-    return out
+    return export(tmp_path_factory.mktemp("exported"), "--data", recordings, *PAPER)
 
 
 @pytest.fixture(scope="session")

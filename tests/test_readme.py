@@ -24,7 +24,8 @@ CODE = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", TEXT)]
 BOARD = [c for c in dict.fromkeys(CODE) if c.startswith("edge-classify ")]
 WORKSTATION = [c for c in dict.fromkeys(CODE) if c.startswith("python -m train ") and "--" in c]
 MAKE = [c for c in dict.fromkeys(CODE) if c.startswith("make ")]
-TARGETS = sorted(set(re.findall(r"make ([a-z-]+)", TEXT)))
+# In code, or at the beginning of a line of it: "make" is a word of prose too.
+TARGETS = sorted(set(re.findall(r"(?:^ *|`)make ([a-z-]+)", TEXT, re.M)))
 FAKED = ("scan", "calibrate", "view", "record", "run")
 
 

@@ -16,25 +16,23 @@ from edge.model.teaching import taught
 from edge.model.verify import first_series, verify
 from edge.recording import save
 from edge.touch.features import FEATURES
-from export.__main__ import main as export
 from export.api import save as save_model
 from export.graph import to_onnx
-from tests.conftest import PAPER, save_touches
+from tests.conftest import PAPER, export, save_touches
 from tests.hard_cases.everywhere import LEVELS
 from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.dataset import load_trials
 from train.pipeline import Choice
 
-POINTS = "0.3,0.6,1.2"
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder of recordings, data/, and of the model that was fitted on them, out/."""
     folder = tmp_path_factory.mktemp("early")
-    given = ["--data", str(save_touches(folder / "data", 15)), "--out", str(folder / "out"), *PAPER]
-    assert export([*given, "--decision-points", POINTS, "--scaling", "IV"]) == 0
+    data = save_touches(folder / "data", 15)
+    points = ("--decision-points", "0.3,0.6,1.2", "--scaling", "IV")
+    export(folder / "out", "--data", data, *PAPER, *points)
     return folder
 
 

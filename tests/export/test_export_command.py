@@ -5,7 +5,7 @@ import pytest
 from edge.model.model import Model
 from edge.statistics import wilson
 from export.__main__ import main
-from tests.conftest import PAPER
+from tests.conftest import PAPER, export
 
 
 def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, capsys):
@@ -15,8 +15,7 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
 
 
 def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
-    command = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
-    assert main(command) == 0
+    export(tmp_path, "--data", recordings, "--quick")
     out = capsys.readouterr()
     lines = out.err.splitlines()
     rows = [line for line in lines if line.startswith(("paper ", "contact joints ", "moments "))]
@@ -38,16 +37,14 @@ def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
 
 
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
-    command = ["--data", str(recordings), "--out", str(tmp_path), *PAPER, "--jobs", "2"]
-    assert main(command) == 0
+    export(tmp_path, "--data", recordings, *PAPER, "--jobs", 2)
     for name in ("model.onnx", "golden.npz"):
         assert (tmp_path / name).read_bytes() == (exported / name).read_bytes()
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
-    fixed = ["--scaling", "II", "--components", "3", "--k", "2", "--window", "0.8", *PAPER]
-    command = ["--data", str(recordings), "--out", str(tmp_path), "--tasks", "object", *fixed]
-    assert main([*command, "--threshold", "120"]) == 0
+    fixed = ("--scaling", "II", "--components", 3, "--k", 2, "--window", 0.8, "--threshold", 120)
+    export(tmp_path, "--data", recordings, "--tasks", "object", *fixed, *PAPER)
     info = Model(tmp_path / "model.onnx").info
     assert list(info.tasks) == ["object"]
     task = info.tasks["object"]
@@ -97,8 +94,7 @@ def test_a_number_outside_its_range_is_refused(option, value, sentence, capsys):
 
 
 def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, capsys):
-    few = [str(recordings / f"{kind}_{i}.npz") for kind in ("hard", "soft") for i in range(3)]
-    command = ["--data", *few, "--out", str(tmp_path), "--components", "20", "--jobs", "1"]
-    assert main([*command, *PAPER]) == 0
+    few = [recordings / f"{kind}_{i}.npz" for kind in ("hard", "soft") for i in range(3)]
+    export(tmp_path, "--data", *few, "--components", 20, *PAPER)
     err = capsys.readouterr().err
     assert "span 5 components, 15 fewer than asked for" in err

@@ -7,7 +7,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.model.model import Model
-from export.__main__ import main
+from tests.conftest import export
 from train.dataset import load_trials
 
 SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate@10".split()
@@ -15,10 +15,8 @@ SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate
 
 @pytest.fixture(scope="module")
 def six(recordings, tmp_path_factory):
-    out = tmp_path_factory.mktemp("six")
-    given = ["--data", str(recordings), "--out", str(out), "--jobs", "1", "--samples", "20"]
-    assert main([*given, "--scaling", "IV", "--projection", "pca", "--features", *SIX]) == 0
-    return out
+    given = ("--samples", 20, "--scaling", "IV", "--projection", "pca", "--features", *SIX)
+    return export(tmp_path_factory.mktemp("six"), "--data", recordings, *given)
 
 
 def test_the_model_says_what_it_measures_and_in_which_units(six):
@@ -48,8 +46,8 @@ def test_its_golden_file_holds(six, edge):
 
 
 def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(recordings, tmp_path, edge):
-    given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1", "--quick"]
-    assert main([*given, "--features", "kernels", "zone_kernels", "--tasks", "object"]) == 0
+    given = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
+    export(tmp_path, "--data", recordings, *given)
     model = Model(tmp_path / "model.onnx")
     assert sum(len(table.biases) for table in model.info.kernels.values()) == model.info.width
     assert len(json.dumps(model.info.to_json())) < 20_000

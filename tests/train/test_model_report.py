@@ -1,6 +1,5 @@
 """The report of an export: the answers to left-out trials, and the reasons for wrong ones."""
 
-import csv
 from dataclasses import replace
 
 import pytest
@@ -10,6 +9,7 @@ import train
 from edge.model.model import Model
 from edge.recording import load, save
 from export.api import measure
+from tests.conftest import rows_of
 from train import model_report as report
 
 
@@ -32,7 +32,7 @@ def written(recordings, tmp_path_factory):
 
 
 def table(page, name):
-    return list(csv.DictReader((page.parent / f"{name}.csv").read_text().splitlines()))
+    return rows_of(page.parent / f"{name}.csv")
 
 
 def test_the_answers_are_those_that_the_nested_accuracy_counts(written):

@@ -7,7 +7,7 @@ import pytest
 from edge import recording
 from edge.recording import load
 from edge.skin import file as skinfile
-from tests.conftest import PAPER
+from tests.conftest import PAPER, export
 
 
 @pytest.fixture
@@ -22,8 +22,6 @@ def skin(tmp_path, forearm):
 
 
 def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
-    from export.__main__ import main as export
-
     first = load(recordings / "hard_0.npz")
     rest = recording.Recording(first.t[:20], first.frames[:20], meta={})
     recording.save(tmp_path / "rest.npz", rest)
@@ -43,7 +41,7 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
         assert (status, event["complete"]) == (0, True)
     assert len(list(trials.iterdir())) == len(shown)
 
-    assert export(["--data", str(trials), "--out", str(tmp_path / "build"), *PAPER]) == 0
+    export(tmp_path / "build", "--data", trials, *PAPER)
     capsys.readouterr()
 
     # One file goes to the board; what it was shown it knows again, live.

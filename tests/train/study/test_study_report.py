@@ -1,6 +1,5 @@
 """The paper's numbers, the tables and the page; and the command, end to end on few trials."""
 
-import csv
 import re
 from collections import Counter
 
@@ -9,7 +8,7 @@ import pytest
 
 from edge.recording import save
 from tests import browser
-from tests.conftest import save_touches
+from tests.conftest import rows_of, save_touches
 from train.__main__ import main
 from train.evaluate import Result
 from train.study import methods
@@ -107,14 +106,9 @@ def test_every_number_of_the_report_is_in_a_csv(studied):
     assert 2 * len(list(studied.glob("*.png"))) == text.count("data:image/png")
 
 
-def rows(path):
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_equal_scalings_are_equal(studied):
     """Methods I and II, and none and III, differ by what centring takes away."""
-    scaled = {(r["scaling"], r["task"]): r["accuracy %"] for r in rows(studied / "scaling.csv")}
+    scaled = {(r["scaling"], r["task"]): r["accuracy %"] for r in rows_of(studied / "scaling.csv")}
     for task in ("category", "object"):
         assert scaled["I", task] == scaled["II", task]
         assert scaled["none", task] == scaled["III", task]
@@ -123,7 +117,7 @@ def test_equal_scalings_are_equal(studied):
 def test_easy_touches_are_recognised_and_the_findings_come_first(studied):
     text = (studied / "report.html").read_text()
     assert re.findall(r"<h2>([^<]+)", text)[0] == "Findings"
-    compared = rows(studied / "methods.csv")
+    compared = rows_of(studied / "methods.csv")
     assert {r["task"] for r in compared} == {"category", "object"}
     assert len({r["method"] for r in compared}) == len(methods.OURS) + 4
     assert max(float(r["accuracy %"]) for r in compared if r["task"] == "category") == 100.0

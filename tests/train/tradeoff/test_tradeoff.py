@@ -1,7 +1,6 @@
 """The trade-off: wires, boards, nested accuracy, points, and early decisions."""
 
 import argparse
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +15,9 @@ from edge.model.stopping import StoppingRule
 from edge.skin import file as skinfile
 from edge.statistics import wilson
 from edge.touch.layout import SkinLayout
-from export.__main__ import main as export
+from export.__main__ import main
 from tests import browser
-from tests.conftest import save_touches
+from tests.conftest import export, rows_of, save_touches
 from train.choose import Chosen
 from train.commands.tradeoff import cost
 from train.dataset import read
@@ -98,8 +97,7 @@ def fronted(recordings, tmp_path_factory):
 
 def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, capsys):
     path, choice = fronted
-    given = ["--data", str(recordings), "--out", str(tmp_path), "--jobs", "1"]
-    assert export([*given, "--front", "fast", "--fronts", str(path)]) == 0
+    export(tmp_path, "--data", recordings, "--front", "fast", "--fronts", path)
     said = capsys.readouterr().err
     assert f"category {choice.by_trial.accuracy:.1%} (62 to 100) in 410 ms" in said
     info = Model(tmp_path / "model.onnx").info
@@ -125,7 +123,7 @@ def test_a_point_that_cannot_be_exported_is_one_sentence(
     given = ["--data", str(recordings), "--out", str(tmp_path), "--front", "fast"]
     if more[0] == "--data":
         more = ["--data", *(str(recordings / name) for name in more[1:])]
-    assert export([*given, "--fronts", str(fronted[0]), *more]) == 2
+    assert main([*given, "--fronts", str(fronted[0]), *more]) == 2
     assert sentence in capsys.readouterr().err.splitlines()[-1]
     assert not list(tmp_path.iterdir())
 
@@ -288,9 +286,7 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     assert "62 MB of memory, and the model is ready 812 ms after the start of Python" in text
     assert not browser.available() or browser.faults(report) == []
     assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
-    saved = {
-        row["change"]: row for row in csv.DictReader((out / "costs.csv").read_text().splitlines())
-    }
+    saved = {row["change"]: row for row in rows_of(out / "costs.csv")}
     assert saved["waiting 0.4 s"]["category, points"].startswith("+0 (-")
     assert saved["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
     best = ParetoFront.read(out / "front.json", digest)
