@@ -36,8 +36,8 @@ def available() -> bool:
 
 
 @contextmanager
-def chromium(width: int) -> Iterator[Any]:
-    """A headless browser with a window of that width."""
+def chromium(width: int, address: str) -> Iterator[Any]:
+    """A headless browser with a window of that width, which shows a page."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="needs the group `browser`")
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if program is None or driver is None:
@@ -50,6 +50,7 @@ def chromium(width: int) -> Iterator[Any]:
     try:
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        browser.get(address)
         yield browser
     finally:
         browser.quit()
@@ -59,8 +60,7 @@ def faults(report: Path) -> list[str]:
     """A line for each fault of a report, at each of `WIDTHS`."""
     lines = []
     for width in WIDTHS:
-        with chromium(width) as browser:
-            browser.get(report.resolve().as_uri())
+        with chromium(width, report.resolve().as_uri()) as browser:
             browser.execute_script(
                 "document.querySelectorAll('details').forEach(section => section.open = true)"
             )

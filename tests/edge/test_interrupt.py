@@ -1,7 +1,7 @@
 """Ctrl-C during an import waits for its end."""
 
 import signal
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -47,9 +47,8 @@ def test_a_thread_imports_without_it(interruptible):
         with delayed():
             entered.append(signal.getsignal(signal.SIGINT))
 
-    thread = threading.Thread(target=enter)
-    thread.start()
-    thread.join()
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(enter)
     assert entered == [interruptible]
 
 

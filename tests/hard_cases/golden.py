@@ -112,10 +112,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
             print(folder)
         # Decisions before the full window.
-        decision_points = ["--decision-points", "0.6:1.2:0.3", "--jobs", "1"]
-        return export(
-            ["--data", trials, "--out", str(arguments.out / "decision_points"), *decision_points]
-        )
+        out = str(arguments.out / "decision_points")
+        points = ("--decision-points", "0.6:1.2:0.3", "--jobs", "1")
+        return export(["--data", trials, "--out", out, *points])
 
 
 if __name__ == "__main__":

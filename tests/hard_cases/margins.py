@@ -13,14 +13,7 @@ from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from tests.hard_cases.cases import Case, Ladder
 from tests.hard_cases.frames import contact_of
-from tests.hard_cases.models import (
-    Ours,
-    converted,
-    features,
-    labels_for,
-    session,
-    usual_pipeline,
-)
+from tests.hard_cases.models import Ours, converted, features, labels_for, session, usual_pipeline
 
 FAILED, REFUSED = "fails", "refused with a sentence"
 SEEDS = range(5)

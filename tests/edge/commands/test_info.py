@@ -3,15 +3,16 @@
 from edge import demo
 from edge.model.model import Model
 
+INFO = Model(demo.MODEL).info
+
 
 def test_a_program_gets_the_metadata_with_size_and_time(edge):
     status, (said,), _ = edge("info", demo.MODEL)
     assert status == 0
-    info = Model(demo.MODEL).info
     assert said["bytes"] == demo.MODEL.stat().st_size
-    assert said["data_digest"] == info.data_digest
+    assert said["data_digest"] == INFO.data_digest
     assert {name: tuple(task["labels"]) for name, task in said["tasks"].items()} == {
-        name: task.labels for name, task in info.tasks.items()
+        name: task.labels for name, task in INFO.tasks.items()
     }
 
 
@@ -19,11 +20,10 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     status, out, _ = edge("info", demo.MODEL, text=True)
     assert status == 0
-    info = Model(demo.MODEL).info
-    for name, task in info.tasks.items():
+    for name, task in INFO.tasks.items():
         assert f"{name}: {task.accuracy:.1%} accurate (nested)" in out
     assert "Skin: 16 x 24 taxels, closed around" in out
-    assert f"Fitted on {info.rows} trials" in out
+    assert f"Fitted on {INFO.rows} trials" in out
     assert max(map(len, out.splitlines())) <= 80
 
 

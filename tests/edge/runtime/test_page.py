@@ -146,8 +146,7 @@ class TestInABrowser:
     """The page in headless Chromium."""
 
     def test_the_picture_moves_and_a_label_reaches_the_program(self, page):
-        with chromium(390) as browser:
-            browser.get(page.server.link)
+        with chromium(390, page.server.link) as browser:
             image = "return document.getElementById('skin').toDataURL()"
             seen = set()
             stream = frames(10_000, touched_from=0)
@@ -172,7 +171,6 @@ class TestInABrowser:
 
     def test_a_wrong_token_shows_nothing(self):
         page = Page("0.0.0.0:0", LAYOUT, title="pad")
-        with closing(page.server), chromium(390) as browser:
-            browser.get(f"http://127.0.0.1:{page.server.server_port}/?token=wrong")
-
+        address = f"http://127.0.0.1:{page.server.server_port}/?token=wrong"
+        with closing(page.server), chromium(390, address) as browser:
             assert browser.find_elements("id", "skin") == []

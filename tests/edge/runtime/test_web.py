@@ -110,19 +110,15 @@ def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
     server.show({"counts": "0" * 20_000_000})
     with socket.create_connection(("127.0.0.1", server.server_port), timeout=5) as sleeper:
         sleeper.sendall(b"GET /picture?token=%s HTTP/1.0\r\n\r\n" % server.token.encode())
-        wait_for(lambda: server.watched)
+        ends = time.monotonic() + 10.0
+        while not server.watched:
+            assert time.monotonic() < ends
+            time.sleep(0.01)
         time.sleep(0.5)
         received = 0
         while piece := sleeper.recv(1 << 20):
             received += len(piece)
     assert received < 10_000_000
-
-
-def wait_for(condition, seconds=10.0):
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.01)
-    assert condition()
 
 
 @pytest.mark.parametrize("address", ["8000", "127.0.0.1:x", "127.0.0.1:70000", "nowhere.invalid:1"])

@@ -40,8 +40,7 @@ def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
 @pytest.mark.parametrize("width", [1440, 390])
 def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
     report = write(tmp_path, "Title", [], [Section("Answer", widget=slider(ANSWERS))])
-    with chromium(width) as browser:
-        browser.get(report.resolve().as_uri())
+    with chromium(width, report.resolve().as_uri()) as browser:
         browser.execute_script(
             "const i = document.querySelector('input'); i.value = 0;"
             "i.dispatchEvent(new Event('input'));"
