@@ -176,6 +176,7 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
         "d": Choice("IV", 20, 5),
     }
     fitted, model = export(X, choices)
+    assert fitted.components_ == {"a": 20, "b": 3, "c": 7, "d": 20}
     queries = np.concatenate([X, features(40, seed=1)])
     assert differences(fitted, model.run(queries), queries) == []
     proto = onnx.load(model.path)
