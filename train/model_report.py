@@ -188,9 +188,9 @@ def _accuracy(exported: Exported, task: str) -> Section:
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     text += (
-        " The intervals are for the exported model on other trials: Wilson's for two fifths "
-        "of the trials, because that model differs from those of the folds. Where entire groups are left "
-        "out they count groups, whose trials are right or wrong together."
+        " The intervals are for the exported model on other trials: Wilson's for two fifths of "
+        "the trials, because that model differs from those of the folds. Where entire groups are "
+        "left out they count groups, whose trials are right or wrong together."
     )
     labels = sorted(set(truth))
     scores: Any = precision_recall_fscore_support(truth, answers, labels=labels, zero_division=0.0)

@@ -165,8 +165,8 @@ GLOSSARY = {
     "neighbours (nested cross-validation).",
     "from, to": "The 95 % interval for the exported model's accuracy on other contacts. It is "
     "Wilson's binomial interval for two fifths of the contacts, because the exported model differs "
-    "from those that were tested. `make risk` counts how often it holds. For early decisions, only the "
-    "contacts of the folds that certified the error rate count.",
+    "from those that were tested. `make risk` counts how often it holds. For early decisions, only "
+    "the contacts of the folds that certified the error rate count.",
     "points": "The percentage of decisions that become right less the percentage that become "
     "wrong, on the same held-out contacts. The brackets hold the 95 % interval of this paired "
     "difference.",
