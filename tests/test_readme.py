@@ -1,4 +1,4 @@
-"""README.md and docs/: the commands run as written, and the tables are true."""
+"""README.md and docs/: README's commands run as written, others are known; tables are true."""
 
 import errno
 import re
@@ -15,15 +15,23 @@ from edge.skin import file as skinfile
 from export.cli import parser as export_parser
 from tests.conftest import ROOT
 from train.__main__ import main as train
+from train.__main__ import parser as train_parser
 from train.importers import sdh2
 
 GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
-CODE = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", TEXT)]
-BOARD = [c for c in dict.fromkeys(CODE) if c.startswith("edge-classify ")]
-WORKSTATION = [c for c in dict.fromkeys(CODE) if c.startswith("python -m train ") and "--" in c]
-MAKE = [c for c in dict.fromkeys(CODE) if c.startswith("make ")]
+FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
+FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
+CODE = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", FENCE.sub("", TEXT))]
+BLOCKS = "\n".join(FENCE.findall(TEXT)).replace("\\\n", "")
+COMMAND = re.compile(r"(?m)(?:^|[ /])(edge-classify|-m train|-m export) ([^\n|>#&;]*)")
+COMMANDS = sorted(set(COMMAND.findall("\n".join([*CODE, BLOCKS]))))
+README = " ".join(PAGES[0].read_text().split())
+FIRST = [code for code in dict.fromkeys(CODE) if f"`{code}`" in README]
+BOARD = [c for c in FIRST if c.startswith("edge-classify ")]
+WORKSTATION = [c for c in FIRST if c.startswith("python -m train ") and "--" in c]
+MAKE = [c for c in FIRST if c.startswith("make ")]
 # In code, or at the beginning of a line of it: "make" is a word of prose too.
 TARGETS = sorted(set(re.findall(r"(?:^ *|`)make ([a-z-]+)", TEXT, re.M)))
 FAKED = ("scan", "calibrate", "view", "record", "run")
@@ -57,6 +65,17 @@ def test_a_command_of_the_board_does_as_it_is_written(command, bench, monkeypatc
         words += ["--fake", "still.npz" if words[0] in ("scan", "calibrate") else "REC.npz"]
     words += {"calibrate": ["--frames", "20"], "view": ["--seconds", "0.3"]}.get(words[0], [])
     assert cli.main(words) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("program", "arguments"), COMMANDS)
+def test_a_command_of_any_page_has_arguments_that_its_program_knows(program, arguments, capsys):
+    makers = {"edge-classify": cli.parser, "-m train": train_parser, "-m export": export_parser}
+    try:
+        words = re.sub(r"[][]", "", arguments).replace("FORMAT", "csv")
+        makers[program]().parse_args(shlex.split(words))
+    except SystemExit as end:
+        # A sentence may name a command without all of its arguments.
+        assert end.code == 0 or "are required" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", WORKSTATION)
