@@ -31,19 +31,14 @@ PAPER = ("max_force", "contact_area", "contact_motion")
 """The three features of the paper's section III-B, in its order."""
 
 ZONES = ("contact", "skin", "left", "right")
-QUANTITIES = {
-    "max_force": "largest force of a taxel",
-    "force": "sum of the taxels' forces",
-    "area": "number of taxels",
-    "pressure": "force over area",
-    "along": "centroid's row",
-    "around": "centroid's column, followed across the seam",
-    "spread_along": "standard deviation of the rows",
-    "spread_around": "standard deviation of the columns",
-    "slant": "covariance of rows and columns: orientation without an angle that jumps",
-    "length": "standard deviation along the longer principal axis",
-    "width": "standard deviation along the shorter principal axis",
-}
+QUANTITIES = tuple(
+    "max_force force area pressure along around spread_along spread_around slant length "
+    "width".split()
+)
+"""Of a zone: its taxels' largest force and the sum of their forces; their number; force over area;
+the row and column of the centroid, followed across the seam; the standard deviations of rows and
+columns, and their covariance, an orientation without an angle that jumps; the standard deviations
+along the longer and the shorter principal axis."""
 ALONE = {
     "max_force": ("contact", "max_force"),
     "contact_motion": ("contact", "motion"),
