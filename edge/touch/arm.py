@@ -176,19 +176,28 @@ class Chain:
             raise InputError(f"{where}: {error}") from None
 
     @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Self:
+        """The chain of a TOML file like `edge/arms/cody.toml`.
+
+        Raises:
+            InputError: the file cannot be read, or does not describe a chain.
+        """
+        return cls.from_dict(read_toml(path).raw, where=os.fspath(path))
+
+    @classmethod
     def cody(cls) -> Self:
         """Cody's right arm, up to the wrist frame that carries the skin: 5 angles."""
-        return cls.from_file(Path(__file__).parents[1] / "arms" / "cody.toml")
+        return cls.from_toml(Path(__file__).parents[1] / "arms" / "cody.toml")
 
     @classmethod
     def from_file(
         cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
     ) -> Self:
-        """The chain of a TOML file like `edge/arms/cody.toml`, or of a URDF between two links.
+        """The chain of a TOML file, or of a URDF file between two of its links.
 
         Raises:
-            InputError: the file cannot be read, or does not describe a chain; links are given for
-                a TOML file, or a link is missing for a URDF.
+            InputError: as `from_toml` and `from_urdf`; or links are given for a TOML file, or a
+                link is missing for a URDF.
         """
         if Path(path).suffix.lower() in (".urdf", ".xml"):
             if base is None or tip is None:
@@ -199,7 +208,7 @@ class Chain:
             return cls.from_urdf(path, base, tip)
         if base is not None or tip is not None:
             raise InputError(f"{path}: --base and --tip are for a .urdf file")
-        return cls.from_dict(read_toml(path).raw, where=os.fspath(path))
+        return cls.from_toml(path)
 
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Self:

@@ -132,7 +132,7 @@ def skins() -> list[bytes]:
 def read_chain(path: Path) -> None:
     """Load an arm and compute a pose."""
     urdf = path.suffix == ".urdf"
-    chain = Chain.from_urdf(path, "base", "lower") if urdf else Chain.from_file(path)
+    chain = Chain.from_urdf(path, "base", "lower") if urdf else Chain.from_toml(path)
     if not np.isfinite(chain.pose(np.full(chain.dof, 0.5))).all():
         raise Wrong("a pose is not finite")
 

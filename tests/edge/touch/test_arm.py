@@ -128,7 +128,7 @@ def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
     path = tmp_path / "arm.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=word):
-        Chain.from_file(path)
+        Chain.from_toml(path)
 
 
 @pytest.mark.parametrize("axis", [(1e-8, 1e-8, 0.0), (5.0, 5.0, 0.0)])
