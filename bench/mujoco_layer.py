@@ -14,7 +14,7 @@ NET_M, FACE_M, LAYER_KG_M2 = 0.0108, 0.008, 8.7
 """The pitch of the net, half the face's thickness, and the layer's mass."""
 SHEAR = 0.06
 """The layer's shear stiffness divided by modulus times thickness."""
-SOLIMP, CONTACT = 0.95, "-1e5 -600"
+CONTACT = "-1e5 -600"
 SHEAR_N_M, SHEAR_NS_M = 1e4, 15.0
 """The skin's stretch along the forearm: its stiffness and its loss."""
 
@@ -26,9 +26,9 @@ def beneath_n_m(modulus_pa: float) -> float:
 
 def layer_xml(
     height_m: float, breadth_m: float, modulus_pa: float, thick_m: float
-) -> tuple[str, str, str]:
-    """An elastic layer: a net of sprung knots, the springs between neighbours (together a Pasternak
-    foundation) and the face stretched over the net.
+) -> tuple[str, str]:
+    """An elastic layer: a net of sprung knots, and both the springs between neighbours (together a
+    Pasternak foundation) and the face stretched over the net.
 
     The face is smooth and its net as fine as the skin. Flat blocks would triple the highest load of
     a taxel, because a single pad bears each block. Compared with finite elements of an elastic
@@ -41,41 +41,39 @@ def layer_xml(
     k = modulus_pa * dz * dy / thick_m
     shear = SHEAR * modulus_pa * thick_m
     mass = LAYER_KG_M2 * dz * dy
-    xml, between, knots = "", "", []
-    for r in range(rows + 1):
-        for c in range(cols + 1):
-            share = (0.5 if r in (0, rows) else 1.0) * (0.5 if c in (0, cols) else 1.0)
-            y, z = (c - cols / 2) * dy, ABOVE_FLOOR_M + (r - rows / 2) * dz
-            # A body with a face may have no damped joint, so the face hangs on a second body.
-            xml += (
-                f'<body pos="{FACE_M} {y} {z}"><joint name="b{r}_{c}" type="slide" axis="1 0 0" '
-                f'stiffness="{k * share}" damping="{0.06 * k * share + 0.02}" '
-                f'range="0 {thick_m * 0.9}" limited="true"/><inertial pos="0 0 0" '
-                f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body name="n{r}_{c}">'
-                '<inertial pos="0 0 0" mass="1e-5" diaginertia="1e-9 1e-9 1e-9"/></body></body>'
-            )
-            knots.append(f"n{r}_{c}")
-            beside = [(r + 1, c, dy / dz * (0.5 if c in (0, cols) else 1.0))]
-            beside += [(r, c + 1, dz / dy * (0.5 if r in (0, rows) else 1.0))]
-            for r2, c2, share in beside:
-                if r2 <= rows and c2 <= cols:
-                    between += (
-                        f'<fixed stiffness="{shear * share}"><joint joint="b{r}_{c}" coef="1"/>'
-                        f'<joint joint="b{r2}_{c2}" coef="-1"/></fixed>'
-                    )
-    triangles = []
-    for r in range(rows):
-        for c in range(cols):
-            a = r * (cols + 1) + c
-            b, d, e = a + 1, a + cols + 1, a + cols + 2
+    number = np.arange((rows + 1) * (cols + 1)).reshape(rows + 1, cols + 1)
+    knots, springs, triangles = "", "", []
+    for (r, c), n in np.ndenumerate(number):
+        # A knot on the rim stands for half of a cell, or at a corner for a quarter.
+        of_row, of_col = 0.5 if r in (0, rows) else 1.0, 0.5 if c in (0, cols) else 1.0
+        y, z, share = (c - cols / 2) * dy, ABOVE_FLOOR_M + (r - rows / 2) * dz, of_row * of_col
+        # A body with a face may have no damped joint, so the face hangs on a second body.
+        knots += (
+            f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" stiffness="{k * share}" '
+            f'damping="{0.06 * k * share + 0.02}" range="0 {thick_m * 0.9}"/><inertial pos="0 0 0" '
+            f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body name="n{n}"><inertial '
+            'pos="0 0 0" mass="1e-5" diaginertia="1e-9 1e-9 1e-9"/></body></body>'
+        )
+        for beside, stiff in (
+            (number[r + 1 : r + 2, c], dy / dz * of_col),
+            (number[r, c + 1 : c + 2], dz / dy * of_row),
+        ):
+            for m in beside:
+                springs += (
+                    f'<fixed stiffness="{shear * stiff}"><joint joint="b{n}" coef="1"/>'
+                    f'<joint joint="b{m}" coef="-1"/></fixed>'
+                )
+        if r < rows and c < cols:
+            a, b, d, e = n, n + 1, n + cols + 1, n + cols + 2
             triangles += [a, b, e, a, e, d] if (r + c) % 2 else [a, b, d, b, e, d]
+    bodies = " ".join(f"n{n}" for n in number.flat)
     face = (
-        f'<deformable><flex name="face" dim="2" radius="{FACE_M}" body="{" ".join(knots)}" '
-        f'vertex="{"0 0 0 " * len(knots)}" element="{" ".join(map(str, triangles))}"><contact '
+        f'<deformable><flex name="face" dim="2" radius="{FACE_M}" body="{bodies}" '
+        f'vertex="{"0 0 0 " * number.size}" element="{" ".join(map(str, triangles))}"><contact '
         f'contype="2" conaffinity="1" selfcollide="none" condim="1" solref="{CONTACT}" '
-        f'solimp="{SOLIMP} {SOLIMP} 0.001"/></flex></deformable>'
+        'solimp="0.95 0.95 0.001"/></flex></deformable>'
     )
-    return xml, between, face
+    return knots, f"<tendon>{springs}</tendon>{face}"
 
 
 class Rub:

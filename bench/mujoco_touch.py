@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
+from string import Template
 from typing import Any
 
 import mujoco
@@ -17,15 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import mujoco_layer
-from bench.mujoco_layer import ABOVE_FLOOR_M, SOLIMP
+from bench.mujoco_layer import ABOVE_FLOOR_M
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
+MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
 ARM = Chain.cody()
 START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
 RATE_DEG_S = 20.0
-LEAD_S, TOUCH_S, RATE_HZ, STEP_S = 0.3, 1.8, 100, 0.001
+LEAD_S, TOUCH_S, RATE_HZ = 0.3, 1.8, 100
 """Seconds before the arm meets a rigid thing, and after that at the usual speed."""
 PLACE_M = 0.10
 COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
@@ -33,14 +36,13 @@ RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
 """A taxel whose normal lies farther from the push than this cannot meet the thing."""
-PAD_M, PAD_FLAT_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.0035, 0.02, 0.0015
-"""A pad's radius around the forearm and half its straight part along it (flat over a taxel's 9 mm,
-to 0.1 mm); its mass; its damping divided by its stiffness."""
+PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
+"""A pad's radius around the forearm; its mass; its damping divided by its stiffness."""
 RIGID = "-1e6 -2e3"
-"""MuJoCo's contact is SOLIMP / (1 - SOLIMP) times as stiff as solref times the mass."""
+"""Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the mass."""
 RIGID_KINDS = ("box", "drum", "drawer", "door")
-FOOT_M = 0.16
-"""Length of a thing's foot along the push."""
+HALF_M = 0.08
+"""Half the length of a thing's foot along the push, and at least half its breadth."""
 
 
 @dataclass(frozen=True)
@@ -142,101 +144,75 @@ class Touched:
     moved_m: NDArray[np.float64]
 
 
+def joined(numbers: Any) -> str:
+    """Numbers as MuJoCo reads them."""
+    return " ".join(map(str, numbers))
+
+
 def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
     """The arm's bodies, and the (row, column) of each pad."""
     links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
     pads, where = "", []
-    k, skin = touch.pad_n_m, touch.thing.skin
-    contact, dimensions, loss = RIGID, 3, PAD_LOSS_S * k
-    if touch.thing.layered:
-        contact, dimensions, loss = mujoco_layer.CONTACT, 1, 2.0 * math.sqrt(k * PAD_KG)
     for row in range(ROWS):
         for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
                 continue
-            out = f"{math.cos(math.radians(angle))} {math.sin(math.radians(angle))} 0"
-            x, y = ((RADIUS_M - PAD_M) * float(v) for v in out.split()[:2])
+            out = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+            x, y = ((RADIUS_M - PAD_M) * v for v in out)
             pads += (
-                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}"><joint '
-                f'name="p{len(where)}" type="slide" axis="{out}" stiffness="{k}" '
-                f'damping="{loss}" armature="{PAD_KG}"/>'
-                f'<geom type="capsule" size="{PAD_M} {PAD_FLAT_M}" mass="0.0005" contype="1" '
-                f'conaffinity="2" solref="{contact}" solimp="{SOLIMP} {SOLIMP} 0.001" '
-                f'friction="{skin} 0.005 0.0001" condim="{dimensions}"/></body>'
+                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}" '
+                f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
             )
             where.append((row, column))
-    xml, end, at = "", "", "0 0 0"
+    xml, at = "", "0 0 0"
     for i, joint in enumerate(ARM.joints):
-        axis, damping = " ".join(map(str, joint.axis)), CODY_DAMPING[i] * math.sqrt(touch.stiffness)
         size, mass, centre = links.get(i, ("0.02 0.01", 0.05, "0 0 0"))
+        loss = CODY_DAMPING[i] * math.sqrt(touch.stiffness)
         xml += (
-            f'<body pos="{at}" gravcomp="1"><joint name="j{i}" axis="{axis}" damping="{damping}" '
-            f'armature="0.004"/><geom type="capsule" size="{size}" pos="{centre}" mass="{mass}" '
-            'contype="0" conaffinity="0"/>'
+            f'<body pos="{at}" gravcomp="1" childclass="link"><joint name="j{i}" '
+            f'axis="{joined(joint.axis)}" damping="{loss}"/>'
+            f'<geom size="{size}" pos="{centre}" mass="{mass}"/>'
         )
-        end = "</body>" + end
-        at = " ".join(map(str, joint.translate))
-    return xml + pads + end, where
+        at = joined(joint.translate)
+    return xml + pads + "</body>" * ARM.dof, where
 
 
-def stems_xml(thing: Thing, skin: str) -> str:
-    """Stems on hinges at the foot, bending along the push."""
+def stems_xml(thing: Thing) -> str:
+    """The stems of a plant, which bend along the push."""
     rng = np.random.default_rng(thing.seed)
-    hinge = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2
-    xml = ""
+    hinge, xml = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2, ""
     for _ in range(thing.stems):
         x = 0.012 + rng.uniform(0.0, 0.08)
         y = rng.uniform(-0.5, 0.5) * min(thing.breadth_m, 0.15)
-        length = rng.uniform(0.34, 0.5)
+        half = rng.uniform(0.34, 0.5) / 2
         xml += (
-            f'<body pos="{x} {y} 0.02"><joint axis="0 1 0" stiffness="{hinge}" '
-            f'damping="{0.03 * hinge}" armature="0.0002"/><geom type="capsule" size="0.006 '
-            f'{length / 2}" pos="0 0 {length / 2}" mass="0.01" contype="2" conaffinity="1" '
-            f"{skin}/></body>"
+            f'<body pos="{x} {y} 0.02" childclass="stem"><joint stiffness="{hinge}" '
+            f'damping="{0.03 * hinge}"/><geom size="0.006 {half}" pos="0 0 {half}"/></body>'
         )
     return xml
 
 
-def thing_xml(touch: Touch, face: NDArray[np.float64], push: float) -> tuple[str, str, str]:
-    """The thing, its face at `face` and turned by `push` radians about the vertical; the
-    springs of a layer; and its face."""
-    thing = touch.thing
-    x, y, z = face
-    base, width = z - ABOVE_FLOOR_M, thing.breadth_m
-    half = (thing.below_m + thing.height_m / 2) / 2
-    middle = ABOVE_FLOOR_M + thing.height_m / 2 - half
-    skin = f'friction="{thing.skin} 0.005 0.0001"'
-    floor = f'friction="{thing.floor} 0.005 0.0001"'
-    springs, layer, back = "", "", FOOT_M / 2
+def upper_xml(thing: Thing) -> tuple[str, str]:
+    """What stands on the thing's foot, and the springs and the face of a layer."""
     if thing.layered:
-        upper, springs, layer = mujoco_layer.layer_xml(
+        return mujoco_layer.layer_xml(
             thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m
         )
-        back = 0.2
-    elif thing.soft:
-        upper = stems_xml(thing, skin)
-    else:
-        shape = (
-            f'type="cylinder" size="{width / 2 + 0.08} {half}" pos="{width / 2 + 0.08} 0 {middle}"'
-            if thing.kind == "drum"
-            else f'type="box" size="{FOOT_M / 2} {width / 2} {half}" pos="{FOOT_M / 2} 0 {middle}"'
-        )
-        upper = f'<geom {shape} mass="{thing.mass_kg * 0.2}" contype="2" conaffinity="1" {skin}/>'
-    free = "" if touch.fixed else thing.joint
-    return (
-        f'<body name="thing" pos="{x} {y} {base}" axisangle="0 0 1 {push}">{free}<geom type="box" '
-        f'size="{FOOT_M / 2} {max(width / 2, 0.08)} 0.004" pos="{back} 0 0.004" '
-        f'mass="{thing.mass_kg * 0.8}" contype="4" conaffinity="8" {floor}/>{upper}</body>'
-        f'<geom type="plane" size="4 4 0.1" pos="0 0 {base}" contype="8" conaffinity="4" {floor}/>',
-        springs,
-        layer,
-    )
+    if thing.soft:
+        return stems_xml(thing), ""
+    half, across = (thing.below_m + thing.height_m / 2) / 2, thing.breadth_m / 2
+    deep, shape = HALF_M, f'type="box" size="{HALF_M} {across} {half}"'
+    if thing.kind == "drum":
+        deep, shape = across + HALF_M, f'type="cylinder" size="{across + HALF_M} {half}"'
+    place = f'pos="{deep} 0 {ABOVE_FLOOR_M + thing.height_m / 2 - half}"'
+    return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
 
 def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, int]]]:
     """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
+    thing, k = touch.thing, touch.pad_n_m
     start, rate = np.radians(START_DEG) + np.array(touch.start_rad), touch.rate_rad_s
     first = start - touch.lag_rad
     pose, later = ARM.pose(first + rate * LEAD_S), ARM.pose(first + rate * (LEAD_S + 0.01))
@@ -248,21 +224,26 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     across = pose[:3, :3].T @ ahead
     arm, where = arm_xml(math.degrees(math.atan2(across[1], across[0])), touch)
     aside = np.array([-ahead[1], ahead[0], 0.0]) * touch.aside_m
-    thing, springs, layer = thing_xml(
-        touch, point + ahead * (RADIUS_M + 0.001) + aside, heading + touch.yaw_rad
-    )
-    gains = "".join(
-        f'<position joint="j{i}" kp="{k * touch.stiffness}"/>'
-        for i, k in enumerate(CODY_STIFFNESS[: ARM.dof])
+    x, y, z = point + ahead * (RADIUS_M + 0.001) + aside
+    upper, layer = upper_xml(thing)
+    motors = (
+        f'<position joint="j{i}" kp="{CODY_STIFFNESS[i] * touch.stiffness}"/>'
+        for i in range(ARM.dof)
     )
     slope, g = touch.slope_rad, 9.81
-    fall = (*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope))
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" cone="elliptic" '
-        f'jacobian="dense" gravity="{" ".join(map(str, fall))}"/><worldbody>{arm}{thing}'
-        f"</worldbody>{layer}<tendon>{springs}</tendon><actuator>{gains}</actuator></mujoco>"
-    )
-    return model, start, where
+    gravity = joined((*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope)))
+    words = {**vars(thing), "x": x, "y": y, "floor_m": z - ABOVE_FLOOR_M}
+    words |= {"pad_n_m": k, "pad_loss": PAD_LOSS_S * k, "pad_kg": PAD_KG, "gravity": gravity}
+    words |= {"contact": RIGID, "dimensions": 3, "turn_rad": heading + touch.yaw_rad}
+    words |= {"foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}", "foot_x": HALF_M}
+    words |= {"foot_kg": thing.mass_kg * 0.8, "motors": "".join(motors)}
+    words |= {"arm": arm, "upper": upper, "layer": layer}
+    if touch.fixed:
+        words["joint"] = ""
+    if thing.layered:
+        words |= {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
+        words["pad_loss"] = 2.0 * math.sqrt(k * PAD_KG)
+    return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
 
 
 def simulate(touch: Touch) -> Touched:
@@ -272,31 +253,34 @@ def simulate(touch: Touch) -> Touched:
     data = mujoco.MjData(model)
     data.qpos[:dof] = start - touch.lag_rad
     data.qvel[:dof] = rate
-    springs = [model.joint(f"p{i}").qposadr[0] for i in range(len(where))]
-    row, column = np.array(where).T
-    body = model.body("thing").id
     mujoco.mj_forward(model, data)
-    rub = mujoco_layer.Rub(model, touch.thing.skin) if touch.thing.layered else None
-    frames, joints, forces, places = [], [], [], []
+    rub = mujoco_layer.Rub(model, thing.skin) if thing.layered else None
+
+    def pressed() -> NDArray[np.float64]:
+        """(pads,) newtons; the pads' joints follow the arm's."""
+        return np.maximum(-touch.pad_n_m * data.qpos[dof : dof + len(where)], 0.0)
+
     # A soft thing is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
-    for _ in range(round(lasts_s * RATE_HZ) + 1):
-        loads = np.zeros((ROWS, CODY_SKIN["cols"]))
-        loads[row, column] = np.maximum(-touch.pad_n_m * data.qpos[springs], 0.0)
-        counts = loads * COUNTS_PER_NEWTON
-        if touch.noise is not None:
-            size, generator = touch.noise
-            counts = counts + generator.normal(0.0, size, loads.shape)
-        frames.append(np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16))
-        joints.append(data.qpos[:dof].copy())
-        forces.append(loads.sum())
-        turned = data.xmat[body].reshape(3, 3)
-        places.append(data.xpos[body] + ABOVE_FLOOR_M * turned[:, 2])
-        for _ in range(round(1.0 / (RATE_HZ * STEP_S))):
+    t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
+    loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
+    joints, places = np.zeros((len(t), dof)), np.zeros((len(t), 3))
+    row, column = np.array(where).T
+    body = data.body("thing")
+    for i in range(len(t)):
+        loads[i, row, column] = pressed()
+        joints[i] = data.qpos[:dof]
+        places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
+        for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
             data.ctrl[:] = start + rate * data.time
             if rub is not None:
-                rub.hold(data, np.maximum(-touch.pad_n_m * data.qpos[springs], 0.0))
+                rub.hold(data, pressed())
             mujoco.mj_step(model, data)
+    counts = loads * COUNTS_PER_NEWTON
+    if touch.noise is not None:
+        size, generator = touch.noise
+        counts += generator.normal(0.0, size, counts.shape)
+    frames = np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16)
     condition = "fixed" if touch.fixed else "movable"
     soft = "soft" if thing.soft else "rigid"
     labels = {"category": f"{soft}-{condition}", "mobility": condition}
@@ -305,7 +289,9 @@ def simulate(touch: Touch) -> Touched:
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
     source = "MuJoCo, bench/mujoco_touch.py"
     meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
-    t = np.arange(len(frames)) / RATE_HZ
-    recording = Recording(t, np.array(frames), joints=np.array(joints), meta=meta)
-    place = np.array(places) - places[0]
-    return Touched(recording, np.array(forces), np.hypot(place[:, 0], place[:, 1]))
+    moved = places - places[0]
+    return Touched(
+        Recording(t, frames, joints=joints, meta=meta),
+        loads.reshape(len(t), -1).sum(axis=1),
+        np.hypot(moved[:, 0], moved[:, 1]),
+    )

@@ -9,12 +9,12 @@ another.
 from __future__ import annotations
 
 import argparse
-import itertools
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,11 @@ from edge.cli import dispatch
 from edge.commands.replay import Summary, decide
 from edge.model.model import Model
 from edge.model.stopping import UNKNOWN
-from edge.recording import Recording, load, save
+from edge.recording import Recording, save
 from train.progress import bar
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
-EACH = 2
-"""Trials of each object; every other trial is fixed."""
 ODD = "odd things"
 HABITS: dict[str, dict[str, float]] = {
     "as in the paper": {},
@@ -105,9 +103,7 @@ def draw_odd(rng: np.random.Generator) -> Thing:
     return replace(body, **changes[body.kind])
 
 
-def draw_touch(
-    thing: Thing, fixed: bool, rng: np.random.Generator, habit: Mapping[str, float]
-) -> Touch:
+def draw_touch(thing: Thing, fixed: bool, rng: np.random.Generator, habit: str) -> Touch:
     """One touch: how the object stands before the arm, how the arm begins, a habit's factors."""
     touch = Touch(
         thing=thing,
@@ -120,7 +116,8 @@ def draw_touch(
         taxel_n_m=log_uniform(rng, 5e3, 1.5e4),
         noise=(6.0, rng),
     )
-    return replace(touch, **{name: getattr(touch, name) * by for name, by in habit.items()})
+    factors = HABITS[habit].items()
+    return replace(touch, **{name: getattr(touch, name) * by for name, by in factors})
 
 
 def moved(touched: Touched) -> float:
@@ -130,73 +127,55 @@ def moved(touched: Touched) -> float:
     return float(touched.moved_m[last])
 
 
-def make_trials(folder: Path, count: int, seed: int) -> dict[str, list[Path]]:
-    """{habit: recordings}, `count` in all; those of an earlier run are used again.
+def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
+    """A touch of an object that is fixed, and one where it is free.
 
-    Each habit has a folder, and each object `EACH` recordings. An object is drawn again
-    where a trial that is called movable did not move.
+    Both are drawn again, with another object, where the free one did not move.
     """
-    numbers = [range(first, min(first + EACH, count)) for first in range(0, count, EACH)]
-    habits = [list(HABITS)[i % len(HABITS)] for i in range(len(numbers))]
-    work = (
-        delayed(_touch_object)(folder / habit.replace(" ", "-"), i, numbers[i], seed, habit)
-        for i, habit in enumerate(habits)
-    )
-    done = Parallel(n_jobs=cpu_count(), return_as="generator")(work)
-    paths: dict[str, list[Path]] = {habit: [] for habit in HABITS}
-    shown = bar(done, total=len(habits), unit=" objects", desc="MuJoCo")
-    for habit, made in zip(habits, shown, strict=True):
-        paths[habit] += made
-    return paths
-
-
-def _touch_object(folder: Path, index: int, numbers: range, seed: int, habit: str) -> list[Path]:
-    """The recordings of one object."""
-    folder.mkdir(parents=True, exist_ok=True)
-    earlier = sorted(folder.glob(f"*-{index:02d}-*.npz"))
-    if len(earlier) == len(numbers):
-        return earlier
-    for attempt in itertools.count():
-        draw = draw_odd if habit == ODD else draw_object
+    draw = draw_odd if habit == ODD else draw_object
+    attempt = 0
+    while True:
         thing = draw(streams.stream(seed, f"object.{attempt}", "transfer", index))
-        recordings: dict[Path, Recording] = {}
-        for number in sorted(numbers, key=lambda n: n % 2 == 0):
-            rng = streams.stream(seed, f"trial.{attempt}", "transfer", number)
-            touched = simulate(draw_touch(thing, number % 2 == 0, rng, HABITS[habit]))
-            if number % 2 == 1 and moved(touched) < SLIDES_M:
-                break
-            condition = touched.recording.labels["mobility"]
-            name = f"{thing.kind}-{index:02d}-{condition}-{number:03d}.npz"
-            recordings[folder / name] = touched.recording
-        else:
-            break
-    for path, recording in recordings.items():
-        save(path, recording)
-    return list(recordings)
+        first, second = (
+            streams.stream(seed, f"trial.{attempt}", "transfer", number)
+            for number in (2 * index, 2 * index + 1)
+        )
+        free = simulate(draw_touch(thing, False, second, habit))
+        if moved(free) >= SLIDES_M:
+            return [simulate(draw_touch(thing, True, first, habit)).recording, free.recording]
+        attempt += 1
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the trials, and print how the model decides them.
+    """Make the trials, save them in a folder for each habit, and print how the model decides them.
 
     The tables have right decisions by habit and in all, contacts called unknown, and each task's
     confusion. A contact without a decision counts as wrong.
     """
-    model, folder = Model(arguments.model), arguments.out / f"seed{arguments.seed}"
+    model, seed = Model(arguments.model), arguments.seed
     tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
-    by_habit = make_trials(folder, arguments.trials, arguments.seed)
-    pooled, unknown = Summary(tasks), 0
-    print(f"{'right':<20}" + "".join(f"{task:>12}" for task in tasks))
-    for habit, paths in by_habit.items():
-        summary = Summary(tasks)
-        for path in paths:
-            recording = load(path)
+    summaries = {habit: Summary(tasks) for habit in (*HABITS, "all")}
+    unknown, habits = 0, list(islice(cycle(HABITS), arguments.trials // 2))
+    touches = Parallel(n_jobs=cpu_count(), return_as="generator")(
+        delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
+    )
+    shown = bar(touches, total=len(habits), unit=" objects", desc="MuJoCo")
+    for i, (habit, recordings) in enumerate(zip(habits, shown, strict=True)):
+        folder = arguments.out / f"seed{seed}" / habit.replace(" ", "-")
+        folder.mkdir(parents=True, exist_ok=True)
+        for recording in recordings:
+            labels = recording.labels
+            path = folder / f"{labels['object']}-{i:02d}-{labels['mobility']}.npz"
+            save(path, recording)
             events = decide(model, recording, str(path))
             unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
-            for each in (summary, pooled):
-                each.add(recording.labels, events)
+            for name in (habit, "all"):
+                summaries[name].add(labels, events)
+    print(f"{'right':<20}" + "".join(f"{task:>12}" for task in tasks))
+    for name, summary in summaries.items():
         right = "".join(f"{summary.right(task)[0]:>12}" for task in tasks)
-        print(f"{habit:<20}{right} of {summary.recordings}")
-    print(f"unknown: {unknown} of {pooled.recordings}\n\n{pooled.text()}")
+        print(f"{name:<20}{right} of {summary.recordings}")
+    print(f"unknown: {unknown} of {2 * len(habits)}\n\n{summaries['all'].text()}")
     return 0
 
 
@@ -205,7 +184,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     top = argparse.ArgumentParser(prog="bench.transfer", description=__doc__.split("\n\n")[0])
     top.add_argument("--model", type=Path, required=True)
     top.add_argument("--out", type=Path, default=Path("build/transfer"))
-    top.add_argument("--trials", type=int, default=96)
+    top.add_argument("--trials", type=int, default=96, help="two of each object (%(default)s)")
     top.add_argument("--seed", type=int, default=1)
     top.set_defaults(run=run)
     return dispatch(top, argv)

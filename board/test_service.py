@@ -28,11 +28,15 @@ SHOWN = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitR
 class Machine:
     """The machine of the new systemd, seen from this one."""
 
-    def __init__(self, variables):
-        command = "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
-        environment = os.environ | {name: str(value) for name, value in variables.items()}
+    def __init__(self, folder):
+        """Start it, with the files of a folder as those of the service."""
+        python, packages = Path(sys.executable).resolve().name, Path(numpy.__file__).parents[1]
+        variables = {"BASE": sys.base_prefix, "PYTHON": python, "PACKAGES": packages}
+        variables |= {"CHECKOUT": HERE.parent, "FOLDER": folder, "SYSTEMD": SYSTEMD}
+        command = ["env", *(f"{name}={value}" for name, value in variables.items())]
+        command += "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
         self.process = subprocess.Popen(
-            [*command, HERE / "service_init.sh"], stdin=subprocess.DEVNULL, env=environment
+            [*command, HERE / "service_init.sh"], stdin=subprocess.DEVNULL
         )
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         (self.first,) = self.once(lambda: children.read_text().split(), len)
@@ -74,86 +78,66 @@ class Machine:
         self.run("systemctl", "restart", "--no-block", UNIT)
 
 
-def take_steps(machine):
-    """{step: what systemd and the kernel say of the service}."""
-    verify = f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?"
-    seen = {"verified": machine.run("bash", "-c", verify)}
-    machine.restart(FAKE)
-    seen["started"] = machine.wait_for(ActiveState="active")
-    pid = seen["started"]["MainPID"]
-    seen["status"] = (machine.root / "proc" / pid / "status").read_text()
-    seen["schedule"] = machine.run("chrt", "--pid", pid)
-    machine.run("kill", "-STOP", pid)
-    seen["hung"] = machine.wait_for(ActiveState="active", NRestarts="1")
-    machine.restart("--without-joints skin")
-    seen["missing device"] = machine.wait_for(SubState="auto-restart", ExecMainStatus="3")
-    machine.restart(f"{FAKE} --error 2")
-    machine.wait_for(ActiveState="failed")
-    time.sleep(3.0)
-    seen["mistaken"] = machine.shown()
-    seen["log"] = (machine.root / "run" / "log").read_text()
-    return seen
-
-
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """The results of `take_steps`."""
-    if not (SYSTEMD.exists() and shutil.which("unshare")):
-        pytest.skip("this machine has no systemd, or no unshare")
-    if os.geteuid() != 0:
-        pytest.skip("a systemd of its own needs root")
+def machine(tmp_path_factory):
+    if not (SYSTEMD.exists() and shutil.which("unshare") and os.geteuid() == 0):
+        pytest.skip("a systemd of its own needs systemd, unshare and root")
     folder = tmp_path_factory.mktemp("service")
     shutil.copy(demo.MODEL, folder / "model.onnx")
     shutil.copy(demo.FOLDER / "cardboard-box-fixed.npz", folder / "touch.npz")
     skin = shutil.copy(skinfile.shipped("cody"), folder / "skin.toml")
     save_calibration(skin, calibrated(skinfile.load(skin)).calibration)
-    machine = Machine(
-        {
-            "BASE": sys.base_prefix,
-            "PACKAGES": Path(numpy.__file__).parents[1],
-            "CHECKOUT": HERE.parent,
-            "FOLDER": folder,
-            "SYSTEMD": SYSTEMD,
-            "PYTHON": Path(sys.executable).resolve().name,
-        }
-    )
-    try:
-        return take_steps(machine)
-    finally:
-        machine.process.kill()
-        machine.process.wait()
+    machine = Machine(folder)
+    yield machine
+    machine.process.kill()
+    machine.process.wait()
 
 
-def test_the_unit_is_valid(results):
-    assert results["verified"].splitlines()[-1] == "0", results["verified"]
+@pytest.fixture(scope="module")
+def started(machine):
+    """The unit's properties once it runs."""
+    machine.restart(FAKE)
+    return machine.wait_for(ActiveState="active")
 
 
-def test_it_is_active_once_it_reads_the_skin_as_a_user_without_rights(results):
-    started = results["started"]
+def test_the_unit_is_valid(machine):
+    printed = machine.run("bash", "-c", f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?")
+    assert printed.splitlines()[-1] == "0", printed
+
+
+def test_it_is_active_once_it_reads_the_skin_as_a_user_without_rights(machine, started):
     assert (started["ActiveState"], started["NRestarts"]) == ("active", "0"), started
     assert started["StatusText"] == "reading fake /etc/edge-classify/touch.npz"
-    status = dict(line.split(":\t", 1) for line in results["status"].splitlines())
+    lines = (machine.root / "proc" / started["MainPID"] / "status").read_text().splitlines()
+    status = dict(line.split(":\t", 1) for line in lines)
     assert int(status["Uid"].split()[0]) >= 61184  # of the range of dynamic users
     assert status["CapEff"].strip() == "0000000000000000"
 
 
-def test_the_drop_in_gives_it_a_real_time_priority_with_a_limit(results):
-    policy, priority = (line.split(": ")[1] for line in results["schedule"].splitlines())
-    assert (policy, priority) == ("SCHED_FIFO", "10")
-    assert results["started"]["LimitRTTIME"] == "10000000"
+def test_the_drop_in_gives_it_a_real_time_priority_with_a_limit(machine, started):
+    schedule = machine.run("chrt", "--pid", started["MainPID"]).splitlines()
+    assert [line.split(": ")[1] for line in schedule] == ["SCHED_FIFO", "10"]
+    assert started["LimitRTTIME"] == "10000000"
 
 
-def test_a_loop_that_stands_still_is_started_again(results):
-    assert (results["hung"]["ActiveState"], results["hung"]["NRestarts"]) == ("active", "1")
-    assert results["hung"]["MainPID"] != results["started"]["MainPID"]
+def test_a_loop_that_stands_still_is_started_again(machine, started):
+    machine.run("kill", "-STOP", started["MainPID"])
+    hung = machine.wait_for(ActiveState="active", NRestarts="1")
+    assert (hung["ActiveState"], hung["NRestarts"]) == ("active", "1"), hung
+    assert hung["MainPID"] != started["MainPID"]
 
 
-def test_a_device_that_is_missing_is_tried_again(results):
-    missing = results["missing device"]
+def test_a_device_that_is_missing_is_tried_again(machine):
+    machine.restart("--without-joints skin")
+    missing = machine.wait_for(SubState="auto-restart", ExecMainStatus="3")
     assert (missing["SubState"], missing["ExecMainStatus"]) == ("auto-restart", "3"), missing
 
 
-def test_a_mistake_in_the_arguments_is_not(results):
-    mistaken = results["mistaken"]
+def test_a_mistake_in_the_arguments_is_not(machine):
+    machine.restart(f"{FAKE} --error 2")
+    machine.wait_for(ActiveState="failed")
+    time.sleep(3.0)
+    mistaken = machine.shown()
     assert (mistaken["ActiveState"], mistaken["ExecMainStatus"]) == ("failed", "2"), mistaken
-    assert "the error rate must be" in results["log"].splitlines()[-1]
+    log = (machine.root / "run" / "log").read_text()
+    assert "the error rate must be" in log.splitlines()[-1]
