@@ -6,14 +6,14 @@ physics. Both trials last 2 s and more, with frames of 384 taxels at 100 Hz. `py
 simulate --explain` prints the cost of each effect.
 """
 
-import math
 from pathlib import Path
+from string import Template
 
 import mujoco
 import pytest
 
 from train.simulate.run import batches_of, simulate_trials
-from train.simulate.scene import CODY_SKIN, load
+from train.simulate.scene import load
 
 SCENES = Path(__file__).parents[1] / "train" / "scenes"
 PEERS = {
@@ -26,26 +26,13 @@ FASTER = {"cody18": 1.5, "household": 2.0}
 """{scene: how many times MuJoCo's trials a second}: more where more trials run side by side."""
 
 
+FOREARM = Template(Path(__file__).with_name("forearm.xml").read_text())
+
+
 def mujoco_trial(solref, joint):
-    """A function that runs a trial in MuJoCo: 384 touch geoms on a slide with the arm's stiffness,
-    against a box."""
-    taxels, sensors = "", ""
-    for row in range(16):
-        for column, degrees in enumerate(CODY_SKIN["column_angles_deg"]):
-            angle = math.radians(degrees)
-            x, y, z = 0.043 * math.cos(angle), 0.043 * math.sin(angle), (7.5 - row) * 0.0108
-            taxels += (
-                f'<geom type="sphere" size="0.0045" pos="{x} {y} {z}" mass="0.004" contype="1" '
-                f'conaffinity="2"/><site name="t{row}_{column}" size="0.006" pos="{x} {y} {z}"/>'
-            )
-            sensors += f'<touch site="t{row}_{column}"/>'
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.01" integrator="implicitfast" gravity="0 0 0"/><worldbody>
-        <body><joint name="reach" type="slide" axis="1 0 0" damping="6"/>{taxels}</body>
-        <body pos="0.13 0 0">{joint}<geom type="box" size="0.05 0.15 0.05" mass="1" contype="2"
-        conaffinity="1" {solref}/></body></worldbody><actuator><position joint="reach" kp="115"/>
-        </actuator><sensor>{sensors}</sensor></mujoco>"""
-    )
+    """A function that runs a trial of the forearm against a box in MuJoCo."""
+    model = mujoco.MjModel.from_xml_string(FOREARM.substitute(solref=solref, joint=joint))
+    assert model.nsensor == 384
 
     def trial():
         data, highest = mujoco.MjData(model), 0.0

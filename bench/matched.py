@@ -37,38 +37,25 @@ STEP_S = 0.00125
 
 def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in MuJoCo."""
-    touched = mujoco_touch.simulate(
-        Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M)
-    )
+    touch = Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M)
+    touched = mujoco_touch.simulate(touch)
     return touched.recording.frames, touched.force, touched.moved_m
 
 
 def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in our simulator."""
-    item = {
-        "name": "thing",
-        "family": "foam" if thing.soft else "rigid",
-        "conditions": ["fixed" if fixed else "movable"],
-        "width_m": thing.height_m,
-        "breadth_m": thing.breadth_m,
-        "mass_kg": thing.mass_kg,
-        "friction_static": thing.floor,
-        "friction_kinetic": thing.floor,
-        "skin_friction": thing.skin,
-    }
+    condition = "fixed" if fixed else "movable"
+    item = {"name": "thing", "family": "rigid", "conditions": [condition]}
+    item |= {"width_m": thing.height_m, "breadth_m": thing.breadth_m, "mass_kg": thing.mass_kg}
+    item |= {"friction_static": thing.floor, "friction_kinetic": thing.floor}
+    item |= {"skin_friction": thing.skin}
     if thing.soft:
-        item |= {"modulus_pa": thing.modulus_pa, "depth_m": thing.thick_m}
+        item |= {"family": "foam", "modulus_pa": thing.modulus_pa, "depth_m": thing.thick_m}
         item |= {"relax_ratio": 0.6, "relax_s": 0.06}
     start = [a + b for a, b in zip(mujoco_touch.START_DEG, UPRIGHT_DEG, strict=True)]
-    scene = from_dict(
-        {
-            "trials": {"count": 1, "lead_s": LEAD_S, "after_s": 1.8},
-            "motion": {"start_deg": start, "place_m": MIDDLE_M},
-            "effects": {"add": ["tilt", "inertia"]},
-            "step_s": {"base": STEP_S},
-            "object": [item],
-        }
-    )
+    tables = {"trials": {"count": 1, "lead_s": LEAD_S, "after_s": mujoco_touch.TOUCH_S}}
+    tables |= {"motion": {"start_deg": start, "place_m": MIDDLE_M}, "step_s": {"base": STEP_S}}
+    scene = from_dict({**tables, "effects": {"add": ["tilt", "inertia"]}, "object": [item]})
     batch = run_physics(scene, tuple(next(iter(kinds(scene).values()))))
     slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
     return next(readings(batch)).frames(), batch.force[0], slide[0]

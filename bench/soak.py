@@ -53,7 +53,7 @@ def main() -> int:
     file = skinfile.load(skinfile.shipped("cody"))
     file = replace(file, reading=replace(file.reading, rate_hz=arguments.rate))
     minute_frames = 60.0 * arguments.rate
-    seen: list[tuple[float, int, int]] = []
+    rows: list[list[float]] = []
     written = 0
     print("| minute | frames | events | ticks left out | lines lost | descriptors | kB |")
     print("|---|---|---|---|---|---|---|", flush=True)
@@ -83,18 +83,17 @@ def main() -> int:
                         pass
             if frames % round(arguments.every * minute_frames) == 0:
                 gc.collect()
-                minute, lost = frames / minute_frames, sum(lines.lost.values())
-                seen.append((minute, process.memory_info().rss // 1024, process.num_fds()))
-                cells = frames, written, loop.schedule.missed_ticks, lost, *seen[-1][:0:-1]
-                print(f"| {minute:g} | {' | '.join(map(str, cells))} |", flush=True)
+                row = [frames / minute_frames, frames, written, loop.schedule.missed_ticks]
+                row += [sum(lines.lost.values()), process.num_fds()]
+                rows.append([*row, process.memory_info().rss // 1024])
+                print(f"| {' | '.join(f'{cell:.10g}' for cell in rows[-1])} |", flush=True)
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     print(f"{placed} contacts on the map")
     lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
-    early = [row for row in seen if row[0] <= arguments.minutes / 10] or seen[:1]
-    _, kilobytes, descriptors = early[-1]
-    grown = max(row[1] for row in seen) - kilobytes
-    flat = grown <= GROWTH_KB and seen[-1][2] == descriptors
+    early = rows[max(len(rows) // 10 - 1, 0)]
+    grown = max(row[-1] for row in rows) - early[-1]
+    flat = grown <= GROWTH_KB and rows[-1][-2] == early[-2]
     return 0 if flat and lost == 0 and placed else 1
 
 

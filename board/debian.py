@@ -8,22 +8,12 @@ import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from string import Template
 
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-APT = """\
-APT::Architecture "{architecture}";
-APT::Architectures {{ "{architecture}"; }};
-APT::Sandbox::User "";
-APT::Install-Recommends "false";
-Acquire::Languages "none";
-Debug::NoLocking "true";
-Dir::State "{folder}";
-Dir::State::status "{folder}/status";
-Dir::Cache "{folder}";
-"""
-"""An apt of its own: another architecture, nothing installed, no lock, no root."""
+APT = Template((CHECKOUT / "board" / "apt.conf").read_text())
 
 
 class Unavailable(Exception):
@@ -69,7 +59,7 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
             (apt / folder).mkdir(parents=True)
         (apt / "status").touch()
         config = apt / "apt.conf"
-        config.write_text(APT.format(architecture=architecture, folder=apt))
+        config.write_text(APT.substitute(architecture=architecture, folder=apt))
         hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
         get = ["env", f"APT_CONFIG={config}", "apt-get", "--quiet"]
         run([*get, "update"], hint)

@@ -28,8 +28,7 @@ def counts(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def python(counts):
-    (wheel,) = (CHECKOUT / "dist").glob("edge_classify-*.whl")
+def python(wheel, counts):
     with debian.skipping():
         return aarch64.python(wheel, counts)
 

@@ -8,20 +8,13 @@ import subprocess
 import sys
 import zipfile
 from email.parser import Parser
-from pathlib import Path
 
 import pytest
 
 import edge
+from board.debian import CHECKOUT
 
-CHECKOUT = Path(__file__).resolve().parents[1]
 LARGEST = 240_000
-
-
-@pytest.fixture(scope="session")
-def wheel():
-    (wheel,) = (CHECKOUT / "dist").glob("edge_classify-*.whl")
-    return wheel
 
 
 @pytest.fixture(scope="session")
