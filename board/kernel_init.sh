@@ -1,6 +1,6 @@
 #!/bin/busybox sh
 # The first process of the emulated kernel. It loads modules, makes the host's files its root, runs
-# a command there as root, prints its status, and powers off. kernel.py fills in modules and command.
+# a command there as root, prints its status, and powers off. test_kernel.py fills in modules and command.
 b=/bin/busybox
 $b mount -t proc proc /proc; $b mount -t sysfs sys /sys; $b mount -t devtmpfs dev /dev
 for module in MODULES; do $b insmod /modules/$module.ko || echo "$module cannot be loaded"; done
