@@ -99,15 +99,17 @@ class ConfigTable:
 
         Args:
             raw: the parsed value, which should be a mapping.
-            where: the name of the file in errors.
+            where: the name of the file in errors, followed by `: ` and the part of the file
+                that the table is, if that has a name: `box.npz: meta.arm`.
             prefix: put before a key in errors: `read.` in a table `[read]`.
 
         Raises:
             InputError: `raw` is not a mapping.
         """
         if not isinstance(raw, Mapping):
-            name = prefix.rstrip(".: ") or "the file"
-            raise InputError(f"{where}: {name} must be a table, not {shown(raw)}")
+            name = prefix.rstrip(".: ") or ("" if ": " in where else "the file")
+            thing = f"{where}: {name}" if name else where
+            raise InputError(f"{thing} must be a table, not {shown(raw)}")
         self.raw, self.where, self.prefix = raw, where, prefix
         self._taken: list[str] = []
 

@@ -184,7 +184,7 @@ class ModelInfo:
             rules = meta.table("stopping") if points else ConfigTable({}, where)
             novelty = meta.table("novelty") if points else None
             layout = SkinLayout.from_dict(meta.get("skin"), where=where)
-            names = meta.texts("features")
+            names, arm = meta.texts("features"), meta.get("arm", None)
             info = cls(
                 tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
                 layout=layout,
@@ -194,7 +194,7 @@ class ModelInfo:
                 features=names,
                 units={str(k): str(v) for k, v in meta.table("units").raw.items()},
                 motion_frame=meta.choice("motion_frame", ("world", "skin")),
-                chain=Chain.from_dict(meta.get("arm"), where=where) if meta.has("arm") else None,
+                chain=Chain.from_dict(arm, where=f"{where}: arm") if arm is not None else None,
                 rows=meta.whole("rows"),
                 data_digest=meta.text("data_digest", empty=True),
                 versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},

@@ -38,6 +38,7 @@ def said(check):
         (lambda t: t.texts("n"), "read.n must be a list of texts"),
         (lambda t: t.pair("n"), "read.n must be [row, col], not 7"),
         (lambda t: t.table("n"), "my.toml: read.n must be a table, not 7"),
+        (lambda t: ConfigTable(7, "a.npz: meta.arm"), "a.npz: meta.arm must be a table, not 7"),
         (lambda t: t.tables("n", "bus"), "read.n must be a list of tables, not 7"),
         (lambda t: (t.whole("n"), t.done()), "unknown key read.a; allowed: n"),
     ],

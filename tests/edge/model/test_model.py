@@ -140,6 +140,7 @@ REFUSED = {
     meta(window_s="soon"): "window_s must be a number above 0, at most 3600, not 'soon'",
     meta(skin={"rows": 16}): "cols is missing",
     meta(arm=None): "motion frame contradicts its arm",
+    meta(arm=7): "its metadata: arm must be a table, not 7; export it again",
     meta(tasks={}): "no task",
     meta(tasks=[]): "tasks must be a table",
     meta(tracking={"speed": 1}): "tracking.debounce is missing",

@@ -213,7 +213,7 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, refusal):
         ("[]", "grasp.json: the file must be a table, not []"),
         ('{"labels": 5}', "grasp.json: labels must be a table, not 5"),
         ('{"skin": [1]}', "grasp.json: skin must be a table, not [1]"),
-        ('{"arm": 5}', "grasp.json: arm: "),
+        ('{"arm": 5}', "grasp.json: arm must be a table, not 5"),
     ],
 )
 def test_a_file_beside_the_log_that_cannot_be_used_is_one_sentence(
