@@ -148,18 +148,16 @@ class Classifier:
             self._strongest = max(self._strongest, strongest)
             self._missing_taxels |= bool((self.layout.alive & ~readable).any())
         for contact in self.tracker.push(frame):
-            number = self._numbers.get(contact)
-            if number is None:
+            if contact not in self._numbers:
                 self._begun += 1
-                number = self._begun
-                self._numbers[contact] = number
+                self._numbers[contact] = number = self._begun
                 first = 0 if self.error is not None else len(self.model.decision_points_s) - 1
                 info = self.model.info
                 tasks = sorted(info.tasks, key=info.products.__contains__)
                 self._waiting.append(_Waiting(contact, number, first, tasks))
                 events.append(Onset(contact.onset_s, self._named(number)))
             if contact.ended:
-                del self._numbers[contact]
+                number = self._numbers.pop(contact)
                 events.append(Release(contact.onset_s, frame.t, self._named(number)))
         for waiting in list(self._waiting):
             age = frame.t - waiting.contact.onset_s

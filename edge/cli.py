@@ -80,14 +80,13 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
             argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
-    level = logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
     handler = logging.StreamHandler()
+    handler.setLevel(logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO)
     handler.setFormatter(logging.Formatter(f"{top.prog}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
-    before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.addHandler(handler)
-        logger.setLevel(level)
+        logger.setLevel(logging.INFO)
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
@@ -109,9 +108,8 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         return 130
     finally:
-        for logger, former in zip(loggers, before, strict=True):
+        for logger in loggers:
             logger.removeHandler(handler)
-            logger.setLevel(former)
 
 
 def _open_missing_streams() -> None:

@@ -186,7 +186,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         names = None if arm is None else arm.names
         if arguments.joints is None and live.playback is not None:
-            names = live.playback.joint_names
+            names = live.playback.recording.joint_names
         skin = live.skin
         meta = {
             "skin": skin.layout.to_dict(),

@@ -65,7 +65,7 @@ class Opened:
     @property
     def dof(self) -> int | None:
         """Number of joint angles in the recording that is played; None without any."""
-        return None if self.playback is None else self.playback.dof
+        return None if self.playback is None else self.playback.recording.dof
 
 
 @contextmanager

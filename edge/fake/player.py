@@ -50,16 +50,11 @@ class Playback:
             recording: the contact that the skin feels.
             loop: start again at its end.
         """
-        t = recording.t - recording.t[0]
-        self._t, self._frames = t, recording.frames
-        self._joints = recording.joints
-        self.dof = recording.dof
-        """Number of joint angles, or None without any."""
-        self.joint_names = recording.joint_names
-        """The joint of each angle, where the recording names them."""
-        steps = np.diff(t)
+        self.recording, self._frames = recording, list(recording)
+        self._t = recording.t - recording.t[0]
+        steps = np.diff(self._t)
         last = float(np.median(steps)) if steps.size else 0.01
-        self._length = float(t[-1]) + last
+        self._length = float(self._t[-1]) + last
         self.ends = math.inf if loop else self._length
         """Length in seconds; infinity where it loops."""
         self.start = 0.0
@@ -73,14 +68,11 @@ class Playback:
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
-        return np.asarray(self._frames[self._index(t)])
+        return self._frames[self._index(t)].counts
 
     def at(self, t: float) -> NDArray[np.float64] | None:
-        """Joint angles (dof,) at `t`, where the recording has them."""
-        if self._joints is None:
-            return None
-        joints: NDArray[np.float64] = self._joints[self._index(t)]
-        return None if np.isnan(joints[0]) else joints
+        """Joint angles (dof,) at `t`; None where the recording has none."""
+        return self._frames[self._index(t)].joints
 
 
 def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:

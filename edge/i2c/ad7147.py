@@ -47,18 +47,17 @@ CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
 SYSTEM_ROW: Row = (SYSTEM, (0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400))
 """PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and ambient
 compensation and interrupts, all off."""
-START_ROWS: list[Row] = [
-    *(
-        (STAGE_BANK + i, BANKS[i : i + WRITTEN_AT_ONCE])
-        for i in range(0, len(BANKS), WRITTEN_AT_ONCE)
-    ),
-    SYSTEM_ROW,
-]
+
+
+def rows(step: int, length: int) -> list[Row]:
+    """Rows of `length` registers, one every `step` registers of all stages, and the system row."""
+    starts = range(0, len(BANKS), step)
+    return [*((STAGE_BANK + i, BANKS[i : i + length]) for i in starts), SYSTEM_ROW]
+
+
+START_ROWS = rows(WRITTEN_AT_ONCE, WRITTEN_AT_ONCE)
 """The rows to write, in order."""
-CHECK_ROWS: list[Row] = [
-    *((STAGE_BANK + i, BANKS[i : i + 3]) for i in range(0, len(BANKS), STAGE_REGISTERS)),
-    SYSTEM_ROW,
-]
+CHECK_ROWS = rows(STAGE_REGISTERS, CONNECTIONS.shape[1])
 """The rows to read back: the connections of each stage, and last the system registers. A reset
 changes each of them, so that any one row tells a chip that has lost its settings."""
 

@@ -36,15 +36,11 @@ class BusError(EdgeError):
 
     Attributes:
         errno: the kernel's error number.
-        bus: the bus's name.
-        address: the chip's 7-bit address, or None where the bus itself failed.
         retries: how often the transaction is sent again within the same frame.
         remedy: the words that end the message.
     """
 
     errno: int | None = None
-    bus = ""
-    address: int | None = None
     retries = 0
     remedy = ""
 
@@ -139,7 +135,7 @@ def bus_error(
     kind = ERRORS.get(code, BusFault)
     where = bus if address is None else f"{bus}, address {address:#04x}"
     error = kind(f"{where}: {remedy or kind.remedy} ({errno.errorcode.get(code, code)})")
-    error.errno, error.bus, error.address = code, bus, address
+    error.errno = code
     return error
 
 
@@ -238,11 +234,6 @@ def fetch(bus: Bus, address: int, pointer: bytes, n: int) -> bytes:
     return prepared.buffer.tobytes()
 
 
-def device_path(device: str | int) -> str:
-    """`/dev/i2c-1` for 1."""
-    return f"/dev/i2c-{device}" if isinstance(device, int) else device
-
-
 def lock_holder(fd: int) -> str:
     """Name and number of the process that holds the lock of an open file."""
     with suppress(OSError, IndexError):
@@ -278,16 +269,16 @@ def find_device(name: str, adapters: Path = ADAPTERS) -> str:
 class LinuxBus:
     """An adapter of Linux, `/dev/i2c-N`, over smbus2.
 
-    >>> bus = LinuxBus(1, timeout_s=0.02)                       # doctest: +SKIP
+    >>> bus = LinuxBus("/dev/i2c-1", timeout_s=0.02)            # doctest: +SKIP
     >>> fetch(bus, 0x2C, b"\\x00\\x17", 2).hex()                # doctest: +SKIP
     '1470'
     """
 
-    def __init__(self, device: str | int, *, timeout_s: float = 0.02) -> None:
+    def __init__(self, device: str, *, timeout_s: float = 0.02) -> None:
         """Open the bus and set its timeout.
 
         Args:
-            device: `/dev/i2c-1`, 1, or the beginning of the adapter's name, which is looked up
+            device: `/dev/i2c-1`, or the beginning of the adapter's name, which is looked up
                 whenever the bus is opened: an adapter on USB may come back with another number.
             timeout_s: how long a hung transfer may last, rounded up to the adapter's 10 ms;
                 the kernel's own default is a second.
@@ -295,8 +286,7 @@ class LinuxBus:
         Raises:
             BusError: it does not exist, may not be opened, is in use, or carries no plain I2C.
         """
-        self.name = device_path(device)
-        self.timeout_s = timeout_s
+        self.name, self.timeout_s = device, timeout_s
         self._smbus: Any = None
         self._fd = -1
         self._asked: set[int] = set()

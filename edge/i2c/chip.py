@@ -80,9 +80,7 @@ class Chip(ABC):
 
     def wrong(self, what: str) -> WrongChip:
         """Build the error for a chip that contradicts the skin file."""
-        error = WrongChip(f"{self.bus.name}, address {self.address:#04x}: {what}")
-        error.bus, error.address = self.bus.name, self.address
-        return error
+        return WrongChip(f"{self.bus.name}, address {self.address:#04x}: {what}")
 
 
 class FakeChip(ABC):

@@ -32,7 +32,6 @@ REMEDIES = {
     errno.EIO: "the transfer broke off; check the cable",
     errno.ETIMEDOUT: "no complete answer came in time; check the firmware and the baud rate",
     errno.ENODEV: "the port has gone; plug the microcontroller in again",
-    errno.EOPNOTSUPP: "a serial port carries only the frames of a microcontroller (kind block)",
 }
 """Remedies by errno; any other errno is treated as EIO."""
 
@@ -161,14 +160,11 @@ class SerialBus:
         Raises:
             BusError: the port is gone, or no intact answer came in time.
         """
-        request, *answers = prepared.messages
-        if request.read or len(request.buffer) != 1 or len(answers) != 1:
-            raise serial_error(errno.EOPNOTSUPP, self.name)
         if self._port is None:
             raise serial_error(errno.ENODEV, self.name)
         ends = self.now() + (self.timeout_s if timeout_s is None else timeout_s)
         try:
-            answer = self._ask(int(request.buffer[0]), ends)
+            answer = self._ask(int(prepared.messages[0].buffer[0]), ends)
         except OSError as error:
             # Neither a write's timeout nor pyserial's error of a lost port has an errno.
             hung = type(error).__name__ == "SerialTimeoutException"

@@ -73,8 +73,7 @@ class Joints:
                 are ignored where this is None.
             now: the loop's clock.
         """
-        self._source, self._dof, self._now = source, dof, now
-        self._names = None if names is None else tuple(names)
+        self._source, self._dof, self._names, self._now = source, dof, names, now
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
         self._recent: deque[float] = deque(maxlen=RECENT)

@@ -134,14 +134,13 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     sign = signals.whole("sign", 1, (1, -1)) if signals.has("sign") else None
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
-    defaults = defaults_of([chip for bus in buses for chip in bus.chips])
+    chips = [chip for bus in buses for chip in bus.chips]
+    defaults = defaults_of(chips)
     signal = _signal(signals, layout, defaults)
     if not skin.has("threshold_counts") and defaults.threshold_counts:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
     has = top.has("calibration")
-    calibration = _calibration(top.table("calibration"), layout) if has else None
-    if calibration is not None:
-        _tellable(buses, calibration.baseline.ravel(), where)
+    calibration = _calibration(top.table("calibration"), layout, chips) if has else None
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
 
@@ -180,7 +179,7 @@ def _reading(table: ConfigTable) -> Reading:
     return reading
 
 
-def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
+def _calibration(table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]) -> TaxelCalibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
         try:
@@ -200,18 +199,16 @@ def _calibration(table: ConfigTable, layout: SkinLayout) -> TaxelCalibration:
     if taken is not None and not isinstance(taken, datetime):
         raise table.fail("taken", "a date and time")
     table.done()
-    return TaxelCalibration(arrays["baseline"].astype(np.uint16), arrays["noise"], taken)
-
-
-def _tellable(buses: Sequence[BusSpec], baseline: NDArray[np.uint16], where: str) -> None:
-    """Refuse the calibration of a skin with other chips."""
-    for chip in (chip for bus in buses for chip in bus.chips):
-        highest = max(baseline[chip.served], default=0)
+    baseline = arrays["baseline"].astype(np.uint16)
+    for chip in chips:
+        highest = max(baseline.flat[chip.served], default=0)
         if highest > chip.highest:
+            # The skin had other chips when it was calibrated.
             raise InputError(
-                f"{where}: calibration.baseline is {highest} for a taxel of a {chip.kind.name}, "
+                f"{table.called('baseline')} is {highest} for a taxel of a {chip.kind.name}, "
                 f"which tells at most {chip.highest}; delete [calibration], and calibrate again"
             )
+    return TaxelCalibration(baseline, arrays["noise"], taken)
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:

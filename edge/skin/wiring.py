@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.i2c import tca9548a
-from edge.i2c.bus import device_path
 from edge.i2c.chip import MOST_TAXELS, UNUSED, ChipKind, ChipSpec
 from edge.skin.kinds import KINDS
 from edge.touch.layout import SkinLayout
@@ -92,7 +91,8 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
             f"{table.called('device')} {device} is a serial port, not an I2C bus; write serial = "
             f'"{device}" instead, with kind = "block"'
         )
-    return device_path(device), table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
+    path = f"/dev/i2c-{device}" if number else str(device)
+    return path, table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 
 
 def _kind(table: ConfigTable) -> ChipKind:

@@ -107,8 +107,7 @@ class Chain:
         pose = np.zeros((*angles.shape[:-1], 4, 4))
         pose[..., 3, 3] = 1.0
         of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
-        for row, coordinates in enumerate(self._carried(of_each_joint, np.eye(4), np.sin)):
-            pose[..., row, :] = coordinates
+        pose[..., :3, :] = np.stack(self._carried(of_each_joint, np.eye(4), np.sin), axis=-2)
         return pose
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:

@@ -110,18 +110,17 @@ class Contact:
         ended: no more frames will come.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
-        region: the region followed so far.
-        joints: the joint angles (dof,) when the region was last seen; None where not known.
+        region: the region when it was last seen.
+        joints: the joint angles (dof,) at that time; None where not known.
     """
 
     def __init__(
-        self, onset_s: float, layout: SkinLayout, measurer: Measurer, chain: Chain | None = None
+        self, onset_s: float, region: Region, measurer: Measurer, chain: Chain | None
     ) -> None:
         self.onset_s, self.age_s, self.touched_s = onset_s, 0.0, 0.0
         self.frames = 0
-        self.layout, self.chain = layout, chain
+        self.region, self.layout, self.chain = region, measurer.layout, chain
         self.ended = self.missing_taxels = self.missing_pose = False
-        self.region: Region | None = None
         self.joints: NDArray[np.float64] | None = None
         self._measurer = measurer
         self._rows: list[_Row] = []
@@ -213,8 +212,6 @@ class Contact:
         Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
         arm in that of the link that carries the skin. None where joint angles were not known.
         """
-        if self.region is None:
-            return None
         return self._located(self.region.centroid, self.joints)
 
     def series(self) -> FeatureSeries:

@@ -124,12 +124,9 @@ class SkinLayout:
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""
-        out: dict[str, Any] = {}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if value is not None and value != ():
-                out[f.name] = list(value) if isinstance(value, tuple) else value
-        return out
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        given = {name: value for name, value in values.items() if value not in (None, ())}
+        return {k: list(value) if isinstance(value, tuple) else value for k, value in given.items()}
 
     @classmethod
     def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> Self:
@@ -150,8 +147,7 @@ class SkinLayout:
             high = LONGEST_RELEASE_S if name == "release_s" else math.inf
             if table.has(name):
                 values[name] = table.number(name, low=0.0, high=high, open_low=True)
-        if table.has("row0_z_m"):
-            values["row0_z_m"] = table.number("row0_z_m")
+        values["row0_z_m"] = table.number("row0_z_m", 0.0)
         if isinstance(table.get("pitch_m", None), list | tuple):
             values["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
         elif table.has("pitch_m"):

@@ -215,10 +215,10 @@ class Measurer:
     """Measures the frames of one skin at the zones that some features need.
 
     Attributes:
+        layout: the skin.
         motion: whether the contact's centroid is followed.
         force_motion: whether its force-weighted centroid is followed.
         zones: the zones measured, in the order of `ZONES`.
-        width: how many whole numbers `measure` returns for a frame.
         cells: the skin's cells where a feature needs them, else None.
         kernel_cells: the larger cells that kernels take, likewise.
         joints: number of joint angles kept of each frame; 0 where no feature needs them.
@@ -227,14 +227,13 @@ class Measurer:
     def __init__(self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0) -> None:
         types = features(wanted)
         quantities = {f.quantity for f in types}
-        self._wraps = layout.wraps
+        self.layout = layout
         self.motion = "motion" in quantities
         self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
         self.cells = Cells(layout) if "taxel_force" in quantities else None
         self.kernel_cells = Cells(layout, KERNEL_CELLS) if "taxel_kernels" in quantities else None
         self.joints = joints if any(f.of_joints for f in types) else 0
         self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
-        self.width = ZONE_WIDTH * len(self.zones)
         half = layout.cols // 2
         self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
         rows, cols = np.arange(layout.rows), np.arange(layout.cols)
@@ -251,14 +250,15 @@ class Measurer:
             contact: the region followed; None where no taxel of it is active.
         """
         if contact is None:
-            return [0] * self.width
+            return [0] * (ZONE_WIDTH * len(self.zones))
         row: list[int] = []
         for zone in self.zones:
             half = self._halves.get(zone, slice(None))
             mask = contact.mask if zone == "contact" else active.mask
             counts = (active.counts * mask)[:, half]
             lines = self._rows @ counts  # of each column: counts, times row, times row squared
-            cut = best_cut(lines[0].tolist()) if self._wraps and zone not in self._halves else 0
+            closed = self.layout.wraps and zone not in self._halves
+            cut = best_cut(lines[0].tolist()) if closed else 0
             (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (
                 lines @ self._cols[cut, half]
             ).tolist()

@@ -153,10 +153,8 @@ def _doublings(within: int, step: int, count: int, *, down: bool) -> list[tuple[
     return rounds
 
 
-@lru_cache(maxsize=16)
-def grid(rows: int, cols: int, wraps: bool) -> Grid:
-    """The grid of a shape; its masks are constants, so each is made once."""
-    return Grid(rows, cols, wraps)
+grid = lru_cache(maxsize=16)(Grid)
+"""The grid of a shape; its masks are constants, so each is made once."""
 
 
 class Region:

@@ -151,7 +151,7 @@ class ContactTracker:
     def _contact(self, frame: Frame, region: Region) -> Contact:
         on_skin = self._motion_on_skin and frame.joints is None
         chain = None if on_skin else self._chain
-        return Contact(region_time(frame, region), self.layout, self._measurer, chain)
+        return Contact(region_time(frame, region), region, self._measurer, chain)
 
 
 def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
@@ -159,9 +159,8 @@ def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
     pairs = []
     for i, contact in enumerate(contacts):
         for j, region in enumerate(regions):
-            former = contact.region
-            if former is not None and former.touches(region):
-                pairs.append((-(former.bits & region.bits).bit_count(), i, j))
+            if contact.region.touches(region):
+                pairs.append((-(contact.region.bits & region.bits).bit_count(), i, j))
     shares: dict[int, int] = {}
     for _, i, j in sorted(pairs):
         if i not in shares and j not in shares.values():

@@ -22,9 +22,7 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
     for name in (base, tip):
         if name not in links:
             raise InputError(f"{path}: no link {name!r}; it has {', '.join(map(str, links))}")
-    parents: dict[str, ElementTree.Element] = {}
-    for element in root.findall("joint"):
-        parents[_attribute(path, element, "child", "link")] = element
+    parents = {_link(path, element, "child"): element for element in root.findall("joint")}
     joints: list[dict[str, Any]] = []
     link = tip
     while link != base:
@@ -32,18 +30,16 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
             raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
         element = parents.pop(link)  # taken out, so that a loop of links ends
         joints.append(_joint(path, element))
-        link = _attribute(path, element, "parent", "link")
+        link = _link(path, element, "parent")
     return joints[::-1]
 
 
-def _attribute(
-    path: str | os.PathLike[str], element: ElementTree.Element, tag: str, name: str
-) -> str:
+def _link(path: str | os.PathLike[str], element: ElementTree.Element, tag: str) -> str:
     child = element.find(tag)
-    value = None if child is None else child.get(name)
-    if value is None:
-        raise InputError(f"{path}: joint {element.get('name')!r} has no <{tag} {name}=...>")
-    return value
+    link = None if child is None else child.get("link")
+    if link is None:
+        raise InputError(f"{path}: joint {element.get('name')!r} has no <{tag} link=...>")
+    return link
 
 
 def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:

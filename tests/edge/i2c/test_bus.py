@@ -50,7 +50,7 @@ def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
     assert type(raised) is error
     assert isinstance(raised, EdgeError)
     assert isinstance(raised, builtin)
-    assert (raised.errno, raised.bus, raised.address) == (code, "/dev/i2c-1", 0x2C)
+    assert raised.errno == code
     assert re.match(rf"/dev/i2c-1, address 0x2c: .*\({errno.errorcode[code]}\)$", str(raised))
 
 

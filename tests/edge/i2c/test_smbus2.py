@@ -55,7 +55,7 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
         """
         import os
         from edge.i2c.bus import BusFault, LinuxBus, fetch
-        bus = LinuxBus(1)
+        bus = LinuxBus("/dev/i2c-1")
         try:
             fetch(bus, 0x70, b"\\0", 1)
         except BusFault as error:
@@ -67,7 +67,8 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
-    done = run(library, "from edge.i2c.bus import LinuxBus; LinuxBus(1)", I2CDEV_LOCKED="1")
+    opening = "from edge.i2c.bus import LinuxBus; LinuxBus('/dev/i2c-1')"
+    done = run(library, opening, I2CDEV_LOCKED="1")
     assert done.stderr.splitlines()[-1] == (
         "edge.i2c.bus.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
     )
@@ -88,7 +89,7 @@ def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
         library,
         """
         from edge.i2c.bus import BusGone, LinuxBus, fetch
-        bus = LinuxBus(1)
+        bus = LinuxBus("/dev/i2c-1")
         bus.close(); bus.close()
         try:
             fetch(bus, 0x70, b"", 1)
