@@ -34,8 +34,7 @@ def bench_cold_start(against, tmp_path):
     np.savez(arrays, X=np.random.default_rng(0).normal(size=(140, 120)), y=np.arange(140) % 18)
     # Unbuffered, so that a line arrives as soon as it is printed; with compiled files, as an
     # installed package has them.
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    environment = os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": ""}
 
     def start(sign, *arguments):
         def until_decided():

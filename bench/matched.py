@@ -38,8 +38,8 @@ STEP_S = 0.00125
 def theirs(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Frames, force and motion in MuJoCo."""
     touch = Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M)
-    touched = mujoco_touch.simulate(touch)
-    return touched.recording.frames, touched.force, touched.moved_m
+    recording, force, moved_m = mujoco_touch.simulate(touch)
+    return recording.frames, force, moved_m
 
 
 def ours(thing: Thing, fixed: bool) -> tuple[NDArray, NDArray, NDArray]:

@@ -130,20 +130,6 @@ class Touch:
         return seconds * self.rate_rad_s
 
 
-@dataclass
-class Touched:
-    """The recording of a touch, and quantities that the skin cannot see.
-
-    Attributes:
-        force: (n,) newtons that the pads bear.
-        moved_m: (n,) motion of the thing at the height of the contact.
-    """
-
-    recording: Recording
-    force: NDArray[np.float64]
-    moved_m: NDArray[np.float64]
-
-
 def joined(numbers: Any) -> str:
     """Numbers as MuJoCo reads them."""
     return " ".join(map(str, numbers))
@@ -246,8 +232,13 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
 
 
-def simulate(touch: Touch) -> Touched:
-    """One touch, as the board would have recorded it."""
+def simulate(touch: Touch) -> tuple[Recording, NDArray[np.float64], NDArray[np.float64]]:
+    """One touch, as the board would have recorded it.
+
+    Returns:
+        The recording; (n,) newtons that the pads bear; (n,) metres that the thing has moved at the
+        height of the contact. The skin cannot see the last two.
+    """
     model, start, where = model_of(touch)
     thing, rate, dof = touch.thing, touch.rate_rad_s, ARM.dof
     data = mujoco.MjData(model)
@@ -289,9 +280,6 @@ def simulate(touch: Touch) -> Touched:
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
     source = "MuJoCo, bench/mujoco_touch.py"
     meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
-    moved = places - places[0]
-    return Touched(
-        Recording(t, frames, joints=joints, meta=meta),
-        loads.reshape(len(t), -1).sum(axis=1),
-        np.hypot(moved[:, 0], moved[:, 1]),
-    )
+    recording = Recording(t, frames, joints=joints, meta=meta)
+    moved_m = np.hypot(*(places - places[0])[:, :2].T)
+    return recording, loads.sum(axis=(1, 2)), moved_m

@@ -17,7 +17,6 @@ import os
 import socket
 import sys
 import tempfile
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,11 +63,10 @@ def main() -> int:
         faulty_skin(file, lambda t: touches[int(t) % 50], faults, timed=True) as skin,
     ):
         listener.bind(("127.0.0.1", 0))
-        listener.setblocking(False)
         place, waiting = Path(folder) / "map.jsonl", {"patient": lambda: True}
-        port = listener.getsockname()[1]
+        address = "{}:{}".format(*listener.getsockname())  # nobody reads what arrives there
         more = [map_writer(place, model.info, **waiting)]
-        lines = Lines(out, f"127.0.0.1:{port}", more=more, **waiting)
+        lines = Lines(out, address, more=more, **waiting)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
         pose = np.zeros(model.info.chain.dof)
@@ -77,10 +75,6 @@ def main() -> int:
             events = [event.to_dict() for event in classifier.push(frame)]
             written += len(events)
             lines.write(events)
-            if frames % 100 == 0:
-                with suppress(BlockingIOError):
-                    while listener.recv(65536):
-                        pass
             if frames % round(arguments.every * minute_frames) == 0:
                 gc.collect()
                 row = [frames / minute_frames, frames, written, loop.schedule.missed_ticks]

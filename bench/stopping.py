@@ -49,7 +49,6 @@ from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
 SECONDS = np.array(DECISION_POINTS_S)
 RATE_HZ = 100
 """Frames of the series that aeon's rules look at."""
-TREES = 100
 WAITING = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Prices of waiting for the full window, in wrong decisions."""
 AEON = {"TEASER": TEASER, "threshold 0.85": ProbabilityThresholdEarlyClassifier}
@@ -68,7 +67,7 @@ def extra_trees(
     X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
 ) -> Curve:
     """Extra trees at each decision point, X (points, n, p), that decide when sure."""
-    model = ExtraTreesClassifier(TREES, random_state=0)
+    model = ExtraTreesClassifier(random_state=0)
     split = PredefinedSplit(folds)
     shares = np.stack(
         [cross_val_predict(model, x, labels, cv=split, method="predict_proba") for x in X]
@@ -125,7 +124,7 @@ def of_aeon(
     make: Callable[..., Any], series: NDArray, labels: NDArray, folds: NDArray
 ) -> tuple[float, float]:
     """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames * features)."""
-    trees = SklearnClassifierWrapper(ExtraTreesClassifier(TREES), random_state=0)
+    trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
     looks = SECONDS[::2]  # half as many, as TEASER is slow
     points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
     seconds, right = np.empty(len(labels)), np.empty(len(labels), dtype=bool)
@@ -199,12 +198,10 @@ def run(arguments: argparse.Namespace) -> int:
     print("", *table, "", sep="\n")
     for task, ours in compared.items():
         for rule in ours.certified:
-            if rule.folds:
-                print(
-                    f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
-                    f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) "
-                    f"at {rule.mean_s:.2f} s"
-                )
+            print(
+                f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
+                f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) at {rule.mean_s:.2f} s"
+            )
     return 0
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
-from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, Touched, simulate
+from bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, simulate
 from edge.cli import dispatch
 from edge.commands.replay import Summary, decide
 from edge.model.model import Model
@@ -120,13 +120,6 @@ def draw_touch(thing: Thing, fixed: bool, rng: np.random.Generator, habit: str) 
     return replace(touch, **{name: getattr(touch, name) * by for name, by in factors})
 
 
-def moved(touched: Touched) -> float:
-    """Metres that the thing has moved at the end of the window."""
-    onset = int(np.argmax(touched.recording.frames.max(axis=(1, 2)) > ONSET_COUNTS))
-    last = min(onset + round(WINDOW_S * RATE_HZ), len(touched.moved_m) - 1)
-    return float(touched.moved_m[last])
-
-
 def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
     """A touch of an object that is fixed, and one where it is free.
 
@@ -140,9 +133,10 @@ def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
             streams.stream(seed, f"trial.{attempt}", "transfer", number)
             for number in (2 * index, 2 * index + 1)
         )
-        free = simulate(draw_touch(thing, False, second, habit))
-        if moved(free) >= SLIDES_M:
-            return [simulate(draw_touch(thing, True, first, habit)).recording, free.recording]
+        free, _, moved_m = simulate(draw_touch(thing, False, second, habit))
+        onset = int(np.argmax(free.frames.max(axis=(1, 2)) > ONSET_COUNTS))
+        if moved_m[onset : onset + round(WINDOW_S * RATE_HZ) + 1][-1] >= SLIDES_M:
+            return [simulate(draw_touch(thing, True, first, habit))[0], free]
         attempt += 1
 
 

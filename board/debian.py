@@ -58,10 +58,9 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
         for folder in ("lists/partial", "archives/partial"):
             (apt / folder).mkdir(parents=True)
         (apt / "status").touch()
-        config = apt / "apt.conf"
-        config.write_text(APT.substitute(architecture=architecture, folder=apt))
+        (apt / "apt.conf").write_text(APT.substitute(architecture=architecture, folder=apt))
         hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
-        get = ["env", f"APT_CONFIG={config}", "apt-get", "--quiet"]
+        get = ["env", f"APT_CONFIG={apt}/apt.conf", "apt-get", "--quiet"]
         run([*get, "update"], hint)
         run([*get, "install", "--download-only", "--yes", *packages], hint)
         for archive in sorted((apt / "archives").glob("*.deb")):

@@ -35,17 +35,16 @@ class Machine:
         variables |= {"CHECKOUT": HERE.parent, "FOLDER": folder, "SYSTEMD": SYSTEMD}
         command = ["env", *(f"{name}={value}" for name, value in variables.items())]
         command += "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
-        self.process = subprocess.Popen(
-            [*command, HERE / "service_init.sh"], stdin=subprocess.DEVNULL
-        )
+        command.append(str(HERE / "service_init.sh"))
+        self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         (self.first,) = self.once(lambda: children.read_text().split(), len)
         self.root = Path(f"/proc/{self.first}/root")
         # Before that, /run and its sockets are this machine's, and so is the systemd behind them.
         name = Path(f"/proc/{self.first}/comm")
         assert self.once(name.read_text, "systemd\n".__eq__) == "systemd\n"
-        target = ("systemctl", "is-active", "multi-user.target")
-        self.once(lambda: self.run(*target), "active\n".__eq__)
+        state = "systemctl is-active multi-user.target".split()
+        self.once(lambda: self.run(*state), "active\n".__eq__)
 
     def run(self, *command):
         """What a command prints there."""
