@@ -6,9 +6,12 @@ import math
 def wilson(right: float, total: float, z: float = 1.959963984540054) -> tuple[float, float]:
     """Wilson's score interval of a proportion (95 % by default).
 
+    Nothing right has the lower end 0, and everything right the upper end 1, exactly: the square
+    root of a rounded square is the number itself.
+
     Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212.
     """
-    p, zz = right / total, z * z / total
-    centre = (p + zz / 2) / (1 + zz)
-    half = z / (1 + zz) * math.sqrt(p * (1 - p) / total + zz / (4 * total))
-    return max(0.0, centre - half), min(1.0, centre + half)
+    zz = z * z
+    spread = z * math.sqrt(zz + 4 * right * (1 - right / total))
+    low, high = right + (zz - spread) / 2, right + (zz + spread) / 2
+    return low / (total + zz), high / (total + zz)
