@@ -157,6 +157,3 @@ def main(argv: Sequence[str] | None = None) -> int:
 # The interpreter's last garbage collection would visit every imported object, which doubles the
 # time that the program takes to end.
 atexit.register(gc.freeze)
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -143,10 +143,9 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         fail("meta.skin must be an object")
     if frames.ndim == 2:
         rows, cols = skin.get("rows"), skin.get("cols")
-        if type(rows) is type(cols) is int and rows > 0 and rows * cols == frames.shape[1]:
-            frames = frames.reshape(len(frames), rows, cols)
-        else:
+        if not (type(rows) is type(cols) is int and rows > 0 and rows * cols == frames.shape[1]):
             fail('frames are flat; give their "rows" and "cols" in meta.skin')
+        frames = frames.reshape(len(frames), rows, cols)
     if frames.dtype != np.uint16 or frames.ndim != 3:
         fail(f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} {frames.shape}")
     n, rows, cols = frames.shape

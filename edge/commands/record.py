@@ -5,8 +5,6 @@ Existing files are never overwritten. With --joints, --fake plays at the origina
 status is 1 if nothing was saved, or if --joints gave no angles.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import re
@@ -16,7 +14,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,14 +26,11 @@ from edge.errors import InputError
 from edge.files import NameTaken, check_writable, refusing
 from edge.recording import Recording, save
 from edge.runtime.event_writer import Lines
+from edge.runtime.page import Page
 from edge.skin.skin import Skin
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import DEBOUNCE, ContactTracker
-
-if TYPE_CHECKING:
-    from edge.runtime.page import Page
-
 
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
@@ -121,9 +116,7 @@ class Trials:
 
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
-    valid = np.array(
-        [np.ones(f.counts.shape, bool) if f.valid is None else f.valid for f in frames]
-    )
+    valid = np.array([f.valid for f in frames])  # a skin's frames always say which taxels are
     dof = next((len(f.joints) for f in frames if f.joints is not None), None)
     unknown = np.full(dof or 0, np.nan)
     joints = np.array([unknown if f.joints is None else f.joints for f in frames])

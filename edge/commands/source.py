@@ -1,13 +1,11 @@
 """Opens the skin that a command's options name, and reads it with all that they put beside it."""
 
-from __future__ import annotations
-
 import argparse
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from edge.commands.output import LOG, Output, event_text
 from edge.errors import InputError
@@ -18,15 +16,13 @@ from edge.model.model import Model, require_joints
 from edge.recording import load
 from edge.runtime.event_writer import Lines, LineWriter
 from edge.runtime.joint_stream import Joints, joint_source
+from edge.runtime.page import Page
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import for_device
-
-if TYPE_CHECKING:
-    from edge.runtime.page import Page
 
 
 def ending_signals() -> list[int]:
@@ -222,8 +218,6 @@ def reading(
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
-            from edge.runtime.page import Page  # a skin without a page needs no web server
-
             live = Page(arguments.web, opened.skin.layout, title=opened.source, **page)
             stack.callback(live.server.close)
             LOG.info(f"open {live.server.link} in a browser")

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,18 +84,15 @@ class Chip(ABC):
         return WrongChip(f"{self.bus.name}, address {self.address:#04x}: {what}")
 
 
-class FakeChip(ABC):
+class FakeChip(Protocol):
     """A model of a chip on a fake bus."""
 
-    @abstractmethod
     def write(self, data: bytes, t: float) -> None:
         """Take the bytes of one write message at time `t`."""
 
-    @abstractmethod
     def read(self, n: int, t: float) -> bytes:
         """Serve the `n` bytes of one read message at time `t`."""
 
-    @abstractmethod
     def reset(self) -> None:
         """Lose all settings, as in a brown-out."""
 
@@ -166,16 +164,11 @@ class ChipSpec:
         """The largest raw value that is not saturated."""
         return self.kind.highest(self)
 
-    @property
-    def frame_bytes(self) -> int:
-        """Bytes of one reading."""
-        return self.kind.frame_bytes(self)
-
     @cached_property
     def frame_bits(self) -> int:
         """Bits on the wire of one reading, `[write pointer][read frame]`."""
         pointer = write(self.address, bytes(self.kind.pointer_bytes))
-        return wire_bits([pointer, read(self.address, self.frame_bytes)])
+        return wire_bits([pointer, read(self.address, self.kind.frame_bytes(self))])
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import Any
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
 from edge.recording import Recording, load, save
-from edge.runtime.web import WebServer
 from edge.skin.loop import Schedule
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -56,6 +55,8 @@ class Page:
         Raises:
             InputError: the address cannot be used, or a trial in the folder cannot be read.
         """
+        from edge.runtime.web import WebServer  # commands without a page start sooner without it
+
         self._folder = folder
         self.labels = dict(labels or {})
         self.recording = bool(self.labels)

@@ -19,7 +19,7 @@ from importlib import resources
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from edge.errors import EdgeError, InputError
+from edge.errors import EdgeError
 from edge.files import refusing
 from edge.runtime.event_writer import parse_address
 
@@ -141,12 +141,10 @@ class _Handler(BaseHTTPRequestHandler):
         if not length.isdecimal() or int(length) > LARGEST_ACTION:
             return self._answer(HTTPStatus.BAD_REQUEST)
         try:
-            action = json.loads(self.rfile.read(int(length)))
-            if not isinstance(action, dict):
-                raise InputError("an action is an object")
+            action = dict(json.loads(self.rfile.read(int(length))))
             with page.acting:
                 page.act(action)
-        except (ValueError, RecursionError, EdgeError) as error:
+        except (TypeError, ValueError, RecursionError, EdgeError) as error:
             return self._answer(HTTPStatus.BAD_REQUEST, str(error).encode())
         return self._answer(HTTPStatus.NO_CONTENT)
 

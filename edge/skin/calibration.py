@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,12 +53,12 @@ def save_calibration(path: str | os.PathLike[str], calibration: TaxelCalibration
         InputError: the file cannot be read or written.
     """
     target = Path(path)
-    text = with_calibration(read_text(target), calibration, os.fspath(path))
+    former = read_text(target)
+    text = with_calibration(former, calibration, os.fspath(path))
     backup = target.with_name(f"{target.name}.bak")
-    with write_whole(backup) as file, open(target, "rb") as old:
-        shutil.copyfileobj(old, file)
-    with write_whole(target) as file:
-        file.write(text.encode())
+    for name, contents in ((backup, former), (target, text)):
+        with write_whole(name) as file:
+            file.write(contents.encode())
     return backup
 
 

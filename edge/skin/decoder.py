@@ -31,7 +31,7 @@ class Decoder:
         self._groups: list[tuple[ChipSpec, slice, int]] = []
         """Neighbours of one kind with equal options and number of taxels, which one call parses:
         their bytes in `_bytes` and their number."""
-        starts = np.cumsum([0, *(chip.frame_bytes for chip in chips)])
+        starts = np.cumsum([0, *(chip.kind.frame_bytes(chip) for chip in chips)])
         self._bytes = np.zeros(starts[-1], dtype=np.uint8)
         self._before, self._starts = self._bytes.copy(), starts[:-1]
         self._unchanged = np.zeros(len(chips), dtype=np.int64)

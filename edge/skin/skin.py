@@ -4,7 +4,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -134,10 +134,8 @@ class Skin:
                 f"`edge-classify calibrate --skin {file.path}` with nothing touching"
             )
         with ExitStack() as opened:
-            buses: list[Adapter] = []
-            for spec in file.buses:
-                buses.append(_open(spec, file.reading.timeout_s))
-                opened.callback(buses[-1].close)
+            timeout_s = file.reading.timeout_s
+            buses = [opened.enter_context(closing(_open(b, timeout_s))) for b in file.buses]
             skin = cls(file, buses, touch_counts=touch_counts)
             opened.callback(skin.close)
             skin.start()
@@ -212,22 +210,19 @@ class Skin:
         clock = self.clock
         clock.sleep_until(clock.now())  # lets the buses of a virtual clock start together
         t = clock.now()
-        self._transfer(t)
-        return self._assemble(t)
-
-    def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
-        """The last frame's raw values (rows, cols), and which of them are valid."""
-        shape = self.layout.shape
-        return self._decoder.values.reshape(shape), self._valid.reshape(shape)
-
-    def _transfer(self, t: float) -> None:
-        """Read the buses side by side, each in a thread."""
+        # The buses are read side by side, each in a thread.
         jobs: list[list[Slot]] = [reader.slots for reader in self.readers]
         if self.scheduler is not None:
             chosen = self.scheduler.plan(self._last, self.touch_counts)
             jobs = [[job[i] for i in indices] for job, indices in zip(jobs, chosen, strict=True)]
         deadlines = [t + self.period_s - LONGEST_STEP_S] * len(jobs)
         list(self._threads.map(BusReader.read, self.readers, jobs, deadlines))
+        return self._assemble(t)
+
+    def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+        """The last frame's raw values (rows, cols), and which of them are valid."""
+        shape = self.layout.shape
+        return self._decoder.values.reshape(shape), self._valid.reshape(shape)
 
     def _assemble(self, t: float) -> Frame:
         self._valid = valid = self._decoder.decode(self._slots, t, t - self.oldest_s)

@@ -107,13 +107,11 @@ def _chip(
     table: ConfigTable, kind: ChipKind, layout: SkinLayout, sign: int | None, serial: bool
 ) -> ChipSpec:
     table.has("kind")
-    address = 0
     if serial and not kind.serial:
         raise InputError(f"{table.called('kind')} is {kind.name}; a serial port carries block only")
     if serial and table.has("address"):
         raise InputError(f"{table.called('address')} has no meaning on a serial port; leave it out")
-    if not serial:
-        address = table.whole("address", allowed=kind.addresses, form="#04x")
+    address = 0 if serial else table.whole("address", allowed=kind.addresses, form="#04x")
     mux = channel = None
     if table.has("mux"):
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,18 +85,6 @@ class FeatureSeries:
         return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *cells])
 
 
-class _Row(NamedTuple):
-    """The measurements of one frame."""
-
-    t: float
-    motion: float
-    force_motion: float | None
-    counted: NDArray[np.int64]
-    taxels: NDArray[np.int64] | None
-    kernel_cells: NDArray[np.int64] | None
-    joints: NDArray[np.float64] | None
-
-
 class Contact:
     """A contact being followed, one row of measurements a frame.
 
@@ -123,7 +111,9 @@ class Contact:
         self.ended = self.missing_taxels = self.missing_pose = False
         self.joints: NDArray[np.float64] | None = None
         self._measurer = measurer
-        self._rows: list[_Row] = []
+        self._rows: list[dict[str, Any]] = []
+        """Of each frame, what was measured: fields of `FeatureSeries`, but `counted` (m,) for the
+        whole numbers of region and zones."""
         self._starts: dict[str, Vector] = {}
 
     def add(self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float) -> None:
@@ -144,27 +134,29 @@ class Contact:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         zones = measurer.measure(active, region)
         plain = [0] * PLAIN
-        motion, force_motion = 0.0, 0.0 if measurer.force_motion else None
+        row: dict[str, Any] = {"t": age_s, "motion": 0.0}
+        if measurer.force_motion:
+            row["force_motion"] = 0.0
         if region is not None:
             self.region, self.joints = region, frame.joints
             plain[:2] = region.peak, region.area
             if measurer.motion:
                 plain[2:] = region.sums
-                motion = self._distance("motion", region.centroid, frame.joints)
+                row["motion"] = self._distance("motion", region.centroid, frame.joints)
             if measurer.force_motion:
                 # The contact's zone comes first.
                 _, _, force, rows, cols, *_ = zones
                 centroid = rows / force, cols / force % self.layout.cols
-                force_motion = self._distance("force_motion", centroid, frame.joints)
+                row["force_motion"] = self._distance("force_motion", centroid, frame.joints)
         elif self._rows:
-            motion, force_motion = self._rows[-1].motion, self._rows[-1].force_motion
-        counted = np.array(plain + zones, dtype=np.int64)
-        cells, coarse = (
-            None if cells is None else cells.read(frame)
-            for cells in (measurer.cells, measurer.kernel_cells)
-        )
-        joints = self._joints_of(frame) if measurer.joints else None
-        self._rows.append(_Row(age_s, motion, force_motion, counted, cells, coarse, joints))
+            row |= {name: self._rows[-1][name] for name in row.keys() - {"t"}}
+        row["counted"] = np.array(plain + zones, dtype=np.int64)
+        for name, cells in (("taxels", measurer.cells), ("kernel_cells", measurer.kernel_cells)):
+            if cells is not None:
+                row[name] = cells.read(frame)
+        if measurer.joints:
+            row["joints"] = self._joints_of(frame)
+        self._rows.append(row)
         self.age_s = age_s
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
@@ -184,7 +176,7 @@ class Contact:
     def _forget_last(self) -> None:
         self._rows.pop()
         for name in tuple(self._starts):
-            if not any(math.isfinite(getattr(row, name)) for row in self._rows):
+            if not any(math.isfinite(row[name]) for row in self._rows):
                 del self._starts[name]
 
     def _distance(
@@ -217,8 +209,7 @@ class Contact:
     def series(self) -> FeatureSeries:
         """The measurements so far; later frames do not change them."""
         measured: dict[str, Any] = {
-            name: None if values[0] is None else np.array(values)
-            for name, values in zip(_Row._fields, zip(*self._rows, strict=True), strict=True)
+            name: np.array([row[name] for row in self._rows]) for name in self._rows[0]
         }
         counted = measured.pop("counted")
         zones = self._measurer.zones

@@ -131,5 +131,5 @@ def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_p
     assert "Traceback" not in Path(f"{log}.err").read_text()
 
 
-def test_the_module_of_the_command_line_runs_it_and_the_version_is_the_package_s():
-    assert python("-m", "edge.cli", "--version").stdout == f"edge-classify {__version__}\n"
+def test_the_version_is_the_package_s():
+    assert python("-m", "edge", "--version").stdout == f"edge-classify {__version__}\n"

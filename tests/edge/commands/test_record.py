@@ -40,9 +40,8 @@ def recorder(folder, out=None, *, names=None):
 
 
 def frames(*poses):
-    return [
-        Frame(i / 100, np.zeros((2, 2), np.uint16), joints=pose) for i, pose in enumerate(poses)
-    ]
+    counts, valid = np.zeros((2, 2), np.uint16), np.ones((2, 2), bool)
+    return [Frame(i / 100, counts, valid, joints=pose) for i, pose in enumerate(poses)]
 
 
 def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_path):
