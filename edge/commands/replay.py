@@ -109,9 +109,8 @@ class Summary:
         self.recordings += 1
         decisions = [event for event in events if event["event"] == "decision"]
         self.as_trained += any(AS_TRAINED in decision["flags"] for decision in decisions)
-        first: dict[str, str] = {}
-        for decision in decisions:
-            first.setdefault(decision["task"], printable(decision["label"] or UNDECIDED))
+        # Of several decisions for a task, the first one stays.
+        first = {d["task"]: printable(d["label"] or UNDECIDED) for d in reversed(decisions)}
         for task in self._pairs.keys() & labels:
             self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
 

@@ -29,9 +29,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
     """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
     marks = np.full(invalid.shape, " ")
-    for status in statuses:
-        for taxel in status.spec.served:
-            marks.flat[taxel] = "." if invalid.flat[taxel] else "#"
+    served = [taxel for status in statuses for taxel in status.spec.served]
+    marks.flat[served] = np.where(invalid.flat[served], ".", "#")
     return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
 

@@ -141,8 +141,7 @@ class Reading(Opened):
                 {"event": "bus", "t": frame.t, "bus": name, "state": "lost" if lost else "back"}
                 for name, lost in skin.bus_changes()
             ]
-            silent = skin.silent_changes()
-            if silent is not None:
+            if (silent := skin.silent_changes()) is not None:
                 taxels = {"event": "taxels", "t": frame.t, "invalid": silent}
                 events.append({**taxels, "frames": SILENT_FRAMES})
             events += [chip_event(status, t=frame.t) for status in skin.changes()]

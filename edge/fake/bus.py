@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from edge.fake.clock import VirtualClock
+from edge.fake.clock import Hand, VirtualClock
 from edge.i2c.bus import Message, Transfer, bus_error, wire_bits
 from edge.i2c.chip import FakeChip
 from edge.i2c.tca9548a import FakeTCA9548A
@@ -55,7 +55,7 @@ class FakeBus:
         self.chips = dict(chips or {})
         self.clock_hz, self.timed, self.timeout_s = clock_hz, timed, timeout_s
         self.overhead_s = overhead_s
-        self.hand = (clock or VirtualClock()).hand()
+        self.hand = Hand(clock or VirtualClock())
         self.now, self.sleep = self.hand.now, self.hand.advance
         self.bits = 0
         """Bits on the wire so far."""

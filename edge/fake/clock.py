@@ -13,8 +13,8 @@ class Hand:
     """The time of one bus; buses run side by side, so each has its own."""
 
     def __init__(self, clock: VirtualClock) -> None:
-        self._clock = clock
-        self._t = clock.start
+        self._clock, self._t = clock, clock.start
+        clock.hands.append(self)
 
     def now(self) -> float:
         """Seconds."""
@@ -29,7 +29,7 @@ class VirtualClock:
     """A clock for a loop over fake buses; never waits.
 
     >>> clock = VirtualClock()
-    >>> hand = clock.hand()
+    >>> hand = Hand(clock)
     >>> hand.advance(0.007)
     >>> clock.sleep_until(0.010)
     >>> clock.now(), hand.now()
@@ -39,16 +39,12 @@ class VirtualClock:
     def __init__(self, start: float = 0.0) -> None:
         self.start = start
         """When all hands last met; a bus that has done nothing since is still there."""
-        self._hands: list[Hand] = []
-
-    def hand(self) -> Hand:
-        """A hand for a further bus."""
-        self._hands.append(Hand(self))
-        return self._hands[-1]
+        self.hands: list[Hand] = []
+        """One for each bus."""
 
     def now(self) -> float:
         """The latest of all hands."""
-        return max((hand.now() for hand in self._hands), default=self.start)
+        return max((hand.now() for hand in self.hands), default=self.start)
 
     def sleep_until(self, t: float) -> None:
         """Let all hands meet at `t`, or now if it has passed."""

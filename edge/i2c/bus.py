@@ -227,9 +227,8 @@ def send(bus: Bus, address: int, data: bytes | Sequence[int]) -> None:
 
 
 def fetch(bus: Bus, address: int, pointer: bytes, n: int) -> bytes:
-    """Read `n` bytes from a chip, once, after writing `pointer` unless it is empty."""
-    messages = [write(address, pointer)] if pointer else []
-    prepared = bus.prepare(*messages, read(address, n))
+    """Read `n` bytes from a chip, once, after writing `pointer`."""
+    prepared = bus.prepare(write(address, pointer), read(address, n))
     bus.transfer(prepared)
     return prepared.buffer.tobytes()
 

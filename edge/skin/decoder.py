@@ -28,9 +28,9 @@ class Decoder:
     def __init__(self, file: SkinFile) -> None:
         """Map stages to taxels."""
         chips, n = file.chips, file.layout.rows * file.layout.cols
-        self._groups: list[tuple[ChipSpec, slice, int]] = []
+        self._groups: list[tuple[ChipSpec, NDArray[np.uint8]]] = []
         """Neighbours of one kind with equal options and number of taxels, which one call parses:
-        their bytes in `_bytes` and their number."""
+        the first of them, and their bytes (n, frame_bytes) in `_bytes`."""
         starts = np.cumsum([0, *(chip.kind.frame_bytes(chip) for chip in chips)])
         self._bytes = np.zeros(starts[-1], dtype=np.uint8)
         self._before, self._starts = self._bytes.copy(), starts[:-1]
@@ -41,7 +41,8 @@ class Decoder:
         for _, group in groupby(chips, key=lambda c: (c.kind.name, len(c.taxels), c.options)):
             spec, *others = group
             last = first + 1 + len(others)
-            self._groups.append((spec, slice(starts[first], starts[last]), last - first))
+            data = self._bytes[starts[first] : starts[last]].reshape(last - first, -1)
+            self._groups.append((spec, data))
             first = last
         # The last stage and the last chip stand for a taxel that no chip serves.
         stages = [(i, taxel) for i, chip in enumerate(chips) for taxel in chip.taxels]
@@ -94,12 +95,9 @@ class Decoder:
         """
         at = np.array([slot.at for slot in slots] + [NEVER])
         good = np.array([slot.good for slot in slots] + [False])
-        first = 0
-        for spec, place, count in self._groups:
-            values, intact = spec.kind.parse(self._bytes[place].reshape(count, -1), spec)
-            stages = slice(first, first + values.size)
-            self._raw[stages], self._intact[stages] = values.ravel(), intact.ravel()
-            first = stages.stop
+        parsed = [spec.kind.parse(data, spec) for spec, data in self._groups]
+        self._raw[:-1] = np.concatenate([values for values, _ in parsed], axis=None)
+        self._intact[:-1] = np.concatenate([intact for _, intact in parsed], axis=None)
         fresh = at[:-1] >= began
         self._unchanged += fresh
         self._unchanged[np.logical_or.reduceat(self._bytes != self._before, self._starts)] = 0

@@ -140,13 +140,12 @@ def _chip(
 def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
     """Flat indices from `taxels`, or from `first` and `block`, row by row."""
     listed, *block = [table.has(key) for key in ("taxels", "first", "block")]
+    key = "taxels" if listed else "first"
     if listed:
         taxels = table.get("taxels")
         if not isinstance(taxels, list):
             raise table.fail("taxels", "a list of [row, col]")
-        key = "taxels"
     elif all(block):
-        key = "first"
         row, col = table.pair("first")
         high, wide = table.pair("block")
         if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
@@ -176,12 +175,11 @@ def taxel_at(table: ConfigTable, key: str, value: object, layout: SkinLayout) ->
 def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
     """Raise InputError where two chips claim one address or one taxel."""
     owner: dict[int, str] = {}
-    devices: dict[str, int] = {}
+    devices = [bus.device for bus in buses]
     for b, bus in enumerate(buses):
         place = f"{where}: bus {b}"
-        if bus.device in devices:
-            raise InputError(f"{place} has the same device as bus {devices[bus.device]}")
-        devices[bus.device] = b
+        if bus.device in devices[:b]:
+            raise InputError(f"{place} has the same device as bus {devices.index(bus.device)}")
         claimed: dict[tuple[int | None, ...], str] = {
             (None, None, chip.mux): "a mux" for chip in bus.chips if chip.mux is not None
         }

@@ -108,7 +108,9 @@ class ContactTracker:
         for j, region in enumerate(regions):
             begins = j not in shares.values() and region.peak > self.layout.onset
             if begins and len(contacts) < self._max_contacts:
-                contacts.append(self._contact(frame, region))
+                on_skin = self._motion_on_skin and frame.joints is None
+                chain = None if on_skin else self._chain
+                contacts.append(Contact(region_time(frame, region), region, self._measurer, chain))
                 of_contacts.append(region)
         for contact, of_contact in zip(contacts, of_contacts, strict=True):
             self._follow(contact, frame, active, of_contact)
@@ -147,11 +149,6 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
-
-    def _contact(self, frame: Frame, region: Region) -> Contact:
-        on_skin = self._motion_on_skin and frame.joints is None
-        chain = None if on_skin else self._chain
-        return Contact(region_time(frame, region), region, self._measurer, chain)
 
 
 def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
