@@ -1,7 +1,7 @@
 """Early decisions compared with fixed windows, on held-out trials."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -90,22 +90,23 @@ class StoppingComparison:
 
 
 def compare_stopping(
-    dataset: DataSet, decision_points_s: Sequence[float], *, jobs: int = 1
+    dataset: DataSet, decision_points_s: Sequence[float], *, quick: bool = True, jobs: int = 1
 ) -> dict[str, StoppingComparison]:
     """{task: early decisions compared with fixed windows}.
 
-    Each fold is held out once, and a quick export of the other folds decides its trials. The other
-    folds have trials of the same objects, so the export leaves out single trials too.
+    Each fold is held out once, and an export of the other folds decides its trials. The other folds
+    have trials of the same objects, so the export leaves out single trials too.
 
     Args:
         dataset: the trials.
         decision_points_s: the windows.
+        quick: whether the export tries few candidates.
         jobs: processes.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
     tests = [folds == k for k in range(FOLDS)]
-    cases = [(dataset, test, decision_points_s) for test in tests]
+    cases = [(dataset, test, decision_points_s, quick) for test in tests]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
     comparisons, unknown = {}, np.empty(shape, dtype=bool)
@@ -128,15 +129,16 @@ def compare_stopping(
 
 
 def _held_out(
-    dataset: DataSet, test: NDArray[np.bool_], decision_points_s: Sequence[float]
+    dataset: DataSet, test: NDArray[np.bool_], decision_points_s: Sequence[float], quick: bool
 ) -> tuple[Any, ...]:
     """The model that was fitted without a fold, and its answers to the fold's trials (`judged`)."""
-    train, others = dataset.part(~test), dataset.part(test)
-    fitted = fit(train, quick=True, leave_out=TRIAL, decision_points_s=decision_points_s, jobs=1)
-    model = fitted.sequential
+    given: dict[str, Any] = {"leave_out": TRIAL, "decision_points_s": decision_points_s}
+    fitted = fit(dataset.part(~test), quick=quick, jobs=1, **given)
+    model, others = fitted.sequential, replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
-    form = fitted.samples, fitted.dataset.names
-    new = np.stack([others.features(seconds, *form) for seconds in decision_points_s])
+    new = np.stack(
+        [others.features(s, fitted.samples, fitted.dataset.names) for s in decision_points_s]
+    )
     truth = {task: others.labels(task) for task in model.choices}
     return (model, *model.judged(new, truth))
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -218,6 +219,11 @@ class TestEarly:
         assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
         # Forty trials certify no rate as low as the smallest one.
         assert min(certified.asked for certified in compared.certified) > early.ERRORS[0]
+
+    def test_features_of_kernels_have_the_tables_of_the_other_folds(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(early, "fit", partial(early.fit, features=("zone_kernels",)))
+        dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
+        assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()
 
     def test_an_object_moves_when_the_arm_s_spring_breaks_friction(self):
         from train.simulate.scene import load
