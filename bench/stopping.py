@@ -3,9 +3,10 @@
 All decide on the same five folds; ours has the settings of an export. Extra trees decide at the
 first point at which their highest class probability passes a threshold. CALIMERA (Bilski and
 Jastrzebska, CALIMERA: a new early time series classification method, 2023) decides on the same
-features with calibrated ridge classifiers, at several prices of waiting. Columns are compared at the same mean time, between two thresholds or
-prices by interpolation. The gain is by how much deciding when sure errs less than the fixed window;
-its standard error treats the two shares as independent, which overstates it.
+features with calibrated ridge classifiers, at several prices of waiting. Columns are compared at
+the same mean time, between two thresholds or prices by interpolation. The gain is by how much
+deciding when sure errs less than the fixed window; its standard error treats the two shares as
+independent, which overstates it.
 
 The second table has rules that choose their mean time themselves: aeon's TEASER (Schäfer and Leser,
 TEASER: early and accurate time series classification, 2020) and its threshold of the probability,
