@@ -144,7 +144,8 @@ REFUSED = {
     meta(tasks={}): "no task",
     meta(tasks=[]): "tasks must be a table",
     meta(tracking={"speed": 1}): "tracking.debounce is missing",
-    meta(features=["noise"]): "was made for the features noise",
+    meta(features=["noise"], units={"noise": "1"}): "was made for the features noise",
+    meta(units={"max_force": "newton"}): "units.contact_area is missing; export it again",
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(lambda m: m.pop("window_s")): "window_s is missing; export it again",
     edited(
