@@ -98,14 +98,16 @@ class Log:
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
-        with parsing(f"{self.path}: a message of {topic}", "usable"):
-            message = parse_json(data, f"{self.path}: a message of {topic}")
-            t = float(message.get("t", logged_s))
-            if "q" in message:
-                q = np.asarray(message["q"], dtype=np.float64)
+        where = f"{self.path}: a message of {topic}"
+        with parsing(where, "usable"):
+            message = ConfigTable(parse_json(data, where), where)
+            t = message.number("t", logged_s)
+            if message.has("q"):
+                q = np.asarray(message.get("q"), dtype=np.float64)
                 self._pose(topic, t, list(map(str, message.get("names", ()))), q)
-            elif "counts" in message:
-                self._frames[topic].append((t, self._counts(topic, np.asarray(message["counts"]))))
+            elif message.has("counts"):
+                counts = self._counts(topic, np.asarray(message.get("counts")))
+                self._frames[topic].append((t, counts))
 
     def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:
         """Take in a message's angles; joints without names get their positions as names."""

@@ -1,6 +1,7 @@
 """CSV frames, bags and MCAP files, made here and imported through the command."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from rosbags.rosbag1 import Writer as Bag1
 from rosbags.rosbag2 import Writer as Bag2
 from rosbags.typesys import Stores, get_typestore
 
+from edge.errors import InputError
 from edge.recording import load
 from train.__main__ import main
+from train.importers.topics import Log
 
 N, ROWS, COLS, DOF = 12, 4, 6, 5
 RNG = np.random.default_rng(8)
@@ -258,6 +261,15 @@ def write_mcap(path, *, cdr, **options):
 def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
     path = write_mcap(tmp_path / "grasp.mcap", cdr=cdr)
     assert differences(imported(tmp_path, "mcap", path)) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [(b"[]", "must be a table, not []"), (b'{"t": "x"}', "t must be a finite")],
+)
+def test_a_json_message_of_another_form_is_named_with_its_topic(tmp_path, text, sentence):
+    with pytest.raises(InputError, match=f"grasp: a message of /skin:? {re.escape(sentence)}"):
+        Log.of(tmp_path / "grasp").json("/skin", text, 0.0)
 
 
 def cut_mcap(tmp_path):
