@@ -1,7 +1,6 @@
 """CSV frames, bags and MCAP files, made here and imported through the command."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -263,13 +262,9 @@ def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
     assert differences(imported(tmp_path, "mcap", path)) == []
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [(b"[]", "must be a table, not []"), (b'{"t": "x"}', "t must be a finite")],
-)
-def test_a_json_message_of_another_form_is_named_with_its_topic(tmp_path, text, sentence):
-    with pytest.raises(InputError, match=f"grasp: a message of /skin:? {re.escape(sentence)}"):
-        Log.of(tmp_path / "grasp").json("/skin", text, 0.0)
+def test_a_json_message_that_is_no_table_is_named_with_its_topic(tmp_path):
+    with pytest.raises(InputError, match=r"grasp: a message of /skin must be a table, not \[\]"):
+        Log.of(tmp_path / "grasp").json("/skin", b"[]", 0.0)
 
 
 def cut_mcap(tmp_path):
