@@ -1,6 +1,7 @@
 """A model file: what is refused, and what a decision says."""
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -132,10 +133,10 @@ REFUSED = {
     no_metadata: "no edge-classify metadata",
     another_attribute: "ONNX Runtime refuses it",
     another_input: "has an input more",
-    twice_as_many_neighbours: r"no tensor\(double\) object_distances of shape \[3\]",
+    twice_as_many_neighbours: "no tensor(double) object_distances of shape [3]",
     edited(dict.clear): "its metadata: not JSON",
     meta(format=99): "is of format 99, but this edge-classify reads",
-    meta(samples=30): r"no tensor\(double\) features of shape \[90\], which its metadata",
+    meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
     meta(samples=-3): "samples must be a whole number from 2 to 10000, not -3",
     meta(window_s="soon"): "window_s must be a number above 0, at most 3600, not 'soon'",
     meta(skin={"rows": 16}): "cols is missing",
@@ -150,10 +151,10 @@ REFUSED = {
     edited(lambda m: m.pop("window_s")): "window_s is missing; export it again",
     edited(
         lambda m: m["tasks"]["category"]["labels"].append("liquid")
-    ): r"no tensor\(double\) category_scores of shape \[3\]",
+    ): "no tensor(double) category_scores of shape [3]",
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
-    ): r"no tensor\(int64\) mobility_label",
+    ): "no tensor(int64) mobility_label",
     # Each pair of a rigid or soft category and one of four objects would need a label of its own.
     edited(
         lambda m: m["tasks"]["object"].update(
@@ -166,7 +167,7 @@ REFUSED = {
 @pytest.mark.parametrize("change", REFUSED, ids=REFUSED.values())
 def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
     path = altered(change)
-    with pytest.raises(InputError, match=REFUSED[change]) as caught:
+    with pytest.raises(InputError, match=re.escape(REFUSED[change])) as caught:
         Model(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
