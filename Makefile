@@ -270,9 +270,10 @@ $(VENV)/.mutants: $(READY)
 	$(PIP) --group mutants
 	@touch $@
 
-# MUTANTS="--only edge.touch --count 50 --minutes 5": a smaller draw.
+# MUTANTS="--only edge.touch --count 50 --minutes 5": a smaller draw. mutmut forks, and worker
+# processes that were started before a fork answer nobody.
 mutants: $(VENV)/.mutants
-	$(BIN)/python -m tests.mutants $(MUTANTS)
+	LOKY_MAX_CPU_COUNT=1 $(BIN)/python -m tests.mutants $(MUTANTS)
 
 # The lines that differ are missing pins (<) and pins that nothing needs (>).
 GROUPS := train dev docs browser mutants bench upkeep
