@@ -1,5 +1,8 @@
 """The base of all errors, the errors that a user can correct, and text that is safe to print."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 def printable(text: str) -> str:
     """Text that is safe on a terminal or in a log: unprintable characters become Python escapes.
@@ -44,3 +47,16 @@ class InputError(EdgeError, ValueError):
 
 class OutOfRange(InputError):
     """Features that are too large to be scaled, or not finite: a decision on them has no label."""
+
+
+@contextmanager
+def about(name: str) -> Iterator[None]:
+    """Begin the sentences of the errors in the block with the name of what they are about.
+
+    Raises:
+        InputError: the block raised one.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.config import parse_json, shown
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.files import open_regular, parsing, write_whole
 from edge.touch.arm import joint_columns
 from edge.touch.frame import Frame
@@ -88,10 +88,8 @@ class Recording:
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
-        try:
+        with about(where):
             columns = joint_columns(self.joint_names or (), names)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
         meta = {**self.meta, "joint_names": list(names)}
         return replace(self, joints=self.joints[:, columns], meta=meta)
 

@@ -111,9 +111,8 @@ def measure(model: Model) -> dict[str, Any]:
 def touch(model: Model, seconds: float) -> list[Frame]:
     """Frames of a touch on the model's skin that begins at once and grows in force and area."""
     layout, dof = model.info.layout, model.info.dof
-    rows = np.arange(layout.rows)[:, None] - layout.rows // 2
-    cols = np.arange(layout.cols) - layout.cols // 2
-    distance = np.hypot(rows, cols)
+    rows, cols = np.ogrid[: layout.rows, : layout.cols]
+    distance = np.hypot(rows - layout.rows // 2, cols - layout.cols // 2)
     frames = []
     for i in range(math.ceil(seconds * RATE_HZ) + 1):
         age = i / RATE_HZ

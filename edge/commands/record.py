@@ -103,9 +103,7 @@ class Trials:
             self._frames.append(frame)
         over = contact is None or contact.ended
         onset_s = math.inf if self._saved is None else self._saved.onset_s
-        if over or frame.t - onset_s >= self._length:
-            return self.rest()
-        return None
+        return self.rest() if over or frame.t - onset_s >= self._length else None
 
     def rest(self) -> list[Frame] | None:
         """End the trial that is under way, if any, and return its frames."""
@@ -118,8 +116,7 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
     valid = np.array([f.valid for f in frames])  # a skin's frames always say which taxels are
     dof = next((len(f.joints) for f in frames if f.joints is not None), None)
-    unknown = np.full(dof or 0, np.nan)
-    joints = np.array([unknown if f.joints is None else f.joints for f in frames])
+    joints = np.array([np.full(dof or 0, np.nan) if f.joints is None else f.joints for f in frames])
     return Recording(
         t=np.array([f.t - frames[0].t for f in frames]),
         frames=np.array([f.counts for f in frames]),

@@ -12,7 +12,7 @@ from typing import Any
 from edge.classifier import AS_TRAINED, Classifier, suited
 from edge.commands.options import add_error, check_error
 from edge.commands.output import LOG, Output, counted
-from edge.errors import InputError, printable
+from edge.errors import InputError, about, printable
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
@@ -42,9 +42,11 @@ def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
     Raises:
         InputError: the recording does not suit the model, or holds no contact.
     """
-    contact = first_series(suited(model, recording, name), model)
-    if contact is None:
-        raise InputError(f"{name}: holds no contact")
+    recording = suited(model, recording, name)
+    with about(name):
+        contact = first_series(recording, model)
+        if contact is None:
+            raise InputError("holds no contact; leave it out, or record the touch again")
     return contact[1]
 
 
@@ -57,11 +59,9 @@ def decide(
         InputError: the recording does not suit the model; the message begins with `name`.
     """
     recording = suited(model, recording, name)
-    try:
+    with about(name):
         classifier = Classifier(model, recording.layout, error=error)
         events = [event.to_dict() for event in classifier.classify(recording)]
-    except InputError as problem:
-        raise InputError(f"{name}: {problem}") from None
     if not any(event["event"] == "onset" for event in events):
         events.append({"event": "no_contact"})
     return events

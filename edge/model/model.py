@@ -225,7 +225,7 @@ class Model:
         """The error for a vector that the graph answers with label -1."""
         finite = np.isfinite(x)
         if finite.all():
-            return OutOfRange("the features are too large to be scaled")
+            return OutOfRange("the features are too large to be scaled; check the skin's units")
         feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
         return OutOfRange(f"value {finite.argmin()} of the features, of {feature}, is not finite")
 

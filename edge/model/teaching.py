@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.errors import InputError, printable
+from edge.errors import InputError, about, printable
 from edge.files import parsing
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
@@ -152,7 +152,8 @@ def taught(
     if new_labels:
         info = with_labels(info, unknown_labels(info, labels))
     for name, trial, trial_labels in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
-        points = [model.decide(vector, point) for point, vector in enumerate(trial)]
+        with about(name):
+            points = [model.decide(vector, point) for point, vector in enumerate(trial)]
         if any(next(iter(decisions.values())).out_of_range for decisions in points):
             raise InputError(
                 f"{name}: lies far outside the trials that the model was fitted on, so its "

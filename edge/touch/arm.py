@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from edge.config import ConfigTable, read_toml, shown
-from edge.errors import InputError
+from edge.errors import InputError, about
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -169,10 +169,9 @@ class Chain:
         joints = [_joint_from(joint, i) for i, joint in enumerate(table.tables("joint", "joint"))]
         base, tip = table.text("base", "base"), table.text("tip", "tip")
         table.done()
-        try:
-            return cls(joints, base, tip)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
+        with about(where):
+            chain = cls(joints, base, tip)
+        return chain
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Self:

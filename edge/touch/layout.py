@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.config import ConfigTable
-from edge.errors import InputError
+from edge.errors import InputError, about
 
 RELEASE_S = 0.3
 """Longer than an arm bounces off a rigid object, and shorter than the time to a second tap."""
@@ -155,10 +155,9 @@ class SkinLayout:
         if table.has("column_angles_deg"):
             values["column_angles_deg"] = table.numbers("column_angles_deg", values["cols"])
         values["dead"] = table.wholes("dead", ())
-        try:
-            return cls(**values)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
+        with about(where):
+            layout = cls(**values)
+        return layout
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:

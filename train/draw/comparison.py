@@ -11,7 +11,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from edge.classifier import Classifier
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.events import Decided
 from edge.files import write_whole
 from edge.model.model import Model
@@ -124,10 +124,8 @@ def contact_of(name: str, recording: Recording, number: int = 1) -> tuple[float,
 def _decided(name: str, recording: Recording, model: Model) -> Decided | None:
     """The decision of the first task: the category, where the model has one."""
     task = "category" if "category" in model.info.tasks else next(iter(model.info.tasks))
-    try:
+    with about(name):
         events = list(Classifier(model, recording.layout).classify(recording))
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
     return next((e for e in events if isinstance(e, Decided) and e.task == task), None)
 
 

@@ -113,7 +113,7 @@ def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_
             lambda t: labelled(t, object="sotf 1"),
             "label it, or teach it with --new-labels; did you mean 'soft 1'?",
         ),
-        (lambda t: replace(t, frames=0 * t.frames), "odd.npz: holds no contact"),
+        (lambda t: replace(t, frames=0 * t.frames), "odd.npz: holds no contact; leave it out"),
         (
             lambda t: replace(t, frames=t.frames.max(axis=(1, 2), keepdims=True) * ALL_TAXELS),
             "odd.npz: lies far outside the trials that the model was fitted on",
