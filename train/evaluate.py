@@ -203,9 +203,9 @@ class AnswerTable:
             for fold, right in enumerate(self.right[task])
         ]
 
-    def nested(self, task: str, *rule: Any, **more: Any) -> Result:
+    def nested(self, task: str, *rule: Any) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often takes."""
-        return self.answered(task, self.by_fold(task, *rule, **more))
+        return self.answered(task, self.by_fold(task, *rule))
 
     def answered(self, task: str, picked: Sequence[int]) -> Result:
         """The accuracy where the candidate `picked` for a fold answers the trials of that fold."""

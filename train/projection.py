@@ -350,7 +350,7 @@ class Projection(TransformerMixin, BaseEstimator):
         if self.kind == "pca":
             _, axes, values = principal_axes(d)
             squares = values**2
-            gaps = 1.0 - squares[1:] / squares[:-1] if len(values) > 1 else np.ones(1)
+            gaps = 1.0 - squares[1:] / squares[:-1]
             return axes.T, float(gaps[: self.components].min(initial=1.0))
         if self.kind != "lda":
             raise InputError(f"the projection must be one of {', '.join(KINDS)}, not {self.kind!r}")

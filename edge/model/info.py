@@ -192,7 +192,7 @@ class ModelInfo:
                 window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
                 samples=meta.whole("samples", allowed=range(2, 10_001)),
                 features=names,
-                units={name: meta.table("units").text(name, empty=True) for name in names},
+                units={name: meta.table("units").text(name) for name in names},
                 motion_frame=meta.choice("motion_frame", ("world", "skin")),
                 chain=Chain.from_dict(arm, where=f"{where}: arm") if arm is not None else None,
                 rows=meta.whole("rows"),

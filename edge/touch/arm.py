@@ -218,8 +218,6 @@ class Chain:
         from edge.touch.urdf import joints_between
 
         joints = joints_between(path, base, tip)
-        if not joints:
-            return cls([], base, tip)
         return cls.from_dict({"base": base, "tip": tip, "joint": joints}, where=os.fspath(path))
 
 

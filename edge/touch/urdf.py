@@ -12,8 +12,10 @@ def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[di
     """The joints from link `base` to link `tip`, as tables for `edge.touch.arm.Chain.from_dict`.
 
     Raises:
-        InputError: the file cannot be read, or no chain leads from `base` to `tip`.
+        InputError: the file cannot be read, or no chain leads from `base` to another link `tip`.
     """
+    if base == tip:
+        raise InputError(f"{path}: link {tip!r} is both base and tip; name the arm's two ends")
     with parsing(os.fspath(path), "a URDF file"):
         root = ElementTree.fromstring(read_bytes(path))
     if root.tag != "robot":

@@ -119,7 +119,7 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(mo
     }
     rng = np.random.default_rng(0)
     X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
-    vectors[-1] *= 1e3  # beyond the reach of the coordinates
+    vectors[-1] *= 1e3  # beyond the reach of features and coordinates
     y = {"of_area": np.array(["a", "b", "c"] * 20), "partial": np.array(["d", "e", "", "d"] * 15)}
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range
@@ -130,16 +130,6 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(mo
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
-
-
-def test_features_and_coordinates_are_cut_off_as_in_the_graph(model, exported):
-    vector = np.load(exported / "golden.npz")["vectors"][0]
-    vector[3] = 1e9
-    decision = model.decide(vector)["category"]
-    assert decision.out_of_range
-    _, distances = why_of(model, "category", vector, decision)
-    reach = np.abs(Space.of(model, "category").rows).max()
-    assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5 * reach)
 
 
 def test_without_another_label_there_is_no_rival():

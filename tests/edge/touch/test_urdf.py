@@ -8,61 +8,59 @@ from edge.touch.urdf import joints_between
 
 ARM = """<?xml version="1.0"?>
 <robot name="r">
-  <link name="base"/><link name="upper"/><link name="lower"/><link name="aside"/>
-  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
-    <origin xyz="0.3 0 -1e-3" rpy="0 1.5 0"/><axis xyz="0 1 0"/>
+  <link name="base"/><link name="upper"/><link name="mount"/><link name="lower"/>
+  <link name="tool"/><link name="aside"/>
+  <joint name="elbow" type="revolute"><parent link="mount"/><child link="lower"/>
+    <origin xyz="0.3 0 -1e-3" rpy="0.4 -0.5 0.6"/><axis xyz="0 0.6 0.8"/>
     <limit lower="-2.5" upper="0" effort="1" velocity="1"/></joint>
   <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/></joint>
+  <joint name="bracket" type="fixed"><parent link="upper"/><child link="mount"/>
+    <origin xyz="0 0.02 0.25"/></joint>
   <joint name="camera" type="fixed"><parent link="upper"/><child link="aside"/></joint>
+  <joint name="slide" type="prismatic"><parent link="lower"/><child link="tool"/>
+    <origin xyz="0.05 0 0" rpy="3 2 1"/><axis xyz="0 1 0"/>
+    <limit upper="0.5" effort="1" velocity="1"/></joint>
 </robot>"""
 
 
 @pytest.fixture
-def joints(tmp_path):
-    def read(text, base="base", tip="lower"):
-        path = tmp_path / "arm.urdf"
-        path.write_text(text)
-        return joints_between(path, base, tip)
-
-    return read
+def urdf(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    return path
 
 
-def test_the_chain_runs_from_base_to_tip_whatever_the_order_of_the_file(joints):
-    assert [joint["name"] for joint in joints(ARM)] == ["shoulder", "elbow"]
-    assert [joint["name"] for joint in joints(ARM, "upper", "aside")] == ["camera"]
-    assert joints(ARM, "upper", "upper") == []
+def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_file(urdf):
+    given = [joint["name"] for joint in joints_between(urdf, "base", "lower")]
+    assert given == ["shoulder", "bracket", "elbow"]
+    assert [joint["name"] for joint in joints_between(urdf, "upper", "aside")] == ["camera"]
+    with pytest.raises(InputError, match="link 'upper' is both base and tip; name the arm's two"):
+        joints_between(urdf, "upper", "upper")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("<robot", "<sdf", "not a URDF file"),
+        ("robot", "sdf", "not a URDF file: its root is <sdf> instead of <robot>"),
         ('link name="base"', 'link name="world"', "no link 'base'; it has world, upper"),
         ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
         ('<parent link="base"/>', '<parent link="upper"/>', "no chain of joints leads from"),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
         ("0.3 0 -1e-3", "0.3 0 x", "joint 'elbow': not numbers: could not convert"),
-        (
-            '<axis xyz="0 1 0"/>',
-            '<mimic joint="shoulder"/>',
-            "joint 'elbow' follows joint 'shoulder' (<mimic>)",
-        ),
+        ("0.3 0 -1e-3", "0.3 0", "joint 'elbow': origin_xyz must be a list of 3 numbers"),
+        ('<axis xyz="0 1 0"/>', '<mimic joint="elbow"/>', "joint 'slide' follows joint 'elbow'"),
         ('lower="-2.5"', 'lower="low"', "joint 'elbow': not numbers: could not convert"),
+        ('"continuous"', '"floating"', "joint 'shoulder': type must be one of revolute, co"),
+        ('type="continuous"', "", "prismatic, fixed, not ''"),
     ],
 )
-def test_what_is_wrong_is_named(joints, old, new, said):
+def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, said):
+    urdf.write_text(ARM.replace(old, new))
     with pytest.raises(InputError, match=r"arm\.urdf: .*") as caught:
-        joints(ARM.replace(old, new))
+        Chain.from_urdf(urdf, "base", "tool")
     assert said in str(caught.value)
 
 
-def test_an_origin_of_two_numbers_is_named_by_the_chain(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(ARM.replace("0.3 0 -1e-3", "0.3 0"))
-    with pytest.raises(InputError, match="joint 'elbow': origin_xyz must be a list of 3 numbers"):
-        Chain.from_urdf(path, "base", "lower")
-
-
-def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
+def test_a_urdf_that_is_not_there_is_one_sentence(tmp_path):
     with pytest.raises(InputError, match="cannot be read: No such file"):
         joints_between(tmp_path / "none.urdf", "a", "b")
