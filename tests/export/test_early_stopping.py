@@ -13,7 +13,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
 from edge.model.teaching import taught
-from edge.model.verify import first_series, verify
+from edge.model.verify import first_series, renew, verify
 from edge.recording import save
 from edge.touch.features import FEATURES
 from export.api import save as save_model
@@ -73,10 +73,13 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
 
 
 def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
-    checks = {check.name: check for check in verify(early, folder / "out" / "golden.npz")}
-    assert all(check.passed for check in checks.values())
-    named = {name for name in checks if "decision_point" in name}
-    assert {f"{task}_decision_point_label" for task in early.info.tasks} <= named
+    golden = np.load(folder / "out" / "golden.npz")
+    assert all(check.passed for check in verify(early, folder / "out" / "golden.npz"))
+    for point, vectors in enumerate(golden["decision_point_vectors"]):
+        answers = early.run(vectors, point)
+        for task in early.info.tasks:
+            stored = golden[f"{task}_decision_point_distances"][point]
+            np.testing.assert_array_equal(stored, answers[f"{task}_distances"])
 
 
 def test_the_board_stops_where_the_rule_does(early, make_touch, error):
@@ -155,11 +158,11 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early,
 
 
 def pressed(make_touch, seeds):
-    """Touches whose category is the product of softness and of how hard they are pressed."""
+    """Touches of an object; their category is of its softness and of how hard they are pressed."""
     for kind, press, seed in itertools.product(("hard", "soft"), (4, 5), seeds):
         given = make_touch(kind=kind, seed=seed)
         labels = {"softness": kind, "mobility": f"by {press}", "category": f"{kind}-by {press}"}
-        meta = {**given.meta, "labels": labels}
+        meta = {**given.meta, "labels": {**labels, "object": f"{kind} {seed % 2}"}}
         frames = (given.frames * (press / 4)).astype(np.uint16)
         yield replace(given, frames=frames, meta=meta)
 
@@ -211,17 +214,20 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing,
 
 
 @pytest.mark.parametrize("new", [False, True])
-def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(early, tmp_path, new):
-    """Two tasks of one space; two labels of the further trials are new.
+def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
+    early, folder, tmp_path, new
+):
+    """Two tasks; two labels of the further trials are new.
 
-    Without new labels, each trial has a label for one task. With them, no more than the two trials
-    of `d` vote.
+    Without new labels, each trial has a label for one task, and the tasks are of one space. With
+    them, no more than the two trials of `d` vote, and one task takes one of the features.
     """
     rng = np.random.default_rng(1)
     y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
     width = early.info.samples * len(FEATURES)
     X, more, queries = (rng.normal(size=(3, n, width)) for n in (45, 3, 9))
-    choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1)}
+    of_u = ("contact_area",) if new else FEATURES
+    choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1, features=of_u)}
     sequential, before = fitted_model(tmp_path / "model.onnx", early.info, choices, X, y)
     labels = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
     data = taught(before, ["one", "two", "three"], more, labels, new_labels=new)
@@ -243,7 +249,7 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
             further = [classes.index(labels[i][task]) for i in known]
             point.labels_[task] = np.array([*point.labels_[task], *further])
             point.classes_[task] = np.array(classes)
-        del point.projections_[space]
+        point.projections_ = {own: point.projections_[own] for own in point.spaces_.values()}
     (tmp_path / "taught.onnx").write_bytes(data)
     model = Model(tmp_path / "taught.onnx")
     described = replace(before.info, rows=48, tasks=model.info.tasks)
@@ -254,6 +260,10 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(ear
             expected = oracle.run(vectors, point)
             for key, values in model.run(vectors, point).items():
                 assert (values == expected[key]).all(), key
+    renew(folder / "out" / "golden.npz", tmp_path / "golden.npz", model, more)
+    golden = np.load(tmp_path / "golden.npz")
+    assert (golden["decision_point_vectors"][:, -3:] == more).all()
+    assert (golden["vectors"][-3:] == more[-1]).all()
     assert (model.info.rows, model.info.taught) == (48, 3)
     assert {t: (e.labels[2:], e.k) for t, e in model.info.tasks.items()} == (
         {"t": (("c", "d"), 2), "u": (("z",), 1)} if new else {"t": (("c",), 3), "u": ((), 1)}

@@ -1,7 +1,10 @@
 """`make export` as a user meets it."""
 
+from unittest.mock import Mock
+
 import pytest
 
+from edge.errors import InputError
 from edge.model.model import Model
 from edge.statistics import wilson
 from export.__main__ import main
@@ -44,9 +47,9 @@ def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
     fixed = ("--scaling", "II", "--components", 3, "--k", 2, "--window", 0.8, "--threshold", 120)
-    export(tmp_path, "--data", recordings, "--tasks", "object", *fixed, *PAPER)
+    export(tmp_path, "--data", recordings, "--tasks", "object", "--name", "pads", *fixed, *PAPER)
     info = Model(tmp_path / "model.onnx").info
-    assert list(info.tasks) == ["object"]
+    assert (info.name, list(info.tasks)) == ("pads", ["object"])
     task = info.tasks["object"]
     assert (task.scaling, task.components, task.k) == ("II", 3, 2)
     assert (task.projection, task.features) == ("pca", info.features)
@@ -61,6 +64,10 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
         (["--tasks", "colour"], "label 'colour'; all have category, object"),
         (["--data", "."], ".: no .npz recording in this folder"),
         (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
+        (["--decision-points", "0.3,x"], "--decision-points must be like 0.2:1.2:0.1 or"),
+        (["--decision-points", "0:0.6:0.3"], "(seconds above 0) or none, not '0:0.6:0.3'"),
+        (["--decision-points", "0.9:0.6:0.3"], "(seconds above 0) or none, not '0.9:0.6:0.3'"),
+        (["--front", "fast"], "build/tradeoff/front.json: cannot be read: No such file"),
     ],
 )
 def test_options_that_make_no_sense_are_one_sentence(
@@ -68,12 +75,31 @@ def test_options_that_make_no_sense_are_one_sentence(
 ):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
-    command = ["--data", str(recordings), "--out", str(out), "--jobs", "1", *PAPER]
-    assert main([*command, *options]) == 2
+    command = ["--data", str(recordings), "--out", str(out), "--jobs", "1"]
+    assert main([*command, *(() if "--front" in options else PAPER), *options]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("export: ")
     assert word in last
     assert not any(out.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "window_s", "points"),
+    [
+        ([], None, None),
+        (["--decision-points", "none"], None, ()),
+        (["--decision-points", "0.9,0.3"], 1.2, (0.3, 0.9, 1.2)),
+        (["--decision-points", "0.2:2:0.3", "--window", "0.8"], 0.8, (0.2, 0.5, 0.8)),
+    ],
+)
+def test_decision_points_before_a_window_hold_it_fixed(
+    options, window_s, points, tmp_path, monkeypatch
+):
+    asked = Mock(side_effect=InputError("enough"))
+    monkeypatch.setattr("export.cli.fit", asked)
+    assert main(["--data", "x", "--out", str(tmp_path), *options]) == 2
+    assert asked.call_args.kwargs["window_s"] == window_s
+    assert asked.call_args.kwargs["decision_points_s"] == points
 
 
 @pytest.mark.parametrize(
@@ -82,8 +108,8 @@ def test_options_that_make_no_sense_are_one_sentence(
         ("--components", "0", "must be a whole number from 1"),
         ("-k", "0", "must be a whole number from 1"),
         ("--samples", "1", "must be a whole number from 2 to 1000"),
-        ("--samples", "1001", "must be a whole number from 2 to 1000"),
         ("--window", "0", "must be a number from 0.01 to 60"),
+        ("--scaling", "VI", "invalid choice: 'VI'"),
         ("--threshold", "-3", "must be a whole number from 0 to 65534"),
     ],
 )

@@ -1,5 +1,7 @@
 """The ONNX graph against Python's whole numbers, the estimators and ONNX's own reference."""
 
+from dataclasses import replace
+
 import numpy as np
 import onnx
 import pytest
@@ -10,11 +12,10 @@ from onnx.reference import ReferenceEvaluator
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
-from tests.hard_cases.models import describe, features, labels_for, session
-from train.evaluate import stratified_folds
+from tests.hard_cases.models import describe, features, labels_for, session, shipped
+from tests.sequential import fitted_model
 from train.pipeline import Choice, ContactClassifier, vote
 from train.scaling import SCALINGS
-from train.stopping import SequentialClassifier
 
 
 def fit(X, choices, labels=5, lack=()):
@@ -144,16 +145,11 @@ def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
     X = np.stack([features(40, seed) for seed in (1, 2, 3)])
     y = {"t": labels_for(X[0], 3), "u": labels_for(X[0], 2, 1)}
     choices = {"t": Choice("IV", 6, 3), "u": Choice("IV", 2, 2, "lda")}
-    model = SequentialClassifier(choices, (0.4, 0.8, 1.2))
-    model.fit(X, y, stratified_folds(y["t"]), [choices] * 10)
-    data = to_onnx(model, describe(model.decision_points_[-1]))
-    runtime = session(data)
-    names = [output.name for output in runtime.get_outputs()]
-    for point, fitted in enumerate(model.decision_points_):
-        queries = features(20, seed=9)
-        given = {"features": queries, "decision_point": np.array([point])}
-        answers = dict(zip(names, runtime.run(names, given), strict=True))
-        assert differences(fitted, answers, queries) == []
+    info = replace(shipped().info, decision_points_s=(0.4, 0.8, 1.2))
+    fitted, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
+    queries = features(20, seed=9)
+    for point, estimator in enumerate(fitted.decision_points_):
+        assert differences(estimator, model.run(queries, point), queries) == []
 
 
 @pytest.mark.parametrize(

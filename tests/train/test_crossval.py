@@ -86,9 +86,10 @@ def test_components_beyond_the_rank_add_nothing():
 
 
 def test_too_few_trials_and_values_that_are_not_finite_are_named():
-    with pytest.raises(InputError, match="at least 2 trials"):
-        neighbours(np.zeros((1, 120)))
     X, _ = overlapping()
+    assert neighbours(X[:2]).shape == (2, 20, 1)
+    with pytest.raises(InputError, match="at least 2 trials"):
+        neighbours(X[:1])
     X[3, 3] = np.inf
     with pytest.raises(InputError, match="trial 3"):
         neighbours(X)

@@ -8,7 +8,7 @@ import pytest
 import train
 from edge.recording import Recording, save
 from train.dataset import load_trials
-from train.evaluate import VARIANCE
+from train.evaluate import VARIANCE, stratified_folds
 from train.fitting import _decision_points, _leaks
 from train.pipeline import Choice
 
@@ -45,7 +45,7 @@ def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
 def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_path):
     for kind in ("hard", "soft"):
         for seed in range(9):
-            labels = {"category": kind, "object": f"{kind} {seed % 3}"}
+            labels = {"category": kind, "object": f"{kind} {seed % 3}", "side": kind}
             save(tmp_path / f"{kind}{seed}.npz", make_touch(kind=kind, seed=seed, labels=labels))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     told = fitted.chosen["category"]
@@ -54,6 +54,9 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
     assert [result.variance for result in (told.accuracy, *told.candidates)] == [3.0, 3.0]
     assert told.by_trial.variance == VARIANCE
     assert fitted.chosen["object"].left_out == "trial"
+    # The folds have all labels of the task that has the most of them.
+    folds = stratified_folds(fitted.dataset.labels("object"))
+    assert (fitted.chosen["object"].folds == folds).all()
 
 
 def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
@@ -76,15 +79,18 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
 
 
 @pytest.mark.parametrize(
-    ("trials", "objects", "points"),
+    ("trials", "objects", "components", "points"),
     [
-        (140, 18, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
-        (1400, 18, (0.3, 0.6, 0.9, 1.2)),
-        (600, 68, (0.6, 1.2)),
-        (2000, 90, ()),
+        (140, 18, 99, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
+        (1400, 18, 17, (0.3, 0.6, 0.9, 1.2)),
+        (600, 68, 67, (0.6, 1.2)),
+        (120, 100, 999, (0.3, 0.6, 0.9, 1.2)),  # no more coordinates than trials
+        (2000, 90, 89, ()),
     ],
 )
-def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(trials, objects, points):
+def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(
+    trials, objects, components, points
+):
     labels = np.array([f"object {i % objects}" for i in range(trials)])
     data = SimpleNamespace(
         trials=range(trials),
@@ -92,7 +98,7 @@ def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(trials, o
         widths=lambda samples: (150,),
         labels=lambda task: labels,
     )
-    choices = {"object": Choice("IV", objects - 1, 3, "lda", ("max_force",))}
+    choices = {"object": Choice("IV", components, 3, features=("max_force",))}
     notes: list[str] = []
     assert _decision_points(data, choices, None, 1.2, 40, notes, trials) == pytest.approx(points)
     assert [note.split(" decision points")[0] for note in notes] == (
