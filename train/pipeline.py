@@ -7,7 +7,7 @@ numbers, and their squared distances are exact. `export/graph.py` writes the gra
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +52,8 @@ def label_distances(
     return out
 
 
+SPREAD_FOLDS = 2
+"""Folds that measure how far new trials lie from their labels."""
 Space = tuple[object, ...]
 """The settings that two tasks must share to have one projection."""
 
@@ -138,7 +140,8 @@ class ContactClassifier:
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
-        spreads_: {task: mean variance of the coordinates within its labels}; 1 where there is none.
+        spreads_: {task: mean variance of a coordinate of new trials around their labels, from
+            `label_distances` of trials by fits without them}; 1 where there is none.
         products_: {task: its factors} of the tasks decided together; see `edge.model.agreement`.
     """
 
@@ -157,12 +160,14 @@ class ContactClassifier:
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
         own: NDArray[np.bool_] | None = None,
+        measured: bool = True,
     ) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for it.
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
             own: (n,) whether a trial is the owner's, see `Choice.counts`.
+            measured: whether `spreads_` is measured, which `decide` needs.
         """
         X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
@@ -193,18 +198,47 @@ class ContactClassifier:
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
-        self.spreads_: dict[str, float] = {}
         for task, choice in self.choices.items():
             labels = y[task][self.members_[self.spaces_[task]]]
             self.classes_[task], self.labels_[task] = np.unique(labels, return_inverse=True)
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
-            rows = self.rows_[self.spaces_[task]][:, : self.components_[task]]
-            members = np.eye(len(self.classes_[task]))[self.labels_[task]]
-            means = (members.T @ rows) / members.sum(axis=0)[:, None]
-            within = (rows - means[self.labels_[task]]) ** 2
-            self.spreads_[task] = float(within.mean() if within.any() else 1.0)
+        if measured:
+            self.spreads_ = self._spreads(X, y, own)
         return self
+
+    def _spreads(
+        self,
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        own: NDArray[np.bool_] | None,
+    ) -> dict[str, float]:
+        """`spreads_`, from fits without each of `SPREAD_FOLDS` folds.
+
+        The variance of the training trials would not do. Discriminants of many features with little
+        shrinkage draw these together, up to a thousand times closer than new trials.
+        """
+        folds = np.empty(len(X), dtype=np.int64)
+        folds[np.lexsort([y[task] for task in sorted(y)])] = np.arange(len(X)) % SPREAD_FOLDS
+        squares: dict[str, list[float]] = {task: [] for task in self.choices}
+        for fold in range(SPREAD_FOLDS):
+            new = folds == fold
+            others = {task: labels[~new] for task, labels in y.items()}
+            owned = None if own is None else own[~new]
+            fitted = [t for t, c in self.choices.items() if c.counts(others[t], owned).any()]
+            choices = {task: replace(self.choices[task], k=1) for task in fitted}
+            model = ContactClassifier(choices, self.features, self.widths)
+            model.fit(X[~new], others, owned, measured=False)
+            for task, classes in model.classes_.items():
+                met = new & np.isin(y[task], classes)
+                labels = classes.searchsorted(y[task][met])
+                to_rows = model.squares(task, X[met])
+                to_labels = label_distances(to_rows, model.labels_[task], len(classes))
+                squares[task] += to_labels[np.arange(len(labels)), labels].tolist()
+        return {
+            task: float(np.mean(each)) / max(self.components_[task], 1) if any(each) else 1.0
+            for task, each in squares.items()
+        }
 
     def _projection(
         self,
