@@ -155,13 +155,13 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
         if early or last.products_:
             all_squares = build.node("Add", [squares, length])
-            spreads = [point.spreads_[task] for point in points]
-            areas = build.by_decision_point([u**2 / s for u, s in zip(units, spreads, strict=True)])
-            sums = _label_sums(build, output, all_squares, labels, classes)
-            build.node("Mul", [sums, areas], names[f"{task}_label_distances"])
+            slopes = [point.slopes_[task] for point in points]
+            scales = build.by_decision_point([u * s for u, s in zip(units, slopes, strict=True)])
+            roots = _label_distances(build, output, all_squares, labels, classes)
+            build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
 
 
-def _label_sums(
+def _label_distances(
     build: Builder, task: str, squares: str, labels: NDArray[np.int64], classes: int
 ) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n, rows)."""
@@ -174,7 +174,7 @@ def _label_sums(
     nearest, _ = build.nodes("TopK", [own, most], ["", ""], axis=2, largest=0, sorted=1)
     kept = build.node("Where", [taken, nearest, build.constant(0.0)])
     total = build.node("ReduceSum", [kept, build.ints(2)], keepdims=0)
-    return build.node("Div", [total, counts])
+    return build.node("Sqrt", [build.node("Div", [total, counts])])
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
+from scipy.special import expit
 
 from edge.errors import InputError
 from edge.model.agreement import agreed
@@ -43,17 +45,43 @@ def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDAr
 def label_distances(
     squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int
 ) -> NDArray[np.float64]:
-    """(m, classes) mean of the smallest of each label's squares (m, n): `nearest_of_label`."""
+    """(m, classes) distance of each label: the root of the mean of the smallest of its trials'
+    squares (m, n), of as many as `nearest_of_label` says."""
     counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
     for label, count in enumerate(counts):
         own = np.sort(squares[:, labels == label], axis=1)[:, :count]
-        out[:, label] = own.sum(axis=1) / count
+        out[:, label] = np.sqrt(own.sum(axis=1) / count)
     return out
 
 
-SPREAD_FOLDS = 2
-"""Folds that measure how far new trials lie from their labels."""
+def slope(gaps: NDArray[np.float64]) -> float:
+    """By how much the log odds of being right change with the gap, without an intercept.
+
+    The likelihood has one trial more at the mean size of a gap, half right and half wrong, so that
+    it has a maximum.
+
+    Args:
+        gaps: (n,) how much nearer the right label is than any other; below 0 where it is not.
+
+    Returns:
+        Above 0; 1 without a gap.
+    """
+    size = float(np.abs(gaps).mean()) if gaps.any() else 0.0
+    if size == 0.0:
+        return 1.0
+
+    def rise(x: float) -> float:
+        return float((gaps / size * expit(-x * gaps / size)).sum() - 0.5 * np.tanh(0.5 * x))
+
+    least, most = LEAST_SLOPE, len(gaps) + 10.0
+    return float(brentq(rise, least, most) if rise(least) > 0.0 else least) / size
+
+
+SLOPE_FOLDS = 2
+"""Folds that measure how the odds of a label change with its distance."""
+LEAST_SLOPE = 1e-3
+"""Smallest change of the log odds over a mean difference of distances."""
 Space = tuple[object, ...]
 """The settings that two tasks must share to have one projection."""
 
@@ -113,8 +141,8 @@ class Decided(NamedTuple):
 
     Attributes:
         labels: (m,) indices.
-        distances: (m, classes) squared distance of the nearest answer with each label, see
-            `label_distances` and `edge.model.agreement`, as a multiple of `spreads_`.
+        distances: (m, classes) of the nearest answer with each label, see `label_distances`,
+            `ContactClassifier.slopes_` and `edge.model.agreement`.
         nearest: (m,) distance of the nearest trial.
     """
 
@@ -140,8 +168,7 @@ class ContactClassifier:
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
-        spreads_: {task: mean variance of a coordinate of new trials around their labels, from
-            `label_distances` of trials by fits without them}; 1 where there is none.
+        slopes_: {task: by how much the log odds of a label change with its `label_distances`}.
         products_: {task: its factors} of the tasks decided together; see `edge.model.agreement`.
     """
 
@@ -167,7 +194,7 @@ class ContactClassifier:
         Args:
             X, y: the trials; labels are empty where a trial has none.
             own: (n,) whether a trial is the owner's, see `Choice.counts`.
-            measured: whether `spreads_` is measured, which `decide` needs.
+            measured: whether `slopes_` are measured, which `decide` needs.
         """
         X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
@@ -204,24 +231,24 @@ class ContactClassifier:
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
         if measured:
-            self.spreads_ = self._spreads(X, y, own)
+            self.slopes_ = self._slopes(X, y, own)
         return self
 
-    def _spreads(
+    def _slopes(
         self,
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
         own: NDArray[np.bool_] | None,
     ) -> dict[str, float]:
-        """`spreads_`, from fits without each of `SPREAD_FOLDS` folds.
+        """`slopes_`, from the distances of trials by fits without their fold.
 
-        The variance of the training trials would not do. Discriminants of many features with little
-        shrinkage draw these together, up to a thousand times closer than new trials.
+        Distances between training trials would not do. Discriminants of many features with little
+        shrinkage draw the trials of a label up to a hundred times closer together than new ones.
         """
         folds = np.empty(len(X), dtype=np.int64)
-        folds[np.lexsort([y[task] for task in sorted(y)])] = np.arange(len(X)) % SPREAD_FOLDS
-        squares: dict[str, list[float]] = {task: [] for task in self.choices}
-        for fold in range(SPREAD_FOLDS):
+        folds[np.lexsort([y[task] for task in sorted(y)])] = np.arange(len(X)) % SLOPE_FOLDS
+        gaps: dict[str, list[float]] = {task: [] for task in self.choices}
+        for fold in range(SLOPE_FOLDS):
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
             owned = None if own is None else own[~new]
@@ -231,14 +258,14 @@ class ContactClassifier:
             model.fit(X[~new], others, owned, measured=False)
             for task, classes in model.classes_.items():
                 met = new & np.isin(y[task], classes)
-                labels = classes.searchsorted(y[task][met])
-                to_rows = model.squares(task, X[met])
-                to_labels = label_distances(to_rows, model.labels_[task], len(classes))
-                squares[task] += to_labels[np.arange(len(labels)), labels].tolist()
-        return {
-            task: float(np.mean(each)) / max(self.components_[task], 1) if any(each) else 1.0
-            for task, each in squares.items()
-        }
+                if len(classes) > 1 and met.any():
+                    squares = model.squares(task, X[met])
+                    distances = label_distances(squares, model.labels_[task], len(classes))
+                    labels = classes.searchsorted(y[task][met])[:, None]
+                    right = np.take_along_axis(distances, labels, axis=1)[:, 0]
+                    np.put_along_axis(distances, labels, np.inf, axis=1)
+                    gaps[task] += (distances.min(axis=1) - right).tolist()
+        return {task: slope(np.array(each)) for task, each in gaps.items()}
 
     def _projection(
         self,
@@ -293,7 +320,7 @@ class ContactClassifier:
             squares = self.squares(task, X)
             labels[task] = vote(known[self.nearest(task, squares)])
             to_labels = label_distances(squares, known, len(self.classes_[task]))
-            distances[task] = to_labels / self.spreads_[task]
+            distances[task] = to_labels * self.slopes_[task]
             nearest[task] = np.sqrt(squares.min(axis=1))
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)

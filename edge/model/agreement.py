@@ -21,7 +21,7 @@ def agreed(
     Args:
         task: the product.
         factors: of the product.
-        distances: {task: (..., labels) mean squared distances} of the three tasks at least.
+        distances: {task: (..., labels) in log odds} of the three tasks at least.
 
     Returns:
         {task: (...) indices of the answer's labels}, and {task: (..., labels) distance of the

@@ -21,7 +21,7 @@ from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 
 METADATA_KEY = "edge-classify"
-FORMAT = 4
+FORMAT = 5
 OPTIONAL = "decision_points_s stopping novelty joints kernels name trials taught".split()
 """Keys that are left out where they would be empty."""
 

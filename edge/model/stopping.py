@@ -34,18 +34,18 @@ def margin(distances: Sequence[float], label: int) -> float:
     """Evidence for a label: how much farther the training trials of the nearest other one lie.
 
     Args:
-        distances: (labels,) mean squared distances.
+        distances: (labels,) of `edge.model.Decision.label_distances`.
         label: index of the label.
 
     Returns:
-        The difference of the roots. It is minus infinity if the label's own trials are infinitely
-        far away, and 0 if there is no other label.
+        The difference. It is minus infinity if the label's own trials are infinitely far away, and
+        0 if there is no other label.
     """
-    own_distance = math.sqrt(distances[label])
+    own_distance = distances[label]
     others = [d for other, d in enumerate(distances) if other != label]
     if not others:
         return 0.0
-    return math.sqrt(min(others)) - own_distance if own_distance < math.inf else -math.inf
+    return min(others) - own_distance if own_distance < math.inf else -math.inf
 
 
 @dataclass(frozen=True)
