@@ -71,17 +71,18 @@ def slope(gaps: NDArray[np.float64]) -> float:
     if size == 0.0:
         return 1.0
 
-    def rise(x: float) -> float:
-        return float((gaps / size * expit(-x * gaps / size)).sum() - 0.5 * np.tanh(0.5 * x))
+    x, most = gaps / size, len(gaps) + 10.0
 
-    least, most = LEAST_SLOPE, len(gaps) + 10.0
-    return float(brentq(rise, least, most) if rise(least) > 0.0 else least) / size
+    def rise(slope: float) -> float:
+        return float((x * expit(-slope * x)).sum() - 0.5 * np.tanh(0.5 * slope))
+
+    return float(brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE) / size
 
 
 SLOPE_FOLDS = 2
 """Folds that measure how the odds of a label change with its distance."""
 LEAST_SLOPE = 1e-3
-"""Smallest change of the log odds over a mean difference of distances."""
+"""Smallest change of the log odds over the mean size of a gap."""
 Space = tuple[object, ...]
 """The settings that two tasks must share to have one projection."""
 
@@ -258,7 +259,7 @@ class ContactClassifier:
             model.fit(X[~new], others, owned, measured=False)
             for task, classes in model.classes_.items():
                 met = new & np.isin(y[task], classes)
-                if len(classes) > 1 and met.any():
+                if len(classes) > 1:
                     squares = model.squares(task, X[met])
                     distances = label_distances(squares, model.labels_[task], len(classes))
                     labels = classes.searchsorted(y[task][met])[:, None]

@@ -67,9 +67,9 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
             own = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
             assert own.shape[1] == size
-            expected = np.sort(own, axis=1)[:, :count].mean(axis=1) / fitted.spreads_["t"]
+            roots = np.sqrt(np.sort(own, axis=1)[:, :count].mean(axis=1))
             given = model.run(queries, point)["t_label_distances"][:, label]
-            assert given == pytest.approx(expected, rel=1e-12)
+            assert given == pytest.approx(fitted.slopes_["t"] * roots, rel=1e-12)
 
 
 def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):

@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
 from tests.hard_cases.models import features
-from train.pipeline import Choice, ContactClassifier, vote
+from train.pipeline import Choice, ContactClassifier, slope, vote
 from train.projection import Projection
 
 
@@ -46,6 +46,25 @@ def test_a_classifier_answers_every_task_by_the_rules():
     assert (squares.argmin(axis=1) == np.arange(30)).all()
     assert not squares.diagonal().any()
     assert (model.predict(X)["object"] == y["object"]).all()
+
+
+def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
+    """At one size of gap the maximum is known: odds of 8.5 to 2.5 for 8 of 10, by half a trial."""
+    assert slope(np.repeat([2.0, -2.0], [8, 2])) == pytest.approx(np.log(8.5 / 2.5) / 2.0)
+    assert slope(np.full(9, 1e-9)) == pytest.approx(np.log(9.5 / 0.5) * 1e9)
+    assert slope(np.repeat([1.0, -1.0], [1, 8])) == pytest.approx(1e-3)
+    assert slope(np.zeros(3)) == slope(np.zeros(0)) == 1.0
+
+
+def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
+    """Discriminants of 200 columns separate any two labels of 40 trials, but not of new ones."""
+    X, y = np.random.default_rng(0).normal(size=(40, 200)), {"real": np.tile(["a", "b"], 20)}
+    X[::2, 0] += 9.0
+    y["random"] = np.random.default_rng(1).permutation(y["real"])
+    choices = dict.fromkeys(y, Choice("none", 1, 1, "lda", 1e-3))
+    model = ContactClassifier(choices, ["max_force"], [200]).fit(X, y)
+    gaps = {task: np.ptp(each.distances, axis=1) for task, each in model.decide(X).items()}
+    assert gaps["random"].max() < 2.0 < gaps["real"].min()
 
 
 @pytest.mark.parametrize(
