@@ -17,7 +17,7 @@ from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
-from train.pipeline import Choice, ContactClassifier
+from train.pipeline import Choice, ContactClassifier, able
 from train.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines, picture
@@ -98,12 +98,7 @@ def _left_out(
         train = others[quarter_of <= quarter]
         owned = None if own is None else own[train]
         known = {name: labels[train] for name, labels in y.items()}
-        counts = {name: (c.counts(known[name], owned) > 0).sum() for name, c in choices.items()}
-        fewer = {
-            name: replace(choice, k=min(choice.k, counts[name]))
-            for name, choice in choices.items()
-            if counts[name]
-        }
+        fewer = able(choices, known, owned)
         model = ContactClassifier(fewer, features, widths).fit(X[train], known, owned)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]

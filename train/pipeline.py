@@ -20,7 +20,7 @@ from edge.errors import InputError
 from edge.model.agreement import agreed
 from edge.model.teaching import nearest_of_label
 from edge.touch.features import FEATURES
-from train.agreement import factors_of
+from train.agreement import Labels, factors_of
 from train.projection import Projection
 from train.scaling import finite, widths_of
 
@@ -79,7 +79,7 @@ def slope(gaps: NDArray[np.float64]) -> float:
     return float(brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE) / size
 
 
-SLOPE_FOLDS = 2
+SLOPE_FOLDS = 5
 """Folds that measure how the odds of a label change with its distance."""
 LEAST_SLOPE = 1e-3
 """Smallest change of the log odds over the mean size of a gap."""
@@ -137,6 +137,18 @@ class Choice:
         return np.where(labels == "", 0, counts)
 
 
+def able(
+    choices: Mapping[str, Choice], y: Labels, own: NDArray[np.bool_] | None
+) -> dict[str, Choice]:
+    """The choices of the tasks that some trials of y have labels for, with at most as many k.
+
+    Args:
+        choices, y, own: see `ContactClassifier.fit`.
+    """
+    counts = {task: int((c.counts(y[task], own) > 0).sum()) for task, c in choices.items()}
+    return {t: replace(c, k=min(c.k, counts[t])) for t, c in choices.items() if counts[t]}
+
+
 class Decided(NamedTuple):
     """A task's decisions on some vectors.
 
@@ -186,7 +198,7 @@ class ContactClassifier:
     def fit(
         self,
         X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
+        y: Labels,
         own: NDArray[np.bool_] | None = None,
         measured: bool = True,
     ) -> ContactClassifier:
@@ -236,10 +248,7 @@ class ContactClassifier:
         return self
 
     def _slopes(
-        self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
-        own: NDArray[np.bool_] | None,
+        self, X: NDArray[np.float64], y: Labels, own: NDArray[np.bool_] | None
     ) -> dict[str, float]:
         """`slopes_`, from the distances of trials by fits without their fold.
 
@@ -253,8 +262,7 @@ class ContactClassifier:
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
             owned = None if own is None else own[~new]
-            fitted = [t for t, c in self.choices.items() if c.counts(others[t], owned).any()]
-            choices = {task: replace(self.choices[task], k=1) for task in fitted}
+            choices = able(self.choices, others, owned)
             model = ContactClassifier(choices, self.features, self.widths)
             model.fit(X[~new], others, owned, measured=False)
             for task, classes in model.classes_.items():
@@ -273,7 +281,7 @@ class ContactClassifier:
         space: Space,
         widths: Sequence[int],
         X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
+        y: Labels,
         trials: NDArray[np.int64],
     ) -> Projection:
         """The projection of a space, fitted on some trials, of which one may be there often."""
@@ -328,13 +336,6 @@ class ContactClassifier:
             labels |= together
             distances |= nearest_answers
         return {task: Decided(labels[task], distances[task], nearest[task]) for task in labels}
-
-    def predict(self, X: NDArray[np.float64]) -> dict[str, NDArray[np.str_]]:
-        """{task: (m,) labels} for vectors (m, p), each task's own vote."""
-        return {
-            task: self.classes_[task][vote(labels[self.nearest(task, self.squares(task, X))])]
-            for task, labels in self.labels_.items()
-        }
 
 
 def columns_of(

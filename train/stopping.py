@@ -23,6 +23,7 @@ for a trained object is an error of it too.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,8 +111,9 @@ def _fold(
 ) -> Answers:
     others = {task: y[task][~left_out] for task in y}
     owned = None if own is None else own[~left_out]
-    models = _models(X[:, ~left_out], others, choices, features, widths, owned)
+    model = partial(ContactClassifier, choices, features, widths)
     with single_thread():
+        models = [model().fit(x, others, owned) for x in X[:, ~left_out]]
         return answers(models, X[:, left_out])
 
 
@@ -229,7 +231,9 @@ class SequentialClassifier:
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
         types = types_of(kept, self.features, widths)
-        self.decision_points_ = _models(X[..., self.columns_], y, self.choices, *types, own)
+        model = partial(ContactClassifier, self.choices, *types)
+        with single_thread():
+            self.decision_points_ = [model().fit(x, y, own) for x in X[..., self.columns_]]
         self.n_features_in_ = len(self.columns_)
         form = self.features, self.widths
         by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
@@ -317,18 +321,6 @@ def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
     """The features that some choice takes, in their order."""
     taken = set().union(*(choice.features or features for choice in choices))
     return [name for name in features if name in taken]
-
-
-def _models(
-    X: NDArray[np.float64],
-    y: Mapping[str, NDArray[np.str_]],
-    choices: Mapping[str, Choice],
-    features: Sequence[str],
-    widths: Sequence[int] | None,
-    own: NDArray[np.bool_] | None,
-) -> list[ContactClassifier]:
-    with single_thread():
-        return [ContactClassifier(choices, features, widths).fit(x, y, own) for x in X]
 
 
 def calibrated(

@@ -70,16 +70,11 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
     folds = stratified_folds(labels)
-    # A projection of no component that tells: the fold it serves is guessed.
-    worse = X.copy()
-    worse[:, :, 0] = 0.0
     choices = {"t": Choice("none", 3, 3)}
     bad = {"t": Choice("none", 1, 59 - int((folds == 0).sum()))}
-    count = int(folds.max()) + 1
-    model = SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
-        X, {"t": labels}, folds, [bad, *[choices] * (count - 1)]
-    )
-    right = model.right_["t"][-1]
+    without = [bad, *[choices] * 9]
+    model = SequentialClassifier(choices, SECONDS, ("max_force",))
+    right = model.fit(X, {"t": labels}, folds, without).right_["t"][-1]
     assert right[folds != 0].all()
     assert not right[folds == 0].all()
 
@@ -120,12 +115,10 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     X, labels = touches(60)
     names = ("max_force", "contact_area")
     folds = stratified_folds(labels)
-    count = int(folds.max()) + 1
     blind = {"t": Choice("none", 3, 3, features=names[1:])}
     seeing = {"t": Choice("none", 3, 3, features=names[:1])}
-    model = SequentialClassifier(blind, SECONDS, names).fit(
-        X, {"t": labels}, folds, [seeing] * count
-    )
+    model = SequentialClassifier(blind, SECONDS, names)
+    model.fit(X, {"t": labels}, folds, [seeing] * 10)
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()

@@ -7,14 +7,6 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.arm import Chain, Joint
-from tests.edge.touch.test_urdf import ARM
-
-
-@pytest.fixture
-def urdf(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(ARM)
-    return path
 
 
 def test_a_urdf_chain_agrees_with_yourdfpy(urdf):

@@ -1,24 +1,19 @@
 """Geometry of a skin against the real one's taxel positions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout
+from tests.conftest import FOREARM
 
 ANGLES = [-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05]
 ANGLES += [97.95, 112.75, 127.56, 142.78, 157.58, 172.39]
 ANGLES += [-172.39, -157.58, -142.78, -127.56, -112.75, -97.95]
 
-CODY = SkinLayout(
-    rows=16,
-    cols=24,
-    wraps=True,
-    pitch_m=(0.0108, 0.01205),
-    radius_m=0.0460375,
-    row0_z_m=0.18432,
-    column_angles_deg=tuple(ANGLES),
-)
+CODY = replace(FOREARM, radius_m=0.0460375, column_angles_deg=tuple(ANGLES))
 
 
 def test_taxels_lie_where_those_of_the_real_forearm_lie(real):

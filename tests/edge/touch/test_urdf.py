@@ -23,13 +23,6 @@ ARM = """<?xml version="1.0"?>
 </robot>"""
 
 
-@pytest.fixture
-def urdf(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(ARM)
-    return path
-
-
 def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_file(urdf):
     given = [joint["name"] for joint in joints_between(urdf, "base", "lower")]
     assert given == ["shoulder", "bracket", "elbow"]
