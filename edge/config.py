@@ -57,7 +57,10 @@ def parse_json(text: str | bytes, where: str) -> Any:
         InputError: it is not JSON, or not UTF-8; the message begins with `where`.
     """
     with parsing(where, "JSON"):
-        return _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
+        value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
+        # An escaped half of a surrogate pair is text that no file or terminal takes.
+        json.dumps(value, ensure_ascii=False).encode()
+        return value
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:

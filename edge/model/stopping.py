@@ -43,9 +43,8 @@ def margin(distances: Sequence[float], label: int) -> float:
     """
     own_distance = distances[label]
     others = [d for other, d in enumerate(distances) if other != label]
-    if not others:
-        return 0.0
-    return min(others) - own_distance if own_distance < math.inf else -math.inf
+    nearest_other = min(others, default=own_distance)
+    return nearest_other - own_distance if own_distance < math.inf else -math.inf
 
 
 @dataclass(frozen=True)

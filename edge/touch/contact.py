@@ -129,7 +129,10 @@ class Contact:
         if self._rows and age_s <= self.age_s:
             # Two readings of one instant: the later one counts.
             age_s = self.age_s
-            self._forget_last()
+            self._rows.pop()
+            for name in tuple(self._starts):
+                if not any(math.isfinite(row[name]) for row in self._rows):
+                    del self._starts[name]
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         zones = measurer.measure(active, region)
@@ -172,12 +175,6 @@ class Contact:
         if not finite.all():
             raise InputError(f"angle {int(finite.argmin())} of a frame's joints is not finite")
         return frame.joints.copy()
-
-    def _forget_last(self) -> None:
-        self._rows.pop()
-        for name in tuple(self._starts):
-            if not any(math.isfinite(row[name]) for row in self._rows):
-                del self._starts[name]
 
     def _distance(
         self, name: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
