@@ -79,7 +79,7 @@ def slope(gaps: NDArray[np.float64]) -> float:
     return float(brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE) / size
 
 
-SLOPE_FOLDS = 5
+SLOPE_FOLDS = 3
 """Folds that measure how the odds of a label change with its distance."""
 LEAST_SLOPE = 1e-3
 """Smallest change of the log odds over the mean size of a gap."""
@@ -200,14 +200,14 @@ class ContactClassifier:
         X: NDArray[np.float64],
         y: Labels,
         own: NDArray[np.bool_] | None = None,
-        measured: bool = True,
+        complete: bool = True,
     ) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for it.
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
             own: (n,) whether a trial is the owner's, see `Choice.counts`.
-            measured: whether `slopes_` are measured, which `decide` needs.
+            complete: whether `slopes_` and `products_` are found, which `decide` needs.
         """
         X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
@@ -233,8 +233,6 @@ class ContactClassifier:
         }
         self.members_ = {space: np.flatnonzero(each) for space, each in counts.items()}
         self.rows_ = {s: self.project(s, X[members]) for s, members in self.members_.items()}
-        used = {t: np.where(counts[space] > 0, y[t], "") for t, space in self.spaces_.items()}
-        self.products_ = factors_of(used)
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
@@ -243,7 +241,9 @@ class ContactClassifier:
             self.classes_[task], self.labels_[task] = np.unique(labels, return_inverse=True)
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
-        if measured:
+        if complete:
+            used = {t: np.where(counts[space] > 0, y[t], "") for t, space in self.spaces_.items()}
+            self.products_ = factors_of(used)
             self.slopes_ = self._slopes(X, y, own)
         return self
 
@@ -264,7 +264,7 @@ class ContactClassifier:
             owned = None if own is None else own[~new]
             choices = able(self.choices, others, owned)
             model = ContactClassifier(choices, self.features, self.widths)
-            model.fit(X[~new], others, owned, measured=False)
+            model.fit(X[~new], others, owned, complete=False)
             for task, classes in model.classes_.items():
                 met = new & np.isin(y[task], classes)
                 if len(classes) > 1:

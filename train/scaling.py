@@ -15,14 +15,6 @@ SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
 """Sizes of scaled features whose grid steps and squares are ordinary float64 numbers."""
 
 
-def _exponents(X: NDArray[np.float64], axes: tuple[int, ...]) -> NDArray[np.int32]:
-    """The powers of two that bring the largest entries along some axes near 1.
-
-    Multiplied by them, nothing is rounded, and neither sums nor squares leave float64.
-    """
-    return np.asarray(np.frexp(np.abs(X).max(axis=axes, initial=0.0))[1])
-
-
 def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
     """X (n, p), rows in a row of memory.
 
@@ -38,8 +30,11 @@ def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(p,) mean of each column of X (n, p), also where its sum would overflow."""
-    powers = _exponents(X, (0,))
+    """(p,) mean of each column of X (n, p), also where its sum would overflow.
+
+    A power of two brings each column's largest entry near 1. It rounds nothing.
+    """
+    powers = np.frexp(np.abs(X).max(axis=0, initial=0.0))[1]
     return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
 
 
@@ -87,15 +82,14 @@ def scale_of(
     Raises:
         InputError: the method is unknown, or the columns are not those of the features.
     """
-    types = len(features)
-    ends = np.cumsum(widths_of(X.shape[1], features, widths))
+    types, sizes = len(features), np.array(widths_of(X.shape[1], features, widths))
     if method in ("none", "III"):
         return np.ones(types)
-    blocks = np.split(X, ends[:-1], axis=1)
-    powers = np.array([_exponents(block, (0, 1)) for block in blocks], dtype=np.int32)
-    small = [np.ldexp(block, -power) for block, power in zip(blocks, powers, strict=True)]
-    mean = np.array([block.mean() for block in small])
-    largest = np.array([np.abs(block).max(initial=0.0) for block in small])
+    starts = np.cumsum(sizes) - sizes
+    powers = np.frexp(np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts))[1]
+    small = np.ldexp(X, -np.repeat(powers, sizes))
+    means = small.mean(axis=0)
+    largest = np.maximum.reduceat(np.abs(small).max(axis=0, initial=0.0), starts)
 
     def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
         gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
@@ -105,13 +99,12 @@ def scale_of(
     if method in ("I", "II"):
         return inverse(largest)
     if method == "IV":
-        squares = []
-        for name, block, middle in zip(features, small, mean, strict=True):
-            # Each cell or joint has a level of its own, which says nothing about a trial: a wide
-            # feature deviates from each column's mean.
-            middles = block.mean(axis=0) if feature(name).wide else middle
-            squares.append(((block - middles) ** 2).mean())
-        deviation = np.sqrt(squares)
+        # Each cell or joint has a level of its own, which says nothing about a trial: a wide
+        # feature deviates from each column's mean.
+        wide = np.repeat([feature(name).wide for name in features], sizes)
+        of_type = np.add.reduceat(means, starts) / sizes
+        squares = ((small - np.where(wide, means, np.repeat(of_type, sizes))) ** 2).mean(axis=0)
+        deviation = np.sqrt(np.add.reduceat(squares, starts) / sizes)
         # A spread below the rounding of its own mean is no spread.
         deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
         return inverse(deviation)

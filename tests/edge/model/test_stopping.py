@@ -42,7 +42,7 @@ def test_the_fastest_rule_that_is_certified_is_taken():
 
 def test_confidence_is_the_logistic_function_of_the_margin():
     assert stopping().confidence(0, [1.0, 2.0], 0) == pytest.approx(1 / (1 + math.exp(-1)))
-    assert stopping().confidence(2, [1.0, 3.0], 1) == pytest.approx(1 / (1 + math.exp(3)))
+    assert stopping().confidence(2, [1.0, 2.0], 1) == pytest.approx(1 / (1 + math.exp(3)))
 
 
 @pytest.mark.parametrize(("far", "expected"), [((0.0, 1e300), 1.0), ((1e300, 0.0), 0.0)])
