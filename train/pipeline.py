@@ -81,6 +81,8 @@ def slope(gaps: NDArray[np.float64]) -> float:
 
 SLOPE_FOLDS = 3
 """Folds that measure how the odds of a label change with its distance."""
+ENOUGH_GAPS = 500
+"""Trials from which on no further fold is measured."""
 LEAST_SLOPE = 1e-3
 """Smallest change of the log odds over the mean size of a gap."""
 Space = tuple[object, ...]
@@ -259,6 +261,8 @@ class ContactClassifier:
         folds[np.lexsort([y[task] for task in sorted(y)])] = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
+            if fold * len(X) >= SLOPE_FOLDS * ENOUGH_GAPS:
+                break
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
             owned = None if own is None else own[~new]
