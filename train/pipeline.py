@@ -81,8 +81,8 @@ def slope(gaps: NDArray[np.float64]) -> float:
 
 SLOPE_FOLDS = 3
 """Folds that measure how the odds of a label change with its distance."""
-ENOUGH_GAPS = 500
-"""Trials from which on no further fold is measured."""
+MOST_MEASURED = 1000
+"""Of more trials, every second, third and so on is measured."""
 LEAST_SLOPE = 1e-3
 """Smallest change of the log odds over the mean size of a gap."""
 Space = tuple[object, ...]
@@ -257,15 +257,14 @@ class ContactClassifier:
         Distances between training trials would not do. Discriminants of many features with little
         shrinkage draw the trials of a label up to a hundred times closer together than new ones.
         """
-        folds = np.empty(len(X), dtype=np.int64)
-        folds[np.lexsort([y[task] for task in sorted(y)])] = np.arange(len(X)) % SLOPE_FOLDS
+        measured = np.lexsort([y[task] for task in sorted(y)])[:: -(-len(X) // MOST_MEASURED)]
+        X, y = X[measured], {task: labels[measured] for task, labels in y.items()}
+        folds = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
-            if fold * len(X) >= SLOPE_FOLDS * ENOUGH_GAPS:
-                break
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
-            owned = None if own is None else own[~new]
+            owned = None if own is None else own[measured][~new]
             choices = able(self.choices, others, owned)
             model = ContactClassifier(choices, self.features, self.widths)
             model.fit(X[~new], others, owned, complete=False)
