@@ -50,6 +50,13 @@ def _finite(text: str) -> float:
 _DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_finite, parse_constant=_finite)
 
 
+def _decoded(text: str | bytes) -> Any:
+    """The value of a JSON text; half of a surrogate pair raises UnicodeError, as UTF-8 has none."""
+    value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
+    json.dumps(value, ensure_ascii=False).encode()
+    return value
+
+
 def parse_json(text: str | bytes, where: str) -> Any:
     """The value of a JSON text; every number in it is finite.
 
@@ -57,10 +64,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
         InputError: it is not JSON, or not UTF-8; the message begins with `where`.
     """
     with parsing(where, "JSON"):
-        value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
-        # An escaped half of a surrogate pair is text that no file or terminal takes.
-        json.dumps(value, ensure_ascii=False).encode()
-        return value
+        return _decoded(text)
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
@@ -81,9 +85,8 @@ def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[An
             a missing key or a wrong type. The message then says that the file is not `kind`, and
             ends with the remedy `mend`.
     """
-    text = read_bytes(path)
     with parsing(os.fspath(path), kind, f"; {mend}"):
-        yield _DECODER.decode(text.decode())
+        yield _decoded(read_bytes(path))
 
 
 class ConfigTable:

@@ -17,7 +17,7 @@ from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
-from train.pipeline import Choice, ContactClassifier, able
+from train.pipeline import Choice, ContactClassifier, fittable
 from train.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines, picture
@@ -98,7 +98,7 @@ def _left_out(
         train = others[quarter_of <= quarter]
         owned = None if own is None else own[train]
         known = {name: labels[train] for name, labels in y.items()}
-        fewer = able(choices, known, owned)
+        fewer = fittable(choices, known, owned)
         model = ContactClassifier(fewer, features, widths).fit(X[train], known, owned)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]

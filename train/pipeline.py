@@ -45,8 +45,11 @@ def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDAr
 def label_distances(
     squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int
 ) -> NDArray[np.float64]:
-    """(m, classes) distance of each label: the root of the mean of the smallest of its trials'
-    squares (m, n), of as many as `nearest_of_label` says."""
+    """(m, classes) distance of each label, from squared distances (m, n) to the trials.
+
+    It is the root of the mean square to the label's nearest trials; `nearest_of_label` says to how
+    many.
+    """
     counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
     for label, count in enumerate(counts):
@@ -70,11 +73,10 @@ def slope(gaps: NDArray[np.float64]) -> float:
     size = float(np.abs(gaps).mean()) if gaps.any() else 0.0
     if size == 0.0:
         return 1.0
-
     x, most = gaps / size, len(gaps) + 10.0
 
-    def rise(slope: float) -> float:
-        return float((x * expit(-slope * x)).sum() - 0.5 * np.tanh(0.5 * slope))
+    def rise(change: float) -> float:
+        return float((x * expit(-change * x)).sum() - 0.5 * np.tanh(0.5 * change))
 
     return float(brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE) / size
 
@@ -139,10 +141,10 @@ class Choice:
         return np.where(labels == "", 0, counts)
 
 
-def able(
+def fittable(
     choices: Mapping[str, Choice], y: Labels, own: NDArray[np.bool_] | None
 ) -> dict[str, Choice]:
-    """The choices of the tasks that some trials of y have labels for, with at most as many k.
+    """The choices of the tasks that y has labels for, with k at most the number of their trials.
 
     Args:
         choices, y, own: see `ContactClassifier.fit`.
@@ -209,7 +211,7 @@ class ContactClassifier:
         Args:
             X, y: the trials; labels are empty where a trial has none.
             own: (n,) whether a trial is the owner's, see `Choice.counts`.
-            complete: whether `slopes_` and `products_` are found, which `decide` needs.
+            complete: whether to set `slopes_` and `products_`, which `decide` needs.
         """
         X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
@@ -259,17 +261,19 @@ class ContactClassifier:
         """
         measured = np.lexsort([y[task] for task in sorted(y)])[:: -(-len(X) // MOST_MEASURED)]
         X, y = X[measured], {task: labels[measured] for task, labels in y.items()}
+        own = None if own is None else own[measured]
         folds = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
-            owned = None if own is None else own[measured][~new]
-            choices = able(self.choices, others, owned)
+            owned = None if own is None else own[~new]
+            choices = fittable(self.choices, others, owned)
             model = ContactClassifier(choices, self.features, self.widths)
             model.fit(X[~new], others, owned, complete=False)
             for task, classes in model.classes_.items():
-                met = new & np.isin(y[task], classes)
+                used = self.choices[task].counts(y[task], own) > 0
+                met = new & used & np.isin(y[task], classes)
                 if len(classes) > 1:
                     squares = model.squares(task, X[met])
                     distances = label_distances(squares, model.labels_[task], len(classes))

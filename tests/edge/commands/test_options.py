@@ -8,7 +8,6 @@ import pytest
 from edge import recording
 from edge.cli import main
 from edge.touch.arm import Chain
-from tests.edge.touch.test_urdf import ARM
 
 
 @pytest.mark.parametrize(
@@ -28,9 +27,8 @@ def test_a_value_that_an_option_does_not_take_is_refused(options, said, capsys):
 
 
 @pytest.fixture
-def files(tmp_path, make_touch):
+def files(tmp_path, make_touch, urdf):
     """A URDF of two joints, and a recording of as many angles that names no arm."""
-    (tmp_path / "arm.urdf").write_text(ARM)
     (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
     trial = make_touch()
     swing = np.linspace(0.0, 0.2, len(trial.t))
