@@ -211,7 +211,7 @@ def report(tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     top = argparse.ArgumentParser(prog="bench.risk", description=__doc__)
-    top.add_argument("--sets", type=int, default=160, help="data sets drawn (%(default)s)")
+    top.add_argument("--sets", type=int, default=140, help="data sets drawn (%(default)s)")
     top.add_argument("--trials", type=int, default=140, help="trials of each (%(default)s)")
     top.add_argument("--seed", type=int, default=0)
     top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
