@@ -37,18 +37,18 @@ WITH_JOINTS = (
     ("moments", "zone_kernels", "joints"),
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave way."""
-DRAWN = (("paper",), ("contact",))
-DRAWN_WITH_JOINTS = (*DRAWN, ("contact", "joints"))
-"""Those for touches of simulated things that are drawn from kinds (`kinds_of`). Joint angles at
+DRAWN, DRAWN_WITH_JOINTS = ("contact",), ("contact", "joints")
+"""The one for touches of simulated things that are drawn from kinds (`kinds_of`). Joint angles at
 onset and single taxels say how the scene is built. Moments say how large and of what form a
-contact is, in which simulators of soft things differ most."""
+contact is, in which simulators of soft things differ most. How far the joints are turned back is
+a second measure of how the thing gave way, on which another skin has no influence."""
 QUICK = 3
 """Combinations tried by a quick choice, from the first on."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
 QUICK_SHRINKAGES = (0.3, 0.03)
 FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
-DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
+DRAWN_SHRINKAGES, DRAWN_DIRECTIONS = (1.0, 0.3), 10
 """Those tried for touches of simulated things of several kinds, and the most discriminants. Another
 physics differs most in differences that are small beside the features' spread."""
 
@@ -105,20 +105,20 @@ def candidates(
     """
     combinations_tried: Sequence[tuple[str, ...]] = WITH_JOINTS if joints else PLAIN
     if drawn:
-        combinations_tried = DRAWN_WITH_JOINTS if joints else DRAWN
+        combinations_tried = [DRAWN_WITH_JOINTS if joints else DRAWN]
     if quick:
         combinations_tried = combinations_tried[:QUICK]
     if features is not None:
         combinations_tried = [tuple(features)]
     shrinkages = DRAWN_SHRINKAGES if drawn else QUICK_SHRINKAGES if quick else SHRINKAGES
-    counts = DRAWN_COMPONENTS if drawn else COMPONENTS
     tried = []
     for sets in combinations_tried:
         for kind in KINDS if projection is None else (projection,):
             paper = sets == ("paper",)
-            # By default discriminants are not tried for the paper's few features, and a quick
-            # choice tries discriminants alone for the others.
-            untried = kind == "lda" if paper else kind == "pca" and quick
+            # By default discriminants are not tried for the paper's few features. A quick choice
+            # tries discriminants alone for the others. So does one for simulated things, because
+            # principal components do not hold back the coordinates in which simulators differ.
+            untried = kind == "lda" if paper else kind == "pca" and (quick or drawn)
             if features is None and projection is None and untried:
                 continue
             thorough = features is not None and kind == "pca"
@@ -127,9 +127,9 @@ def candidates(
             grid = SearchGrid(
                 projection=kind,
                 features=expand(sets),
-                components=counts if components is None else (components,),
+                components=COMPONENTS if components is None else (components,),
                 shrinkages=shrinkages,
-                most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
+                most_directions=DRAWN_DIRECTIONS if drawn else None,
                 neighbours=neighbours if k is None else (k,),
             )
             pairs = {} if kind == "pca" else known_products(y)
