@@ -38,17 +38,17 @@ WITH_JOINTS = (
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave way."""
 DRAWN, DRAWN_WITH_JOINTS = ("contact",), ("contact", "joints")
-"""The one for touches of simulated things that are drawn from kinds (`kinds_of`). Joint angles at
-onset and single taxels say how the scene is built. Moments say how large and of what form a
-contact is, in which simulators of soft things differ most. How far the joints are turned back is
-a second measure of how the thing gave way, on which another skin has no influence."""
+"""The combination tried for touches of simulated things that are drawn from kinds (`kinds_of`).
+Joint angles at onset and single taxels say how the scene is built. Moments say how large and of
+what form a contact is, in which simulators of soft things differ most. How far the contact turns
+the joints back is a second measure of how the thing gives way, whatever the skin."""
 QUICK = 3
 """Combinations tried by a quick choice, from the first on."""
 COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
 QUICK_SHRINKAGES = (0.3, 0.03)
 FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
-DRAWN_SHRINKAGES, DRAWN_DIRECTIONS = (1.0, 0.3), 10
+DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
 """Those tried for touches of simulated things of several kinds, and the most discriminants. Another
 physics differs most in differences that are small beside the features' spread."""
 
@@ -111,6 +111,7 @@ def candidates(
     if features is not None:
         combinations_tried = [tuple(features)]
     shrinkages = DRAWN_SHRINKAGES if drawn else QUICK_SHRINKAGES if quick else SHRINKAGES
+    counts = DRAWN_COMPONENTS if drawn else COMPONENTS
     tried = []
     for sets in combinations_tried:
         for kind in KINDS if projection is None else (projection,):
@@ -127,9 +128,9 @@ def candidates(
             grid = SearchGrid(
                 projection=kind,
                 features=expand(sets),
-                components=COMPONENTS if components is None else (components,),
+                components=counts if components is None else (components,),
                 shrinkages=shrinkages,
-                most_directions=DRAWN_DIRECTIONS if drawn else None,
+                most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
                 neighbours=neighbours if k is None else (k,),
             )
             pairs = {} if kind == "pca" else known_products(y)

@@ -59,6 +59,7 @@ def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
         assert min(min(grid.shrinkages) for grid in grids) == 0.3
         # Ten directions at most: as many as the most components.
         assert {grid.most_directions for grid in grids} == {10}
+        assert max(max(grid.components) for grid in grids) == 10
     plain = [grid for candidate in candidates(TASKS) for grid in candidate.grids]
     assert min(min(grid.shrinkages) for grid in plain) < 0.3
     assert {grid.most_directions for grid in plain} == {None}
