@@ -37,7 +37,6 @@ from sklearn.preprocessing import StandardScaler
 from edge.cli import dispatch
 from edge.model.stopping import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
-from train.agreement import factors_of
 from train.dataset import read
 from train.evaluate import stratified_folds
 from train.feature_sets import expand
@@ -45,7 +44,7 @@ from train.rules import NEVER, THRESHOLDS, Course
 from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
-from train.tradeoff.early import FOLDS, StoppingComparison, compare_stopping
+from train.tradeoff.early import FOLDS, compare_stopping
 
 SECONDS = np.array(DECISION_POINTS_S)
 RATE_HZ = 100
@@ -156,9 +155,8 @@ def cell(percentage: float) -> str:
     return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
-def when_sure(parts: Sequence[StoppingComparison]) -> Curve:
-    """Stopping at each threshold, of a task that is decided when each of these is sure."""
-    course = Course([p.confidence for p in parts], [~p.right for p in parts], parts[0].unknown)
+def when_sure(course: Course) -> Curve:
+    """Stopping at each threshold."""
     curve = []
     for threshold in (NEVER, *THRESHOLDS.tolist()):
         stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1))
@@ -185,7 +183,7 @@ def run(arguments: argparse.Namespace) -> int:
     table = ["| task | rule | mean time, s | % wrong | when sure, at that time |", "|---" * 5 + "|"]
     for (task, ours), (curves, points) in zip(compared.items(), others, strict=True):
         fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
-        sure = when_sure([compared[factor] for factor in factors_of(y).get(task, [task])])
+        sure = when_sure(ours.course)
         for seconds in DECISION_POINTS_S:
             waited, stopped, *others_wrong = (at(way, seconds) for way in (fixed, sure, *curves))
             error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)

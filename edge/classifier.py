@@ -14,7 +14,7 @@ from edge.errors import InputError, OutOfRange
 from edge.events import Decided, Event, Onset, Release
 from edge.model.agreement import product_label
 from edge.model.model import Decision, Model, require_joints
-from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate
+from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate, margin
 from edge.recording import Recording
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -310,10 +310,10 @@ class Classifier:
             decision = decision._replace(label=label)
         elif error is not None:
             assert decision.label_distances is not None
-            confidence = info.stopping[blank.task].confidence(
-                at, decision.label_distances.tolist(), task.labels.index(label)
-            )
-            sure = rule is not None and confidence >= rule.confidence
+            stopping = info.stopping[blank.task]
+            evidence = margin(decision.label_distances.tolist(), task.labels.index(label))
+            confidence = stopping.confidence(at, evidence)
+            sure = rule is not None and stopping.sure(rule, evidence)
             full = len(self.model.decision_points_s) - 1
             last = full if rule is None or unknown else rule.last
             if at < last and (unknown or not sure):

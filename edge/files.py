@@ -54,10 +54,6 @@ def refusing(action: str) -> Iterator[None]:
         raise InputError(f"{action}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK)
-
-
 @contextmanager
 def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
     """Open a regular file for reading. Reading a FIFO could wait, and a device may never end.
@@ -68,7 +64,7 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
     name = os.fspath(path)
     with refusing(f"{name}: cannot be read"):
         # Without O_NONBLOCK, opening a FIFO waits until another process opens it for writing.
-        file = open(name, "rb", opener=_without_waiting)  # noqa: SIM115
+        file = open(name, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))  # noqa: SIM115
     with file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):

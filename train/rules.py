@@ -52,7 +52,7 @@ def stops(
     """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
 
     Args:
-        confidence: (points, n) that the labels are right.
+        confidence: (points, n) that the labels are right, by the curve of all points.
         rule: the rule.
         unknown: (points, n) whether the contact is unlike all trained ones, and so waits.
     """
@@ -67,8 +67,9 @@ class Course:
     """The answers of a task at each decision point, and how sure they are.
 
     Attributes:
-        confidences: (decision points, n), of each part. A product of two tasks has these as its
-            parts, and is decided when both are; any other task is its only part.
+        confidences: (decision points, n) of each part, by its curve of all points. The parts of a
+            product are its two factors, and it is decided when both are; any other task is its only
+            part.
         wrong: (decision points, n) of each part.
         unknown: (decision points, n) whether the contact is unlike all trained ones.
         withheld: whether the task names nothing for an unknown contact.

@@ -12,7 +12,9 @@ machines, 1999). A label's distance is that of its nearest twentieth
 (`train.pipeline.label_distances`). So it is the same for the folds' models, which have fewer
 trials, as for the exported one.
 
-**Rules** are certified by `train.rules`.
+**Rules** are certified by `train.rules`. They compare the confidences of all decision points with
+one threshold, so these come from one logistic regression on all points together. With a curve for
+each point, an early point hardly reaches the threshold, and clear contacts wait as long as others.
 
 A touch that is unlike the training data at a decision point waits, for the full window if it stays
 so: rules are tested with this wait, at `NOVELTY_RATE` and with the other folds' limits for a fold's
@@ -118,7 +120,8 @@ def _fold(
 
 
 def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[float, float]:
-    """Slope (above 0) and intercept of P(right) as a logistic function of the margins (n,)."""
+    """Slope (above 0) and intercept of P(right) as a logistic function of margins of any shape."""
+    margins, right = margins.ravel(), right.ravel()
     middle, spread = float(margins.mean()), float(margins.std()) or 1.0
     columns = np.stack([(margins - middle) / spread, np.ones_like(margins)], axis=1)
     prior = np.array([1.0, 0.0])
@@ -252,11 +255,11 @@ class SequentialClassifier:
             unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self.novelty_ = novelty(most, nearest[:, tested[most]])
-        confidence = {
-            task: calibrated(margins[task], right[task], folds, tested[task])
+        scores = {
+            task: cross_fitted(margins[task], right[task], folds, tested[task])
             for task in self.choices
         }
-        courses = self._courses(confidence, right, unknown, tested)
+        courses = self._courses(scores, right, unknown, tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -264,10 +267,11 @@ class SequentialClassifier:
                 rules[factor] = following(rules[factor], rules[task], courses[factor], seconds)
         self.stopping_ = {}
         for task, tests in tested.items():
-            slopes, intercepts = curves(margins[task][:, tests], right[task][:, tests])
+            known = margins[task][:, tests], right[task][:, tests]
             _, wrong = courses[task].under(candidates(len(seconds))[0])
+            n, errors = len(wrong), int(wrong.sum())
             self.stopping_[task] = Stopping(
-                slopes, intercepts, tuple(rules[task]), len(wrong), int(wrong.sum()), RISK
+                *curves(*known), *logistic(*known), tuple(rules[task]), n, errors, RISK
             )
         return self
 
@@ -287,23 +291,24 @@ class SequentialClassifier:
         """
         with single_thread():
             answered = answers(self.decision_points_, X)
-        confidence = {
-            task: confidences(self.stopping_[task].slopes, self.stopping_[task].intercepts, margins)
-            for task, (_, margins, _) in answered.items()
-        }
+        confidence, scores = {}, {}
+        for task, (_, margins, _) in answered.items():
+            stopping = self.stopping_[task]
+            confidence[task] = confidences(stopping.slopes, stopping.intercepts, margins)
+            scores[task] = confidences([stopping.slope], [stopping.intercept], margins)
         right = {task: labels == y[task] for task, (labels, *_) in answered.items()}
         unknown = unlike(self.novelty_, answered[self.novelty_.task][2])
         tested = {task: y[task] != "" for task in right}
-        return right, confidence, self._courses(confidence, right, unknown, tested)
+        return right, confidence, self._courses(scores, right, unknown, tested)
 
     def _courses(
         self,
-        confidence: Mapping[str, NDArray[np.float64]],
+        scores: Mapping[str, NDArray[np.float64]],
         right: Mapping[str, NDArray[np.bool_]],
         unknown: NDArray[np.bool_],
         tested: Mapping[str, NDArray[np.bool_]],
     ) -> dict[str, Course]:
-        """{task: its course}, from each task's own answers (points, n).
+        """{task: its course}, from each task's own answers and confidences for rules (points, n).
 
         The trials `tested` (n,) count; for a product, those that count for its factors too.
         """
@@ -311,9 +316,9 @@ class SequentialClassifier:
         for task in self.choices:
             deciding = tuple(self.products_.get(task, (task,)))
             own = np.all([tested[t] for t in (task, *deciding)], axis=0)
-            said = [confidence[part][:, own] for part in deciding]
+            sure = [scores[part][:, own] for part in deciding]
             wrong = [~right[part][:, own] for part in deciding]
-            courses[task] = Course(said, wrong, unknown[:, own], task == self.novelty_.task)
+            courses[task] = Course(sure, wrong, unknown[:, own], task == self.novelty_.task)
         return courses
 
 
@@ -323,15 +328,16 @@ def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
     return [name for name in features if name in taken]
 
 
-def calibrated(
+def cross_fitted(
     margins: NDArray[np.float64],
     right: NDArray[np.bool_],
     folds: NDArray[np.int64],
     tested: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """(points, n) confidences, each fold's by a logistic regression on the other folds' tested."""
+    """(points, n) confidences for rules, each fold's by the curve of the other folds' tested."""
     out = np.zeros(right.shape)
     for fold in range(int(folds.max()) + 1):
         own, others = folds == fold, tested & (folds != fold)
-        out[:, own] = confidences(*curves(margins[:, others], right[:, others]), margins[:, own])
+        slope, intercept = logistic(margins[:, others], right[:, others])
+        out[:, own] = confidences([slope], [intercept], margins[:, own])
     return out

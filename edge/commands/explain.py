@@ -85,7 +85,9 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
         compared = f"for (+) and against (-) {label}, compared with {rival['label']}"
         lines += wrapped(f"Features {compared}: {pulls}.", "  ")
     for change in line["changes"][:MOST]:
-        size = f"{change['size']:.2g} {plural_of(info.units[change['feature']])}".rstrip()
+        unit = info.units[change["feature"]]
+        plural = f"{unit}s" if unit.isalpha() else unit.removesuffix("1")  # "1" is a ratio's
+        size = f"{change['size']:.2g} {plural}".rstrip()
         how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
         if abs(change["mean"]) <= DIRECTED * change["size"]:
             how = f"varied in another way, by {size} on average"
@@ -96,8 +98,3 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
 def trial_text(trial: dict[str, Any]) -> str:
     """A training trial: distance, name and label."""
     return f"  {trial['distance']:7.3f}  {trial['trial']}: {trial['label']}"
-
-
-def plural_of(unit: str) -> str:
-    """The unit behind a number; nothing for a ratio."""
-    return f"{unit}s" if unit.isalpha() else unit.removesuffix("1")

@@ -148,10 +148,7 @@ def check_error(model: Model, error: float | None) -> None:
                 f"certified: {model.info.stopping[task].refusal(error)}"
             )
         else:
-            how = (
-                f"always after {model.decision_points_s[rule.last]:g} s"
-                if rule.fixed
-                else f"at a confidence of at least {rule.confidence:g}, in training after "
-                f"{rule.mean_s:.2f} s on average"
-            )
+            fixed = f"always after {model.decision_points_s[rule.last]:g} s"
+            sure = f"when sure, in training after {rule.mean_s:.2f} s on average"
+            how = fixed if rule.fixed else sure
             LOG.info(f"{task}: decided {how}; at most {rule.error:.1%} wrong")

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 
 METADATA_KEY = "edge-classify"
-FORMAT = 5
+FORMAT = 6
 OPTIONAL = "decision_points_s stopping novelty joints kernels name trials taught".split()
 """Keys that are left out where they would be empty."""
 
@@ -150,7 +150,7 @@ class ModelInfo:
         """The metadata as JSON text, as the model file holds it."""
         entries = vars(self) | {
             "format": FORMAT,
-            "tasks": {name: _to_dict(task) for name, task in self.tasks.items()},
+            "tasks": {name: vars(task) for name, task in self.tasks.items()},
             "skin": self.layout.to_dict(),
             "tracking": {"debounce": self.debounce},
             "arm": None if self.chain is None else self.chain.to_dict(),
@@ -265,15 +265,11 @@ class ModelInfo:
         return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
 
 
-def _to_dict(task: Task) -> dict[str, Any]:
-    return {key: value for key, value in vars(task).items() if key != "factors" or value}
-
-
 def _task(table: ConfigTable) -> Task:
     labels = table.texts("labels")
     if not labels:
         raise table.fail("labels", "a list of at least one text")
-    factors = table.table("factors", {})
+    factors = table.table("factors")
     task = Task(
         labels,
         k=table.whole("k", allowed=range(1, 1 << 31)),

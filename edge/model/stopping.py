@@ -47,6 +47,10 @@ def margin(distances: Sequence[float], label: int) -> float:
     return nearest_other - own_distance if own_distance < math.inf else -math.inf
 
 
+def _logistic(x: float) -> float:
+    return 0.5 + 0.5 * math.tanh(0.5 * x)
+
+
 @dataclass(frozen=True)
 class StoppingRule:
     """Decide at the first decision point that is sure enough, and at the last one in any case.
@@ -56,8 +60,8 @@ class StoppingRule:
     Attributes:
         error: certified: decisions are wrong at most this often.
         mean_s: mean seconds from onset to decision, on the calibration trials.
-        confidence: decide from this confidence on. Above 1 no confidence is enough, so the rule
-            waits for a fixed window.
+        confidence: decide from this confidence on, by the curve of all decision points. Above 1 no
+            confidence is enough, so the rule waits for a fixed window.
         last: decision point at which to decide in any case.
     """
 
@@ -79,6 +83,8 @@ class Stopping:
     Attributes:
         slopes, intercepts: of each decision point: the probability that the label is right is the
             logistic function of slope * `margin` + intercept.
+        slope, intercept: the same of all decision points together, for the rules. A point's own
+            curve seldom rises high early, so with it the rules would wait on clear contacts too.
         rules: in the order of rising error. Mean times fall along them, except from a factor's own
             rules to those that it shares with its product (see `edge.model.agreement`).
         trials: number of trials that certify the rules.
@@ -88,6 +94,8 @@ class Stopping:
 
     slopes: tuple[float, ...]
     intercepts: tuple[float, ...]
+    slope: float
+    intercept: float
     rules: tuple[StoppingRule, ...]
     trials: int
     wrong: int
@@ -98,11 +106,13 @@ class Stopping:
         """The smallest error rate that is certified."""
         return self.rules[0].error
 
-    def confidence(self, decision_point: int, distances: Sequence[float], label: int) -> float:
-        """Probability that the label is right, 0 to 1."""
-        slope, intercept = self.slopes[decision_point], self.intercepts[decision_point]
-        x = slope * margin(distances, label) + intercept
-        return 0.5 + 0.5 * math.tanh(0.5 * x)
+    def confidence(self, decision_point: int, evidence: float) -> float:
+        """Probability, 0 to 1, that a label with this `margin` is right."""
+        return _logistic(self.slopes[decision_point] * evidence + self.intercepts[decision_point])
+
+    def sure(self, rule: StoppingRule, evidence: float) -> bool:
+        """Whether a label with this `margin` is sure enough for a rule."""
+        return _logistic(self.slope * evidence + self.intercept) >= rule.confidence
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; or None."""
@@ -140,6 +150,8 @@ class Stopping:
         return cls(
             slopes=table.numbers("slopes", points, low=0.0, open_low=True),
             intercepts=table.numbers("intercepts", points),
+            slope=table.number("slope", low=0.0, open_low=True),
+            intercept=table.number("intercept"),
             rules=tuple(
                 StoppingRule(
                     error=rule.number("error", low=0.0, high=1.0, open_low=True),

@@ -2,6 +2,8 @@
 
 import time
 
+import pytest
+
 from edge.clock import SystemClock
 
 
@@ -14,10 +16,6 @@ def test_it_returns_no_sooner_than_it_was_asked_to():
 
 def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):
     clock = SystemClock()
-
-    def never(seconds):
-        raise AssertionError(f"slept {seconds} s")
-
-    monkeypatch.setattr(time, "sleep", never)
+    monkeypatch.setattr(time, "sleep", lambda seconds: pytest.fail(f"slept {seconds} s"))
     clock.sleep_until(clock.now() - 1.0)
     clock.sleep_until(clock.now())

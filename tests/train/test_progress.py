@@ -2,8 +2,6 @@
 
 import sys
 
-import pytest
-
 from train import progress
 
 
@@ -27,12 +25,3 @@ def test_a_terminal_has_a_bar(capsys, monkeypatch):
     list(progress.bar(range(10), desc="working"))
 
     assert "working: 100%" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-def test_a_bar_that_is_switched_off_stays_so(capsys, monkeypatch, terminal):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
-
-    list(progress.bar(range(10), desc="working", disable=True))
-
-    assert capsys.readouterr().err == ""

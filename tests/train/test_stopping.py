@@ -67,6 +67,15 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     assert (named[1:] == truth).all()
 
 
+def test_rules_ask_for_the_same_margin_at_every_decision_point():
+    X, labels = touches(60)
+    model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
+    _, margins, _ = answers(model.decision_points_, X)["t"]
+    *_, courses = model.judged(X, {"t": labels})
+    (confidences,) = courses["t"].confidences
+    assert (np.diff(confidences.ravel()[margins.argsort(axis=None)]) >= 0.0).all()
+
+
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
     folds = stratified_folds(labels)

@@ -13,7 +13,6 @@ from edge.errors import printable
 from edge.touch import measures
 from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
-from train.evaluate import Result
 from train.feature_sets import moves
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
@@ -62,7 +61,8 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             star = "*" if (chosen.choice.features, chosen.choice.projection) in own else " "
-            row[task] = _percent(chosen.candidates[i]) + star
+            result = chosen.candidates[i]
+            row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
         rows.append({**row, "us per decision": round(us, 1), "kB": round(kilobytes, 1)})
     return Table("candidates", "Candidates", rows, ("us per decision",), narrow=3)
@@ -79,10 +79,6 @@ def accuracy(chosen: Chosen) -> str:
         return f"{numbers}this trial"
     alone = f"{chosen.by_trial.accuracy:.1%} if only the trial itself is left out"
     return f"{numbers}any trial of the same {chosen.left_out}; {alone}"
-
-
-def _percent(result: Result) -> str:
-    return f"{result.accuracy:.1%} ({interval(result)})"
 
 
 def _described(choice: Choice, fitted: Fitted) -> str:

@@ -69,14 +69,15 @@ class StoppingComparison:
         decision_points_s: the windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
-        unknown: (decision points, n) whether the contact is unlike all trained ones.
+        course: of all held-out trials, whose labels count even where the contact is unlike all
+            trained ones.
         certified: an entry for each requested error rate that a fold certified.
     """
 
     decision_points_s: tuple[float, ...]
     right: NDArray[np.bool_]
     confidence: NDArray[np.float64]
-    unknown: NDArray[np.bool_]
+    course: Course
     certified: list[Certified]
 
     @property
@@ -109,21 +110,20 @@ def compare_stopping(
     cases = [(dataset, test, decision_points_s, quick) for test in tests]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
-    comparisons, unknown = {}, np.empty(shape, dtype=bool)
-    for test, (_, _, _, courses) in zip(tests, held_out, strict=True):
-        unknown[:, test] = courses[finest(y)].unknown
+    comparisons = {}
     for task in y:
         right, confidence = np.empty(shape, dtype=bool), np.empty(shape)
         for test, (_, hits, sure, _) in zip(tests, held_out, strict=True):
             right[:, test], confidence[:, test] = hits[task], sure[task]
-        rules = [(courses[task], model.stopping_[task]) for model, _, _, courses in held_out]
+        courses = [courses[task] for *_, courses in held_out]
+        rules = list(zip(courses, (model.stopping_[task] for model, *_ in held_out), strict=True))
         certified = [
             _certified(error, allowed, decision_points_s)
             for error in ERRORS
             if (allowed := [(c, rule) for c, stopping in rules if (rule := stopping.rule(error))])
         ]
         comparisons[task] = StoppingComparison(
-            tuple(decision_points_s), right, confidence, unknown, certified
+            tuple(decision_points_s), right, confidence, _joined(courses), certified
         )
     return comparisons
 
@@ -141,6 +141,13 @@ def _held_out(
     )
     truth = {task: others.labels(task) for task in model.choices}
     return (model, *model.judged(new, truth))
+
+
+def _joined(courses: Sequence[Course]) -> Course:
+    """Courses of several folds as one that withholds no label."""
+    sure = [np.hstack(part) for part in zip(*(c.confidences for c in courses), strict=True)]
+    wrong = [np.hstack(part) for part in zip(*(c.wrong for c in courses), strict=True)]
+    return Course(sure, wrong, np.hstack([c.unknown for c in courses]))
 
 
 def _certified(

@@ -75,9 +75,7 @@ def test_a_bus_that_another_program_uses_is_refused(library):
 
 
 def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_named(library):
-    sentences = """
-        print(sorted({s.error.partition(": ")[2] for s in skin.status() if s.error}))
-    """
+    sentences = "    print(sorted({s.error.partition(': ')[2] for s in skin.status() if s.error}))"
     done = run(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
     valid, sentences = done.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"

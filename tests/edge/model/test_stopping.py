@@ -29,25 +29,28 @@ class TestMargin:
 def stopping(**changes):
     ways = ((0.10, 1.2, 2.0, 2), (0.15, 0.8, 0.9, 2), (0.25, 0.4, 0.6, 2))
     rules = tuple(StoppingRule(*way) for way in ways)
-    given = Stopping((1.0, 1.0, 2.0), (0.0, 0.0, -1.0), rules, trials=140, wrong=7, risk=0.1)
-    return replace(given, **changes)
+    curves = (1.0, 1.0, 2.0), (0.0, 0.0, -1.0), 0.5, 0.0
+    return replace(Stopping(*curves, rules, trials=140, wrong=7, risk=0.1), **changes)
 
 
 def test_the_fastest_rule_that_is_certified_is_taken():
     assert stopping().rule(0.05) is None
-    assert stopping().rule(0.10).mean_s == 1.2
-    assert stopping().rule(0.2).mean_s == 0.8
-    assert stopping().rule(0.9).mean_s == 0.4
+    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [1.2, 0.8, 0.4]
 
 
-def test_confidence_is_the_logistic_function_of_the_margin():
-    assert stopping().confidence(0, [1.0, 2.0], 0) == pytest.approx(1 / (1 + math.exp(-1)))
-    assert stopping().confidence(2, [1.0, 2.0], 1) == pytest.approx(1 / (1 + math.exp(3)))
+def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
+    _, at_nine_tenths, _ = stopping().rules
+    needed = 2.0 * math.log(9.0)
+    assert stopping().sure(at_nine_tenths, needed + 1e-9)
+    assert not stopping().sure(at_nine_tenths, needed - 1e-9)
 
 
-@pytest.mark.parametrize(("far", "expected"), [((0.0, 1e300), 1.0), ((1e300, 0.0), 0.0)])
-def test_confidence_stays_a_probability_whatever_the_distances(far, expected):
-    assert stopping().confidence(0, far, 0) == expected
+@pytest.mark.parametrize(
+    ("point", "evidence", "odds"),
+    [(0, 1.0, math.e), (2, -1.0, math.exp(-3)), (0, 1e300, 1e300), (0, -math.inf, 0.0)],
+)
+def test_confidence_is_the_logistic_function_of_the_margin(point, evidence, odds):
+    assert stopping().confidence(point, evidence) == pytest.approx(odds / (1 + odds))
 
 
 def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
@@ -97,6 +100,7 @@ def test_what_is_stored_is_read_again():
         ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
         ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
         ({"intercepts": (0.0, 0.0, math.nan)}, "intercepts must be a finite number, not nan"),
+        ({"slope": 0.0}, "slope must be a number above 0, not 0.0"),
         ({"rules": ()}, "rules must be a list of tables"),
         ({"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)}, "rules 0: last must be .* 0 to 2, not 3"),
         ({"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)}, "rules 0: error must be a number above 0"),

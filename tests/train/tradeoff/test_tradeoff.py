@@ -176,8 +176,9 @@ def test_the_dearer_an_error_the_longer_it_pays_to_wait():
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
     """Fixed windows with these outcomes; every confidence is a half."""
     right = np.array(right, dtype=bool)
-    confidence, unknown = np.full(right.shape, 0.5), np.zeros(right.shape, dtype=bool)
-    return early.StoppingComparison(seconds, right, confidence, unknown, [])
+    confidence = np.full(right.shape, 0.5)
+    course = Course([confidence], [~right], np.zeros(right.shape, dtype=bool))
+    return early.StoppingComparison(seconds, right, confidence, course, [])
 
 
 def share_right(*shares):
