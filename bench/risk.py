@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from edge.cli import dispatch
+from edge.commands.options import within
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.candidates import candidates
 from train.choose import Chosen
@@ -211,10 +212,11 @@ def report(tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     top = argparse.ArgumentParser(prog="bench.risk", description=__doc__)
-    top.add_argument("--sets", type=int, default=140, help="data sets drawn (%(default)s)")
-    top.add_argument("--trials", type=int, default=140, help="trials of each (%(default)s)")
+    count = within(int, 1, 1e5)
+    top.add_argument("--sets", type=count, default=140, help="data sets drawn (%(default)s)")
+    top.add_argument("--trials", type=count, default=140, help="trials of each (%(default)s)")
     top.add_argument("--seed", type=int, default=0)
-    top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
+    top.add_argument("--jobs", type=count, default=2, help="processes (%(default)s)")
     top.set_defaults(run=run)
     return dispatch(top, argv)
 
