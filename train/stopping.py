@@ -124,27 +124,27 @@ def logistic(margins: NDArray[np.float64], right: NDArray[np.bool_]) -> tuple[fl
     margins, right = margins.ravel(), right.ravel()
     middle, spread = float(margins.mean()), float(margins.std()) or 1.0
     columns = np.stack([(margins - middle) / spread, np.ones_like(margins)], axis=1)
-    prior = np.array([1.0, 0.0])
-    solution = prior.copy()
-    for _ in range(50):
+    solution = prior = np.array([1.0, 0.0])
+
+    def loss(parameters: NDArray[np.float64]) -> float:
+        logits = columns @ parameters
+        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
+        return float(log_loss + PULL / 2 * np.square(parameters - prior).sum())
+
+    for _ in range(500):
         p = expit(columns @ solution)
         gradient = columns.T @ (p - right) + PULL * (solution - prior)
         hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + PULL * np.eye(2)
         step = np.linalg.solve(hessian, gradient)
-        step *= min(1.0, 2.0 / np.abs(step).max(initial=2.0))
-        solution -= step
+        # Far from the optimum, whole steps may go back and forth for ever. Near it, they converge,
+        # and rounding hides what the loss gains.
+        while np.abs(step).max() > 1e-3 and loss(solution - step) > loss(solution):
+            step /= 2.0
+        solution = solution - step
         if np.abs(step).max() < 1e-10:
             break
     slope = max(float(solution[0]), LEAST_SLOPE) / spread
     return slope, float(solution[1]) - slope * middle
-
-
-def curves(
-    margins: NDArray[np.float64], right: NDArray[np.bool_]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Slopes and intercepts of `logistic` at each decision point, from margins (points, n)."""
-    slopes, intercepts = zip(*map(logistic, margins, right), strict=True)
-    return slopes, intercepts
 
 
 def confidences(
@@ -270,8 +270,9 @@ class SequentialClassifier:
             known = margins[task][:, tests], right[task][:, tests]
             _, wrong = courses[task].under(candidates(len(seconds))[0])
             n, errors = len(wrong), int(wrong.sum())
+            slopes, intercepts = zip(*map(logistic, *known), strict=True)
             self.stopping_[task] = Stopping(
-                *curves(*known), *logistic(*known), tuple(rules[task]), n, errors, RISK
+                slopes, intercepts, *logistic(*known), tuple(rules[task]), n, errors, RISK
             )
         return self
 

@@ -82,7 +82,7 @@ def test_components_beyond_the_rank_add_nothing():
     X = np.random.default_rng(2).normal(size=(5, 120))
     rows = neighbours(X, max_components=10, max_k=3)
     assert rows.shape == (5, 10, 3)
-    assert (rows[:, 3:] == rows[:, 3:4]).all()  # four others span three components
+    assert (rows[:, 3:] == rows[:, 2:3]).all()  # four others span three components
 
 
 def test_too_few_trials_and_values_that_are_not_finite_are_named():

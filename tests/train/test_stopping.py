@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import expit
 
 from edge.errors import InputError
 from edge.model.stopping import NOVELTY_RATE
@@ -17,10 +18,14 @@ class TestLogistic:
         right = rng.random(len(margins)) < 1 / (1 + np.exp(-(0.5 * margins + 1.0)))
         assert logistic(margins, right) == pytest.approx((0.5, 1.0), abs=0.05)
 
-    def test_what_is_always_right_stays_finite(self):
-        slope, intercept = logistic(np.full(50, 25.0), np.ones(50, dtype=bool))
-        assert 0.0 <= slope < 100.0
-        assert abs(intercept) < 100.0
+    @pytest.mark.parametrize("margins", [np.full(50, 25.0), np.append(np.linspace(0, 1, 30), 40)])
+    @pytest.mark.parametrize("right", [False, True])
+    def test_equal_outcomes_and_one_far_margin_have_the_best_curve(self, margins, right):
+        slope, intercept = logistic(margins, np.full(len(margins), right))
+        mean, spread = margins.mean(), margins.std() or 1.0
+        errors = expit(slope * margins + intercept) - right
+        assert errors @ (margins - mean) == pytest.approx(0.5 * spread * (1.0 - slope * spread))
+        assert errors.sum() == pytest.approx(-0.5 * (intercept + slope * mean))
 
     def test_a_larger_margin_never_speaks_against_a_label(self):
         margins = np.arange(100.0)
@@ -58,10 +63,8 @@ def touches(n, seed=0):
 
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
-    choices = {"t": Choice("none", 3, 3)}
-    model = calibrated(choices, X, {"t": labels})
-    rule = model.stopping_["t"].rule(0.1)
-    assert rule.mean_s <= 0.83
+    model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
+    assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
@@ -72,8 +75,7 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
     _, margins, _ = answers(model.decision_points_, X)["t"]
     *_, courses = model.judged(X, {"t": labels})
-    (confidences,) = courses["t"].confidences
-    assert (np.diff(confidences.ravel()[margins.argsort(axis=None)]) >= 0.0).all()
+    assert (np.diff(courses["t"].confidences[0].ravel()[margins.argsort(axis=None)]) >= 0.0).all()
 
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
@@ -92,8 +94,7 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
     model = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
     assert (np.array(model.novelty_.limits) > 0.0).all()
-    _, _, own = answers(model.decision_points_, X)["t"]
-    assert (own == 0.0).all()
+    assert (answers(model.decision_points_, X)["t"][2] == 0.0).all()
 
 
 def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
@@ -131,8 +132,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    _, _, distances = answers(model.decision_points_, X[..., model.columns_])["t"]
-    assert (distances == 0.0).all()
+    assert (answers(model.decision_points_, X[..., model.columns_])["t"][2] == 0.0).all()
 
 
 def test_too_few_trials_are_refused():

@@ -59,7 +59,7 @@ REFUSED = {
         "operator com.microsoft.CDist, as no",
     ),
     "a function": (a_function(), PARTS),
-    "an inner graph": (model([add(then_branch=model([add()]).graph)]), PARTS),
+    "an inner graph": (model([add(then_branch=model([add()]).graph, times=2)]), PARTS),
     "a tensor in an attribute": (model([add(value=TENSOR)]), PARTS),
     "a sparse constant": (a_sparse_constant(), PARTS),
     "many nodes": (model([add()] * (onnx_file.MOST_NODES + 1)), "1001 nodes"),
