@@ -136,17 +136,17 @@ $(BENCHVENV): $(READY)
 
 # BENCH="-k region": only the benchmarks whose names contain this.
 bench: $(BENCHVENV)
-	$(BIN)/python -m pytest bench -o python_files='bench_*.py' -o python_functions='bench_*' \
+	$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default $(BENCH)
 
 transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(OUT)/transfer/simulated
 	$(BIN)/python -m export --data $(OUT)/transfer/simulated --out $(OUT)/transfer $(EXPORT)
-	$(BIN)/python -m bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer
+	$(BIN)/python -m tests.bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer
 
 matched: $(BENCHVENV)
-	$(BIN)/python -m bench.matched
+	$(BIN)/python -m tests.bench.matched
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -180,7 +180,7 @@ docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
 
 risk: $(READY)
-	$(BIN)/python -m bench.risk $(RISK)
+	$(BIN)/python -m tests.bench.risk $(RISK)
 
 ifndef DATA
 stopping: $(SIMULATED)/.made
@@ -197,17 +197,17 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	@touch $@
 
 stopping: $(PEERS)/.ready
-	$(PEERS)/bin/python -m bench.stopping --data $(RECORDINGS) $(STOPPING)
+	$(PEERS)/bin/python -m tests.bench.stopping --data $(RECORDINGS) $(STOPPING)
 
 # FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
 faults: $(READY)
 	$(BIN)/python -m tests.faults $(FAULTS)
 
 soak: $(READY)
-	$(BIN)/python -m bench.soak
+	$(BIN)/python -m tests.bench.soak
 
 soak-day: $(READY)
-	$(BIN)/python -m bench.soak --minutes 1440 --every 60 --rate 15
+	$(BIN)/python -m tests.bench.soak --minutes 1440 --every 60 --rate 15
 
 $(VENV)/.upkeep: $(READY)
 	$(PIP) --group upkeep
@@ -225,16 +225,16 @@ wheel: $(READY)
 	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
 
 wheel-test: wheel
-	$(BIN)/python -m pytest board/test_wheel.py
+	$(BIN)/python -m pytest tests/board/test_wheel.py
 
 kernel-test: $(READY)
-	$(BIN)/python -m pytest board/test_kernel.py -rs --capture=tee-sys
+	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys
 
 service-test: $(READY)
-	$(BIN)/python -m pytest board/test_service.py -rs
+	$(BIN)/python -m pytest tests/board/test_service.py -rs
 
 board-test: wheel
-	$(BIN)/python -m pytest board/test_aarch64.py -rs --capture=tee-sys
+	$(BIN)/python -m pytest tests/board/test_aarch64.py -rs --capture=tee-sys
 
 DEMODATA := $(OUT)/demo-data
 
@@ -244,7 +244,7 @@ demo-data: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
 	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points none \
 		--features paper --projection pca --tasks category mobility object --name demo
-	PYTHONPATH=. $(BIN)/python board/demo_data.py $(DEMODATA)
+	PYTHONPATH=. $(BIN)/python tests/board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases
 

@@ -8,7 +8,7 @@ import io
 import logging
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
@@ -17,17 +17,30 @@ from edge import __version__
 from edge.errors import EdgeError, InputError
 from edge.interrupt import delayed
 
-COMMANDS = tuple(
-    "check scan calibrate record label teach run view replay explain info verify bench fake "
-    "demo".split()
-)
-"""Modules of `edge.commands`, in the order in which the help lists them; see `add_commands`."""
+COMMANDS = {
+    "check": "edge.commands.check",
+    "scan": "edge.commands.scan",
+    "calibrate": "edge.commands.calibrate",
+    "record": "edge.tools.record",
+    "label": "edge.tools.label",
+    "teach": "edge.tools.teach",
+    "run": "edge.commands.run",
+    "view": "edge.tools.view",
+    "replay": "edge.tools.replay",
+    "explain": "edge.tools.explain",
+    "info": "edge.tools.info",
+    "verify": "edge.commands.verify",
+    "bench": "edge.tools.bench",
+    "fake": "edge.tools.fake",
+    "demo": "edge.tools.demo",
+}
+"""Modules by command, in the order in which the help lists them; see `add_commands`."""
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of writing to a full disk, beyond a quota, or to a terminal that has gone."""
 
 
-def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
-    """The command line, with the commands `wanted` alone.
+def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The command line, with the named commands alone.
 
     A slow board starts sooner if it loads only the command that it runs.
     """
@@ -38,7 +51,7 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
         "terminal, and one JSON object per line to a pipe or a file.",
     )
     top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
-    for command in add_commands(top, "edge.commands", wanted):
+    for command in add_commands(top, {name: COMMANDS[name] for name in names}):
         flag = partial(command.add_argument, action="store_true")
         flag("--json", help="print JSON lines even to a terminal")
         flag("-q", "--quiet", help="print only errors to stderr")
@@ -46,21 +59,21 @@ def parser(wanted: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
 
 
 def add_commands(
-    top: argparse.ArgumentParser, package: str, names: Sequence[str]
+    top: argparse.ArgumentParser, modules: Mapping[str, str]
 ) -> Iterator[argparse.ArgumentParser]:
-    """Add each named module of the package as a subcommand, and yield the subcommands' parsers.
+    """Add each module as the subcommand of its name, and yield the subcommands' parsers.
 
     A module's docstring is its help: the first line stands in the list of commands, the rest in the
     command's own help. The module has `add_options(parser)` and `run(arguments)`, which returns the
     exit status.
     """
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in names:
+    for name, path in modules.items():
         with delayed():
-            module = import_module(f"{package}.{name}")
+            module = import_module(path)
         headline, _, description = (module.__doc__ or name).partition("\n\n")
         brief = headline[0].lower() + headline[1:].rstrip(".")
-        command = commands.add_parser(name.rstrip("_"), help=brief, description=description)
+        command = commands.add_parser(name, help=brief, description=description)
         module.add_options(command)
         command.set_defaults(run=module.run)
         yield command
@@ -139,12 +152,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 for success, 1 if a check failed, 2 for bad usage or input, 3 for a device that fails.
     """
     words = list(sys.argv[1:] if argv is None else argv)
-    wanted = [word for word in words[:1] if word in COMMANDS]
-    top = parser(wanted or COMMANDS)
+    command = [word for word in words[:1] if word in COMMANDS]
+    top = parser(command or COMMANDS)
     if not words and "_ARGCOMPLETE" not in os.environ:
         top.print_help()
         return 2
-    if not wanted and words and not words[0].startswith("-"):
+    if not command and words and not words[0].startswith("-"):
         from difflib import get_close_matches  # rarely needed, and slow to load
 
         near = get_close_matches(words[0], COMMANDS, 1, 0.5)

@@ -29,7 +29,7 @@ class Builder:
     def constant(self, value: Any, dtype: Any = np.float64, name: str = "") -> str:
         """Name of a constant; equal ones are stored once, but for those that are given a name.
 
-        `edge.model.teaching` changes these.
+        `edge.tools.teaching` changes these.
         """
         array = np.asarray(value, dtype=dtype)
         key = (name, array.dtype.str, array.shape, array.tobytes())

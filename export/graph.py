@@ -19,7 +19,7 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
-from edge.model.teaching import label_tables
+from edge.tools.teaching import label_tables
 from export.build import OPSET, Builder, project, widened
 from train.pipeline import ContactClassifier
 from train.stopping import SequentialClassifier
@@ -180,7 +180,7 @@ def _label_distances(
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
     """Name and type of each output.
 
-    ONNX Runtime derives the sizes from the constants, which `edge.model.teaching` enlarges.
+    ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching` enlarges.
     """
     outputs: list[tuple[str, Any]] = []
     for task in model.choices:

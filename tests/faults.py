@@ -18,10 +18,10 @@ from itertools import count
 import numpy as np
 from joblib import Parallel, delayed
 
+from edge.chips import block
+from edge.chips.chip import ChipSpec
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
-from edge.i2c import block
-from edge.i2c.chip import ChipSpec
 from edge.skin import file as skinfile
 from edge.skin.loop import Schedule
 from edge.skin.skin import Skin

@@ -7,11 +7,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from edge.bus.i2c import Transfer, bus_error, write
+from edge.bus.tca9548a import FakeTCA9548A
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses
-from edge.i2c.bus import Transfer, bus_error, write
-from edge.i2c.tca9548a import FakeTCA9548A
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 

@@ -1,6 +1,6 @@
 """CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
 
-`tests/edge/skin/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an effect.
+`tests/edge/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an effect.
 """
 
 import json
@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-import edge.commands
+import edge.tools
 import train
 import train.importers
 from edge import cli
@@ -94,8 +94,8 @@ def run(arguments):
 
 
 def test_a_subcommand_is_a_module_and_its_name(monkeypatch, tmp_path, capsys):
-    module(edge.commands, monkeypatch, tmp_path, COMMAND)
-    monkeypatch.setattr(cli, "COMMANDS", (*cli.COMMANDS, "toy"))
+    module(edge.tools, monkeypatch, tmp_path, COMMAND)
+    monkeypatch.setitem(cli.COMMANDS, "toy", "edge.tools.toy")
     assert cli.main(["toy", "hello"]) == 0
     assert json.loads(capsys.readouterr().out) == {"event": "toy", "word": "hello"}
     with pytest.raises(SystemExit):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from edge import cli
-from edge.i2c import block
-from edge.i2c.chip import MOST_TAXELS
+from edge.chips import block
+from edge.chips.chip import MOST_TAXELS
 from edge.model.info import FORMAT
 from export.__main__ import main as export
 from tests.conftest import ROOT
@@ -59,7 +59,7 @@ def test_every_page_is_on_the_site_and_its_links_and_paths_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
         assert link.startswith("https://") or (DOCS / link).exists(), link
     prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
-    for named in re.findall(r"`((?:edge|train|examples|tests|board)/[\w./-]+)`", prose):
+    for named in re.findall(r"`((?:edge|train|docs/examples|tests)/[\w./-]+)`", prose):
         assert (ROOT / named).exists(), named
 
 

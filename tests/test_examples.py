@@ -17,7 +17,7 @@ from edge import demo
 from edge.fake.player import play, skin_file
 from tests.conftest import ROOT, python, save_touches
 
-EXAMPLES = ROOT / "examples"
+EXAMPLES = ROOT / "docs" / "examples"
 PACKAGE = EXAMPLES / "ros2" / "edge_classify_ros"
 PILLOW = demo.FOLDER / "pillow-movable.npz"
 

@@ -1,4 +1,4 @@
-"""examples/firmware/: our own driver reads the protocol that a microcontroller runs."""
+"""docs/examples/firmware/: our own driver reads the protocol that a microcontroller runs."""
 
 import os
 import pty
@@ -9,15 +9,15 @@ import tty
 import numpy as np
 import pytest
 
+from edge.bus.serial_bus import SerialBus
+from edge.chips.block import Block, parse
+from edge.chips.chip import WrongChip
 from edge.fake.bus import FakeBus
-from edge.i2c.block import Block, parse
-from edge.i2c.chip import WrongChip
-from edge.i2c.serial_bus import SerialBus
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
 from tests.conftest import ROOT
 
-MATRIX = ROOT / "examples" / "firmware" / "matrix"
+MATRIX = ROOT / "docs" / "examples" / "firmware" / "matrix"
 TAXELS = 100
 
 pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")

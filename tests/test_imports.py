@@ -11,7 +11,7 @@ import pytest
 from tests.conftest import ROOT, python
 
 BOARD = {"numpy", "onnxruntime", "smbus2", "edge"}
-OPTIONAL = {"serial": "edge/i2c/serial_bus.py", "argcomplete": "edge/cli.py"}
+OPTIONAL = {"serial": "edge/bus/serial_bus.py", "argcomplete": "edge/cli.py"}
 """The packages of the wheel's extras, and the only module that may import each."""
 FORBIDDEN = {"pickle", "joblib.dump", "marshal", "shelve"}
 
@@ -60,7 +60,7 @@ def test_nothing_pickles(package):
 
 
 PACKAGES = ["edge", "train", "export"]
-FRAME = [f"edge.{s}" for s in "i2c skin touch model classifier runtime commands".split()]
+FRAME = [f"edge.{s}" for s in "bus chips skin touch model classifier output commands tools".split()]
 """The way of one frame through `edge/`."""
 TOUCH = [f"edge.touch.{s}" for s in "frame layout region measures track features".split()]
 """The way of a touch: a frame becomes a region, a contact, a vector."""
@@ -83,7 +83,7 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
     [
         ("import edge", ("edge.", "numpy")),
         ("import edge.cli, edge.classifier", ("onnxruntime",)),
-        ("from edge import cli; cli.parser(['check'])", ("edge.commands.r", "edge.commands.b")),
+        ("from edge import cli; cli.parser(['check'])", ("edge.commands.r", "edge.tools")),
     ],
 )
 def test_what_is_slow_is_loaded_only_when_it_is_needed(program, left_out):
@@ -108,5 +108,5 @@ def test_no_modules_import_each_other_in_a_circle():
             for alias in node.names
         }
         graph[name] = (imported(path) | named) & paths.keys()
-    assert graph["edge.skin.file"] >= {"edge.skin.kinds", "edge.skin.wiring"}
+    assert graph["edge.skin.file"] >= {"edge.chips.kinds", "edge.skin.wiring"}
     assert len(list(TopologicalSorter(graph).static_order())) == len(graph)

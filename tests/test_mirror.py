@@ -35,7 +35,7 @@ def specified(module):
         return True
     package, name = ".".join(module.parent.parts), module.stem
     imported = rf"(from|import) {package}\.{name}\b|from {package} import .*\b{name}\b"
-    if module.parent.name == "commands":
+    if module.parent.name in ("commands", "tools"):
         imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""
     if module.parent.name == "effects":
         imported += rf"|\"{name}\""

@@ -6,8 +6,16 @@ from collections.abc import Sequence
 
 from edge.cli import add_commands, dispatch
 
-COMMANDS = ("import_", "simulate", "study", "tradeoff", "show", "split", "thresholds")
-"""Modules of `train.commands`; see `edge.cli.add_commands`."""
+COMMANDS = {
+    "import": "train.commands.import_",
+    "simulate": "train.commands.simulate",
+    "study": "train.commands.study",
+    "tradeoff": "train.commands.tradeoff",
+    "show": "train.commands.show",
+    "split": "train.commands.split",
+    "thresholds": "train.commands.thresholds",
+}
+"""Modules by command; see `edge.cli.add_commands`."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -17,7 +25,7 @@ def parser() -> argparse.ArgumentParser:
         description="Imports, simulates, studies and draws recordings; `python -m export` makes "
         "a model of them.",
     )
-    list(add_commands(top, "train.commands", COMMANDS))
+    list(add_commands(top, COMMANDS))
     return top
 
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 from edge.errors import InputError
-from edge.model.teaching import JOINED, joined
 from edge.recording import Recording
+from edge.tools.teaching import JOINED, joined
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""

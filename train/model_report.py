@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import precision_recall_fscore_support
 
-from edge.model.explanation import Explanation, Space, explain
 from edge.model.model import Model
+from edge.tools.explanation import Explanation, Space, explain
 from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Labels, Result, stratified_folds
 from train.fitting import Fitted

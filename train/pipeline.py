@@ -18,7 +18,7 @@ from scipy.special import expit
 
 from edge.errors import InputError
 from edge.model.agreement import agreed
-from edge.model.teaching import nearest_of_label
+from edge.tools.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.agreement import Labels, factors_of
 from train.projection import Projection

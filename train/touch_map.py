@@ -1,4 +1,4 @@
-"""The contacts of a map of touch, as `edge.runtime.touch_map` describes its file."""
+"""The contacts of a map of touch, as `edge.output.touch_map` describes its file."""
 
 import math
 import os
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import open_regular, parsing
-from edge.runtime.touch_map import LARGEST_BYTES, LONGEST_LINE, NOT_A_MAP
+from edge.output.touch_map import LARGEST_BYTES, LONGEST_LINE, NOT_A_MAP
 
 
 class Head(NamedTuple):

@@ -72,7 +72,7 @@ def remarks(file: SkinFile) -> Iterator[str]:
 
 def check_board(output: Output) -> int:
     """Print a table of this machine; 1 if something needs a remedy."""
-    from edge.runtime.board import look  # needs Linux or macOS
+    from edge.commands.board import look  # needs Linux or macOS
 
     rows = list(look())
     width = max(len(row.name) for row in rows)

@@ -17,8 +17,8 @@ from edge.commands.output import LOG
 from edge.commands.source import reading
 from edge.events import Decided, Event
 from edge.model.model import Model
-from edge.runtime.systemd import Notifier
-from edge.runtime.touch_map import map_writer
+from edge.output.systemd import Notifier
+from edge.output.touch_map import map_writer
 from edge.skin.loop import Schedule
 from edge.touch.track import MAX_CONTACTS
 

@@ -13,15 +13,15 @@ from edge.events import Event
 from edge.fake.clock import PacedClock, VirtualClock
 from edge.fake.player import Playback, play, skin_file
 from edge.model.model import Model, require_joints
+from edge.output.event_writer import Lines, LineWriter
 from edge.recording import load
-from edge.runtime.event_writer import Lines, LineWriter
-from edge.runtime.joint_stream import Joints, joint_source
-from edge.runtime.page import Page
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
+from edge.tools.page import Page
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
+from edge.touch.joint_stream import Joints, joint_source
 from edge.touch.layout import for_device
 
 
@@ -188,7 +188,7 @@ def reading(
         needs_joints: refuse a source without the angles that the model needs.
         real_time: play a recording at its original speed, whatever the options say, as a page
             always does.
-        page: further arguments of `edge.runtime.page.Page`.
+        page: further arguments of `edge.tools.page.Page`.
 
     Raises:
         InputError: the options cannot be used.

@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from edge.bus.i2c import Message, Transfer, bus_error, wire_bits
+from edge.bus.tca9548a import FakeTCA9548A
+from edge.chips.chip import FakeChip
 from edge.fake.clock import Hand, VirtualClock
-from edge.i2c.bus import Message, Transfer, bus_error, wire_bits
-from edge.i2c.chip import FakeChip
-from edge.i2c.tca9548a import FakeTCA9548A
 
 NACK_BITS = 11
 """START, the address that nobody acknowledges, and STOP."""
@@ -20,7 +20,7 @@ class FakeBus:
     It refuses the shapes that some real adapter refuses: a read anywhere but last (EOPNOTSUPP,
     Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
-    >>> from edge.i2c.bus import fetch, send
+    >>> from edge.bus.i2c import fetch, send
     >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
     >>> send(bus, 0x70, [4])
     >>> fetch(bus, 0x70, b"", 1)

@@ -17,8 +17,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from edge.bus.i2c import Bus, BusError, BusNack, BusTimeout, Message, bus_error, read, write
 from edge.errors import EdgeError, InputError
-from edge.i2c.bus import Bus, BusError, BusNack, BusTimeout, Message, bus_error, read, write
 
 VENDOR, PRODUCT = 0x0403, 0xC631
 """The USB identity for which the kernel loads its driver."""
@@ -71,7 +71,7 @@ class UsbAdapter:
     driver's 2 s), and every other error stalls the request (EIO).
 
     >>> from edge.fake.bus import FakeBus
-    >>> from edge.i2c.tca9548a import FakeTCA9548A
+    >>> from edge.bus.tca9548a import FakeTCA9548A
     >>> adapter = UsbAdapter(FakeBus(chips={0x70: FakeTCA9548A()}))
     >>> adapter.control(struct.pack("<BBHHH", 0xC1, FUNCTIONS, 0, 0, 4)).hex()
     '0100ff0e'

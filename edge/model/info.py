@@ -89,7 +89,7 @@ class ModelInfo:
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be kept."""
     taught: int = 0
-    """Number of the last trials, which were added on a board (`edge.model.teaching`)."""
+    """Number of the last trials, which were added on a board (`edge.tools.teaching`)."""
 
     @property
     def widths(self) -> tuple[int, ...]:

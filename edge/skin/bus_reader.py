@@ -14,9 +14,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.bus import Adapter, Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout
-from edge.i2c.chip import Chip, ChipSpec
-from edge.i2c.tca9548a import TCA9548A
+from edge.bus.i2c import Adapter, Bus, BusError, BusGone, BusNack, BusRefused, BusTimeout
+from edge.bus.tca9548a import TCA9548A
+from edge.chips.chip import Chip, ChipSpec
 from edge.skin.file import Reading
 from edge.skin.wiring import BusSpec
 

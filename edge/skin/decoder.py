@@ -6,7 +6,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.chip import UNUSED, ChipSpec
+from edge.chips.chip import UNUSED, ChipSpec
 from edge.skin.bus_reader import NEVER, Slot
 from edge.skin.file import SkinFile
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.chips.chip import ChipSpec, Defaults
+from edge.chips.kinds import defaults_of
 from edge.config import ConfigTable, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
-from edge.i2c.chip import ChipSpec, Defaults
-from edge.skin.kinds import defaults_of
 from edge.skin.wiring import BusSpec, read_buses, taxel_at
 from edge.touch.layout import SkinLayout
 

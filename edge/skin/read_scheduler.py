@@ -8,7 +8,7 @@ overdue. A taxel that was not read keeps its last value and its own time (`Frame
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.i2c.tca9548a import SELECT_BITS, VERIFY_BITS
+from edge.bus.tca9548a import SELECT_BITS, VERIFY_BITS
 from edge.skin.file import SkinFile
 from edge.touch.frame import Frame
 

@@ -10,10 +10,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.bus.i2c import Adapter, LinuxBus
+from edge.chips.chip import ChipSpec
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
-from edge.i2c.bus import Adapter, LinuxBus
-from edge.i2c.chip import ChipSpec
 from edge.skin.baseline import Baseline
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, Slot
 from edge.skin.calibration import dead_band
@@ -255,7 +255,7 @@ class Skin:
 
 def _open(spec: BusSpec, timeout_s: float) -> Adapter:
     if spec.serial:
-        from edge.i2c.serial_bus import SerialBus  # few skins have one
+        from edge.bus.serial_bus import SerialBus  # few skins have one
 
         return SerialBus(spec.device, baud=spec.clock_hz, timeout_s=timeout_s)
     return LinuxBus(spec.device, timeout_s=timeout_s)

@@ -4,11 +4,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from edge.bus import tca9548a
+from edge.chips.chip import MOST_TAXELS, UNUSED, ChipKind, ChipSpec
+from edge.chips.kinds import KINDS
 from edge.config import ConfigTable, shown
 from edge.errors import InputError
-from edge.i2c import tca9548a
-from edge.i2c.chip import MOST_TAXELS, UNUSED, ChipKind, ChipSpec
-from edge.skin.kinds import KINDS
 from edge.touch.layout import SkinLayout
 
 FASTEST_MUX_HZ = 400_000

@@ -12,9 +12,9 @@ from edge.classifier import Classifier, stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
-from edge.model.teaching import taught
 from edge.model.verify import first_series, renew, verify
 from edge.recording import save
+from edge.tools.teaching import taught
 from edge.touch.features import FEATURES
 from export.api import save as save_model
 from export.graph import to_onnx

@@ -18,8 +18,8 @@ from mcap.writer import CompressionType
 
 from edge.cli import main as edge_main
 from edge.errors import InputError
-from edge.model.explanation import Space
 from edge.model.model import Model
+from edge.tools.explanation import Space
 from edge.touch.arm import Chain
 from tests.edge.touch.test_urdf import ARM
 from tests.fuzz import mutate

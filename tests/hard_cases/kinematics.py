@@ -7,8 +7,8 @@ import mpmath
 import numpy as np
 from hypothesis import strategies as st
 
-from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
+from edge.touch.joint_stream import Joints
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, seeded
 
 

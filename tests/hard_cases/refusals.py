@@ -10,9 +10,9 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.recording import Recording, save
-from edge.runtime.joint_stream import Joints
 from edge.touch.arm import Chain, Joint
 from edge.touch.frame import Frame
+from edge.touch.joint_stream import Joints
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case

@@ -1,4 +1,4 @@
-"""Reading a map of touch: `tests.edge.runtime.test_touch_map` reads what runs have written."""
+"""Reading a map of touch: `tests.edge.output.test_touch_map` reads what runs have written."""
 
 import pytest
 

@@ -8,11 +8,11 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from edge.commands.explain import explanations
 from edge.errors import InputError
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import Recording, load
+from edge.tools.explain import explanations
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from train.draw.comparison import contact_of

@@ -33,8 +33,8 @@ from edge.config import ConfigTable, parse_json, read_json, shown
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
-from edge.runtime.joint_stream import OLDEST_S
 from edge.touch.arm import Chain, joint_columns
+from edge.touch.joint_stream import OLDEST_S
 
 LOG = logging.getLogger(__name__)
 

@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
+from edge.chips import ad7147, block
+from edge.chips.chip import UNUSED, ChipSpec
 from edge.fake.player import frame_bits
-from edge.i2c import ad7147, block
-from edge.i2c.chip import UNUSED, ChipSpec
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
 from edge.skin.wiring import BusSpec

@@ -4,8 +4,8 @@ import numpy
 import pytest
 
 from edge import __version__
+from edge.commands import board as board_module
 from edge.model.info import FORMAT
-from edge.runtime import board as board_module
 from edge.skin import file as skinfile
 from tests.edge.skin.small import mpr121, one_chip
 

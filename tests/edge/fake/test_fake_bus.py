@@ -4,9 +4,9 @@ import errno
 
 import pytest
 
-from edge.i2c.bus import BusError, BusGone, BusRefused, fetch, read, send, write
-from edge.i2c.chip import FakeChip
-from edge.i2c.tca9548a import FakeTCA9548A
+from edge.bus.i2c import BusError, BusGone, BusRefused, fetch, read, send, write
+from edge.bus.tca9548a import FakeTCA9548A
+from edge.chips.chip import FakeChip
 from tests.faulty import Fault, FaultyBus
 
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from edge.bus.i2c import BusRefused, bus_error
 from edge.fake.clock import VirtualClock
-from edge.i2c.bus import BusRefused, bus_error
 from edge.skin.bus_reader import (
     LONG_PAUSE_S,
     LONGEST_PAUSE_S,

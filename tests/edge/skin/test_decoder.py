@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
-from edge.i2c import block, mpr121
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop

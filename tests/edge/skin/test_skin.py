@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from edge.bus.i2c import BusMissing
+from edge.chips import ad7147, mpr121
+from edge.chips.block import UNCHANGED_FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_skin, frame_bits, still
-from edge.i2c import ad7147, mpr121
-from edge.i2c.block import UNCHANGED_FRAMES
-from edge.i2c.bus import BusMissing
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop

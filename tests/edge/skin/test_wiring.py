@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from edge.i2c.chip import UNUSED
+from edge.chips.chip import UNUSED
 from edge.skin import file as skinfile
 from tests.edge.skin.small import SMALL, mistake, one_chip
 

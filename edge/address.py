@@ -1,0 +1,18 @@
+"""Addresses of options that open a socket."""
+
+from edge.errors import InputError
+
+
+def parse_address(
+    option: str, text: str, example: str, host: str = "", ports: range = range(65536)
+) -> tuple[str, int]:
+    """Host and port of `HOST:PORT`, or of `PORT` alone where there is a default host.
+
+    Raises:
+        InputError: the text is not of that form; the message names the option and an example.
+    """
+    given, _, port = text.rpartition(":")
+    host = given.strip("[]") or host
+    if not (host and port.isascii() and port.isdecimal() and int(port[:6]) in ports):
+        raise InputError(f"{option}{text}: give HOST:PORT, for example {example}")
+    return host, int(port)

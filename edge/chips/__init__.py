@@ -1,0 +1,1 @@
+"""Drivers of the chips, one class each, which a skin file names."""

@@ -1,0 +1,232 @@
+"""AD7147-1: 12 capacitive taxels of 16 bits.
+
+Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-increment (AD7147 data
+sheet). The start sequence is that of robotology/icub-firmware and of Linux's driver ad714x.
+"""
+
+import random
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.bus.i2c import Bus, fetch, read, send, write
+from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Parsed, Sense
+
+STAGES, STAGE_REGISTERS = 12, 8
+SYSTEM, STATUS, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x08, 0x0B, 0x17, 0x80
+REFRESH_S = 0.009216
+"""Time of a conversion of 12 stages at a decimation of 64; slower ones miss 100 Hz."""
+WRITTEN_AT_ONCE = 3 * STAGE_REGISTERS
+"""Some adapters carry at most 61 bytes a transfer (CP2112)."""
+DETECTION = (0x2626, 1600, 1600, 1600, 1600)
+"""Sensitivity and offsets of the chip's own touch detection, as in Linux's board files. No result
+depends on them, but power-up leaves them undefined."""
+
+Row = tuple[int, tuple[int, ...]]
+"""First register and the values from there on."""
+
+
+def stage_bank(stage: int) -> tuple[int, ...]:
+    """The eight registers of a stage: its own input on the positive side, no offset.
+
+    >>> [hex(value) for value in stage_bank(7)[:3]]
+    ['0xffff', '0x1ffe', '0x0']
+    """
+    if stage < 7:
+        connection = (0xFFFF ^ (1 << 2 * stage), 0x1FFF)
+    else:
+        connection = (0xFFFF, 0x1FFF ^ (1 << 2 * (stage - 7)))
+    return (*connection, 0, *DETECTION)
+
+
+BANKS = sum((stage_bank(stage) for stage in range(STAGES)), ())
+"""The registers of all stages, from `STAGE_BANK` on."""
+CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
+"""(12, 3) registers that connect inputs to each stage."""
+SYSTEM_ROW: Row = (SYSTEM, (0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400))
+"""PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and ambient
+compensation and interrupts, all off."""
+
+
+def rows(step: int, length: int) -> list[Row]:
+    """Rows of `length` registers, one every `step` registers of all stages, and the system row."""
+    starts = range(0, len(BANKS), step)
+    return [*((STAGE_BANK + i, BANKS[i : i + length]) for i in starts), SYSTEM_ROW]
+
+
+START_ROWS = rows(WRITTEN_AT_ONCE, WRITTEN_AT_ONCE)
+"""The rows to write, in order."""
+CHECK_ROWS = rows(STAGE_REGISTERS, CONNECTIONS.shape[1])
+"""The rows to read back: the connections of each stage, and last the system registers. A reset
+changes each of them, so that any one row tells a chip that has lost its settings."""
+
+
+def words(values: tuple[int, ...]) -> bytes:
+    """Registers as bytes on the wire."""
+    return b"".join(v.to_bytes(2, "big") for v in values)
+
+
+def parse(data: NDArray[np.uint8]) -> Parsed:
+    """12 big-endian words a chip.
+
+    No converting stage reads 0: a chip without settings serves it, or converts stage 0 alone.
+    Words of 0xFFFF up to the end of a frame come from a bus that nothing drives any more; the
+    word before them is damaged too where it ends in 0xFF.
+
+    Args:
+        data: (n, 24) bytes.
+
+    Returns:
+        (n, 12) values and which of them are intact.
+    """
+    values = data.view(">u2").astype(np.uint16)
+    intact = values != 0
+    intact[:, 0] &= intact[:, 1:].any(axis=1)
+    for row in np.flatnonzero(values[:, -1] == 0xFFFF).tolist():
+        driven = np.flatnonzero(data[row] != 0xFF)
+        intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
+    return values, intact
+
+
+class AD7147(Chip):
+    """One AD7147-1.
+
+    >>> chip = AD7147(bus, 0x2C)                                 # doctest: +SKIP
+    >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
+    >>> parse(chip.frame.buffer[None])                           # doctest: +SKIP
+    """
+
+    def __init__(
+        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * STAGES
+    ) -> None:
+        """Identify the chip.
+
+        Args:
+            bus: a bus or a mux's channel.
+            address: 0x2C to 0x2F.
+            into: (24,) bytes that `read` fills; new ones where it is a number.
+
+        Raises:
+            WrongChip: the identity register does not read 0x147x.
+            BusError: the chip does not answer.
+        """
+        super().__init__(bus, address, words((RESULTS,)), into)
+        self._checks = []
+        for register, values in CHECK_ROWS:
+            pointer, row = write(address, words((register,))), read(address, 2 * len(values))
+            self._checks.append((register, words(values), bus.prepare(pointer, row)))
+        self._turn = -1
+        identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
+        if identity & 0xFFF0 != 0x1470:
+            raise self.wrong(f"not an AD7147: its identity reads {identity:#06x}, not 0x147x")
+
+    def settings(self) -> Iterator[None]:
+        """Write all rows, read the status registers, which clears them, and read the rows back.
+
+        Raises:
+            WrongChip: a register does not hold what was written.
+            BusError: a transaction failed.
+        """
+        for register, values in START_ROWS:
+            send(self.bus, self.address, words((register, *values)))
+            yield
+        fetch(self.bus, self.address, words((STATUS,)), 6)
+        yield
+        for register, *_ in self._checks:
+            if not self.healthy():
+                place = f"register {register:#04x} of the AD7147"
+                raise self.wrong(f"{place} does not keep what is written")
+            yield
+
+    def healthy(self) -> bool:
+        """Whether the next row of `CHECK_ROWS`, each in turn, holds what was written."""
+        self._turn = (self._turn + 1) % len(self._checks)
+        _, expected, prepared = self._checks[self._turn]
+        self.bus.transfer(prepared)
+        return prepared.buffer.tobytes() == expected
+
+    def read(self) -> None:
+        """Read all taxels, and once more where the last byte is 0xFF.
+
+        Such a byte may be a value, or a transfer that broke off before it; the words carry no
+        check that could tell. A burst during which a conversion ends mixes words of two
+        conversions, each of them a value of its own. Reading the status first would not prevent
+        that, since a conversion may end after it. That a single word is never mixed is assumed;
+        the data sheet does not say.
+        """
+        self.bus.transfer(self.frame)
+        if self.frame.buffer[-1] == 0xFF:
+            self.bus.transfer(self.frame)
+
+
+class FakeAD7147(FakeChip):
+    """A model of the AD7147-1: the registers that the driver uses, and the results.
+
+    A running stage serves its taxel where its own input is connected, else something else. A
+    stage that does not run serves 0.
+    """
+
+    def __init__(
+        self, sense: Sense, *, refresh_s: float = 0.0, power_up: random.Random | None = None
+    ) -> None:
+        """Model a chip.
+
+        Args:
+            sense: raw values of the 12 taxels at a time.
+            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the last
+                one; 0 for results that are always fresh.
+            power_up: draws the stage registers, which power-up leaves undefined.
+        """
+        self._sense, self._refresh = sense, refresh_s
+        self._power_up = power_up or random.Random("power-up")
+        self.reset()
+
+    def reset(self) -> None:
+        """Registers as after power-on."""
+        self.registers = np.zeros(0x400, dtype=np.uint16)
+        undefined = [self._power_up.randrange(1 << 16) for _ in BANKS]
+        self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
+        self.registers[DEVICE_ID] = 0x1472
+        self._pointer = 0
+
+    def write(self, data: bytes, t: float) -> None:
+        """Pointer, then words; writes to the read-only registers are lost."""
+        for i, word in enumerate(np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()):
+            if i and not STATUS <= self._pointer <= DEVICE_ID:
+                self.registers[self._pointer] = word
+            self._pointer = (self._pointer + 1 if i else word) & 0x3FF
+
+    def read(self, n: int, t: float) -> bytes:
+        """Words from the pointer on."""
+        if self._refresh > 0.0:
+            t = t // self._refresh * self._refresh
+        banks = self.registers[STAGE_BANK : STAGE_BANK + len(BANKS)]
+        connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
+        power = int(self.registers[SYSTEM])
+        last = power >> 4 & 15 if power & 3 == 0 else -1
+        as_set = (connections == CONNECTIONS).all(axis=1)
+        results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
+        results[last + 1 :] = 0
+        self.registers[RESULTS : RESULTS + STAGES] = results
+        first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
+        served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
+        return served.ljust(n, b"\0")[:n]
+
+
+KIND = ChipKind(
+    name="ad7147",
+    description="a capacitance-to-digital converter",
+    driver=lambda bus, spec, into: AD7147(bus, spec.address, into=into),
+    parse=lambda data, spec: parse(data),
+    fake=lambda spec, sense, timed, power_up: FakeAD7147(
+        sense, refresh_s=REFRESH_S if timed else 0.0, power_up=power_up
+    ),
+    frame_bytes=lambda spec: 2 * STAGES,
+    highest=lambda spec: 0xFFFE,  # 0xFFFF is the end of its range
+    rest=lambda spec: 20946,  # Cody's real skin rests there
+    addresses=range(0x2C, 0x30),
+    stages=STAGES,
+    pointer_bytes=2,
+    defaults=lambda options: Defaults(threshold_counts=40, onset_counts=60),
+)

@@ -1,0 +1,196 @@
+"""A microcontroller that serves whole frames: sequence number, taxels, CRC-16.
+
+| pointer | bytes | register |
+|---|---|---|
+| 0x00 | 10 | identity: `TAXL`, version 1, bits per taxel (8, 12 or 16), taxels (16 bits), CRC-16 |
+| 0x10 | 2 + data + 2 | frame: sequence number (16 bits), taxels, CRC-16 |
+
+docs/block-protocol.md describes the protocol for whoever writes the firmware, and
+docs/examples/firmware/ has one.
+"""
+
+from binascii import crc_hqx
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.bus.i2c import Bus, fetch, read, write
+from edge.chips.chip import Chip, ChipKind, ChipSpec, Defaults, FakeChip, Option, Parsed, Sense
+from edge.clock import TIME_ROUNDING_S
+
+IDENTITY, FRAME = b"\x00", b"\x10"
+MAGIC = b"TAXL\x01"
+BITS = (8, 12, 16)
+UNCHANGED_FRAMES = 25
+"""Readings with one sequence number after which the microcontroller hangs."""
+FAKE_RATE_HZ = 100.0
+"""Samples a second of the model; its sequence number counts them."""
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/CCITT-FALSE.
+
+    >>> hex(crc16(b"123456789"))
+    '0x29b1'
+    """
+    return crc_hqx(data, 0xFFFF)
+
+
+def data_bytes(taxels: int, bits: int) -> int:
+    """Bytes of the taxels of one frame."""
+    return (taxels * bits + 7) // 8
+
+
+def pack(values: NDArray[np.uint16], bits: int) -> bytes:
+    """Taxels as bytes on the wire, highest bit first; the inverse of `unpack`.
+
+    Args:
+        values: (taxels,), each below 2 ** bits.
+        bits: 8, 12 or 16.
+    """
+    digits = np.unpackbits(values.astype(">u2").view(np.uint8)).reshape(-1, 16)
+    return np.packbits(digits[:, 16 - bits :]).tobytes()
+
+
+def unpack(data: NDArray[np.uint8], taxels: int, bits: int) -> NDArray[np.uint16]:
+    """Taxels (n, taxels) from their bytes (n, data_bytes)."""
+    digits = np.zeros((len(data), taxels, 16), dtype=np.uint8)
+    packed = np.unpackbits(data, axis=1, count=taxels * bits)
+    digits[:, :, 16 - bits :] = packed.reshape(len(data), taxels, bits)
+    return np.packbits(digits, axis=2).view(">u2")[:, :, 0].astype(np.uint16)
+
+
+def sealed(data: bytes) -> bytes:
+    """Bytes with their CRC."""
+    return data + crc16(data).to_bytes(2, "big")
+
+
+def parse(data: NDArray[np.uint8], taxels: int, bits: int) -> Parsed:
+    """Taxels of n microcontrollers, and whether the CRC of their frame holds.
+
+    Args:
+        data: (n, 4 + data_bytes) bytes.
+        taxels: of each.
+        bits: of one taxel.
+
+    Returns:
+        (n, taxels) values and which of them are intact: all of a frame or none.
+    """
+    # The CRC over bytes with their own CRC is 0.
+    intact = np.array([[crc16(row.tobytes()) == 0] for row in data])
+    values = unpack(data[:, 2:-2], taxels, bits)
+    return values, np.broadcast_to(intact, values.shape)
+
+
+def identity(taxels: int, bits: int) -> bytes:
+    """The identity register of a microcontroller."""
+    return sealed(MAGIC + bytes([bits]) + taxels.to_bytes(2, "big"))
+
+
+class Block(Chip):
+    """One microcontroller.
+
+    >>> chip = Block(bus, 0x28, taxels=384, bits=8)              # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        address: int,
+        *,
+        taxels: int,
+        bits: int = 16,
+        into: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Check that the microcontroller serves the taxels of the skin file.
+
+        Args:
+            bus: a bus, a mux's channel or a serial port.
+            address: 7 bits.
+            taxels: number of taxels that it serves.
+            bits: of one taxel, 8, 12 or 16.
+            into: (4 + data_bytes,) bytes that `read` fills; new ones where None.
+
+        Raises:
+            WrongChip: it serves something else.
+            BusError: it does not answer.
+        """
+        size = 4 + data_bytes(taxels, bits)
+        super().__init__(bus, address, FRAME, size if into is None else into)
+        self._expected = identity(taxels, bits)
+        self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
+        served = fetch(bus, address, IDENTITY, 10)
+        if served == self._expected:
+            return
+        if served[:5] == MAGIC and served == sealed(served[:8]):
+            number = int.from_bytes(served[6:8], "big")
+            raise self.wrong(f"serves {number} taxels of {served[5]} bits, not {taxels} of {bits}")
+        raise self.wrong("not a microcontroller that serves frames")
+
+    def healthy(self) -> bool:
+        """Whether its identity is still the same."""
+        self.bus.transfer(self._identity)
+        return self._identity.buffer.tobytes() == self._expected
+
+
+class FakeBlock(FakeChip):
+    """A model of a microcontroller that serves frames."""
+
+    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
+        """Model one.
+
+        Args:
+            sense: raw values at a time.
+            taxels: number of taxels that it serves.
+            bits: of one taxel.
+        """
+        self._sense, self._taxels, self._bits = sense, taxels, bits
+        self._pointer = 0
+
+    def reset(self) -> None:
+        """Start again, which takes no time and loses nothing."""
+
+    def write(self, data: bytes, t: float) -> None:
+        """The pointer; nothing can be written."""
+        if data:
+            self._pointer = data[0]
+
+    def read(self, n: int, t: float) -> bytes:
+        """The identity or the frame, then zeros."""
+        out = b""
+        if self._pointer == IDENTITY[0]:
+            out = identity(self._taxels, self._bits)
+        elif self._pointer == FRAME[0]:
+            sample = int((t + TIME_ROUNDING_S) * FAKE_RATE_HZ)
+            values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
+            out = sealed((sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits))
+        return out[:n].ljust(n, b"\0")
+
+
+def _highest(spec: ChipSpec) -> int:
+    return (1 << spec.option("bits")) - 1
+
+
+KIND = ChipKind(
+    name="block",
+    description="a microcontroller that serves frames",
+    driver=lambda bus, spec, into: Block(
+        bus, spec.address, taxels=len(spec.taxels), bits=spec.option("bits"), into=into
+    ),
+    parse=lambda data, spec: parse(data, len(spec.taxels), spec.option("bits")),
+    fake=lambda spec, sense, timed, power_up: FakeBlock(
+        sense, taxels=len(spec.taxels), bits=spec.option("bits")
+    ),
+    frame_bytes=lambda spec: 4 + data_bytes(len(spec.taxels), spec.option("bits")),
+    highest=_highest,
+    rest=lambda spec: min(20946, (_highest(spec) + 1) // 2),
+    options={"bits": Option(16, BITS)},
+    # The drift of 16 bits, scaled to their range.
+    defaults=lambda options: {
+        12: Defaults(drift_counts_per_s=1.25, drift_limit_counts=125),
+        8: Defaults(drift_counts_per_s=0.08, drift_limit_counts=8),
+    }.get(options["bits"], Defaults()),
+    unchanged_frames=UNCHANGED_FRAMES,
+    serial=True,
+    rests_at_zero=True,
+)

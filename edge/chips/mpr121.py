@@ -1,0 +1,179 @@
+"""MPR121: 12 capacitive taxels of 10 bits; a touch lowers the value.
+
+Registers have 8 bits behind an 8-bit pointer, with auto-increment. Most take a write only while
+the chip is stopped (MPR121 data sheet; application note AN3944 for the filter).
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.bus.i2c import Bus, fetch, read, send, write
+from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Parsed, Sense
+
+ELECTRODES = 12
+TOUCH_HIGH, RESULTS, FILTER, THRESHOLDS = 0x01, 0x04, 0x2B, 0x41
+CONFIG1, CONFIG2, ECR, RESET = 0x5C, 0x5D, 0x5E, 0x80
+RESET_KEY, RESET_CONFIG2, RESET_WAIT_S = 0x63, 0x24, 0.001
+RUNNING = 0x8F
+"""ECR: baseline from the first reading, twelve electrodes."""
+OVER_CURRENT = 0x80
+"""Bit of `TOUCH_HIGH`: the current at pin REXT is too high. The data read 0 and ECR stays 0."""
+SATURATED = 1023
+SETTINGS: tuple[tuple[int, tuple[int, ...]], ...] = (
+    (THRESHOLDS, (12, 6) * ELECTRODES),
+    (FILTER, (0x01, 0x01, 0x0E, 0x00, 0x01, 0x05, 0x01, 0x00, 0x00, 0x00, 0x00)),
+    (CONFIG1, (0x10, 0x20)),
+)
+"""(first register, values) to write while stopped: touch and release thresholds; baseline filter;
+charge current 16 uA, charge time 0.5 us and 4 samples each 1 ms."""
+SET_CONFIG2 = SETTINGS[-1][1][1]
+
+
+def parse(data: NDArray[np.uint8]) -> Parsed:
+    """12 words a chip, low byte first, 10 bits used.
+
+    A word with one of the upper six bits set is damaged. A stopped chip serves 0, and 1023 is
+    the end of the range: neither is a value.
+
+    Args:
+        data: (n, 24) bytes.
+
+    Returns:
+        (n, 12) values and which of them are intact.
+    """
+    values = data.view("<u2").astype(np.uint16)
+    return values, (values != 0) & (values < SATURATED)
+
+
+class MPR121(Chip):
+    """One MPR121.
+
+    >>> chip = MPR121(bus, 0x5A)                                 # doctest: +SKIP
+    >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
+    """
+
+    def __init__(
+        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * ELECTRODES
+    ) -> None:
+        """Identify the chip as far as that is possible without a reset.
+
+        It has no identity register. CONFIG2 holds our value where it runs, and its own after a
+        reset; `settings` resets the chip and checks the latter.
+
+        Args:
+            bus: a bus or a mux's channel.
+            address: 0x5A to 0x5D.
+            into: (24,) bytes that `read` fills; new ones where it is a number.
+
+        Raises:
+            WrongChip: CONFIG2 holds something else.
+            BusError: the chip does not answer.
+        """
+        super().__init__(bus, address, bytes([RESULTS]), into)
+        self._state = bus.prepare(write(address, [CONFIG2]), read(address, 2))
+        config = fetch(bus, address, bytes([CONFIG2]), 1)[0]
+        if config not in (RESET_CONFIG2, SET_CONFIG2):
+            raise self.wrong(f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20")
+
+    def settings(self) -> Iterator[None]:
+        """Reset, check, write all while stopped, read back, start; one transaction a step.
+
+        Raises:
+            WrongChip: a register does not hold what was written, or the chip reports over-current.
+            BusError: a transaction failed.
+        """
+        send(self.bus, self.address, [RESET, RESET_KEY])
+        self.bus.sleep(RESET_WAIT_S)
+        yield
+        send(self.bus, self.address, [ECR, 0])
+        yield
+        self._check(CONFIG2, (RESET_CONFIG2,), "does not come out of reset")
+        yield
+        for register, values in SETTINGS:
+            send(self.bus, self.address, [register, *values])
+            yield
+        for register, values in SETTINGS:
+            self._check(register, values, "does not keep what is written")
+            yield
+        send(self.bus, self.address, [ECR, RUNNING])
+        yield
+        if fetch(self.bus, self.address, bytes([TOUCH_HIGH]), 1)[0] & OVER_CURRENT:
+            raise self.wrong("reports over-current; check the resistor at its pin REXT (75 kOhm)")
+        yield
+        # A reset at any earlier moment shows here: it changes both registers.
+        if not self.healthy():
+            raise self.wrong("loses its settings; check its power")
+
+    def _check(self, register: int, values: tuple[int, ...], otherwise: str) -> None:
+        if fetch(self.bus, self.address, bytes([register]), len(values)) != bytes(values):
+            raise self.wrong(f"register {register:#04x} of the MPR121 {otherwise}")
+
+    def healthy(self) -> bool:
+        """Whether CONFIG2 and ECR are as they were set; reset and over-current change ECR."""
+        self.bus.transfer(self._state)
+        return self._state.buffer.tobytes() == bytes([SET_CONFIG2, RUNNING])
+
+
+class FakeMPR121(FakeChip):
+    """A model of the MPR121: stopped it serves 0, running the filtered values.
+
+    While it runs, a write to most registers is lost.
+    """
+
+    def __init__(self, sense: Sense) -> None:
+        self._sense = sense
+        self.over_current = False
+        """The resistor at REXT is too small."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Registers as after power-on or soft reset."""
+        self.registers = bytearray(256)
+        self.registers[CONFIG1] = 0x10
+        self.registers[CONFIG2] = RESET_CONFIG2
+        self._pointer = 0
+
+    def write(self, data: bytes, t: float) -> None:
+        """Pointer, then bytes."""
+        if not data:
+            return
+        self._pointer = data[0]
+        for value in data[1:]:
+            register = self._pointer
+            self._pointer = (register + 1) & 0xFF
+            if register == RESET:
+                if value == RESET_KEY:
+                    self.reset()
+            elif register == ECR or not self.registers[ECR] & 0x3F:
+                self.registers[register] = value
+        if self.over_current:
+            self.registers[TOUCH_HIGH] |= OVER_CURRENT
+            self.registers[ECR] = 0
+
+    def read(self, n: int, t: float) -> bytes:
+        """Bytes from the pointer on."""
+        bank = bytearray(self.registers)
+        if self.registers[ECR] & 0x0F:
+            values = np.minimum(self._sense(t), SATURATED).astype("<u2").tobytes()
+            bank[RESULTS : RESULTS + len(values)] = values
+        out = bytes(bank[(self._pointer + i) & 0xFF] for i in range(n))
+        self._pointer = (self._pointer + n) & 0xFF
+        return out
+
+
+KIND = ChipKind(
+    name="mpr121",
+    description="a capacitive touch controller",
+    driver=lambda bus, spec, into: MPR121(bus, spec.address, into=into),
+    parse=lambda data, spec: parse(data),
+    fake=lambda spec, sense, timed, power_up: FakeMPR121(sense),
+    frame_bytes=lambda spec: 2 * ELECTRODES,
+    highest=lambda spec: SATURATED - 1,
+    rest=lambda spec: 600,
+    addresses=range(0x5A, 0x5E),
+    stages=ELECTRODES,
+    # Of 10 bits, a touch takes some tens of counts.
+    defaults=lambda options: Defaults(-1, 8, 16, 3, 1.0, 200),
+)

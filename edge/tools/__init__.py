@@ -1,0 +1,1 @@
+"""What stands beside the core: commands that decide nothing, with the page and the terminal."""

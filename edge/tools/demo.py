@@ -1,0 +1,59 @@
+"""Decide on recorded touches that come with the program.
+
+Plays the simulated recordings that come with the program onto fake chips, reads these with the real
+drivers, and decides with the model that comes with the program. Everything but the wires works as
+on a robot. The exit status is 1 if a decision is wrong.
+"""
+
+import argparse
+
+import numpy as np
+
+from edge import demo
+from edge.classifier import Classifier
+from edge.commands.output import LOG, Output
+from edge.events import Decided
+from edge.fake.player import play, skin_file
+from edge.model.model import Model
+from edge.recording import Recording, load
+from edge.tools import terminal
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the events; 1 if a decision differs from its recording's label."""
+    classifier, output = Classifier(Model(demo.MODEL)), Output.of(arguments)
+    right = []
+    for path in demo.recordings():
+        recording = load(path)
+        if not output.as_json:
+            output.text(path.stem.replace("-", " "))
+        skin, playback = play(skin_file(recording.layout), recording)
+        with skin:
+            events = list(classifier.watch(skin, joints=playback, lasts_s=playback.ends))
+        for event in events:
+            line = {"source": path.stem, **event.to_dict()}
+            if isinstance(event, Decided):
+                line["expected"] = recording.labels[event.task]
+                right.append(line["expected"] == event.label)
+            output.event(line)
+        if not output.as_json:
+            print(picture(recording) + "\n", flush=True)
+    score = f"{sum(right)} of {len(right)} decisions are right"
+    if output.as_json:
+        LOG.info(score)
+    else:
+        output.text(f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens.")
+    return 0 if right and all(right) else 1
+
+
+def picture(recording: Recording) -> str:
+    """The frame of a recording with the largest sum of counts, as lines for a terminal."""
+    layout = recording.layout
+    strongest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
+    full = int(recording.frames.max())
+    colour, _ = terminal.skin_colours(list(recording)[strongest], layout, full)
+    return terminal.picture(colour)

@@ -1,0 +1,100 @@
+"""Explain a model's decisions on recordings.
+
+Prints the training trials nearest to a touch, the features for and against the answer, and the
+least change of a single feature that would have given another answer. A feature's number says how
+much nearer, as a squared distance, it brings the touch to the nearest trial with the answer than to
+the nearest one with another label. `python -m train show REC --model model.onnx` draws the curves.
+"""
+
+import argparse
+from collections.abc import Iterator
+from typing import Any
+
+from edge.commands.output import Output, counted, wrapped
+from edge.model.info import ModelInfo
+from edge.model.model import Model
+from edge.recording import Recording, find, load
+from edge.tools.explanation import Near, Space, explain
+from edge.tools.replay import contact_of
+
+MOST = 3
+"""Features and changes that a line names."""
+DIRECTED = 0.5
+"""A change goes one way if its mean is more than this share of its size."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("model", metavar="model.onnx", help="the model")
+    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print an explanation for each recording and task."""
+    model, output = Model(arguments.model), Output.of(arguments)
+    for path in find(arguments.recordings):
+        if not output.as_json:
+            output.text(str(path))
+        for line in explanations(model, load(path), str(path)):
+            output.event(line, text(line, model.info))
+    return 0
+
+
+def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict[str, Any]]:
+    """For each task, why the model answers a recording's first contact as it does.
+
+    Raises:
+        InputError: the recording does not suit the model, or holds no contact.
+    """
+    info = model.info
+    vector = info.vector(contact_of(model, recording, name))
+    for task, decision in model.decide(vector).items():
+        labels = info.tasks[task].labels
+        answer, rows = labels.index(decision.label), decision.neighbours.tolist()
+        true_label = recording.labels.get(task)
+        truth = labels.index(true_label) if true_label in labels else None
+        space = Space.of(model, task)
+        why = explain(space, vector, rows, answer, info.features, info.widths, truth)
+
+        def trial(near: Near, labels: tuple[str, ...] = labels) -> dict[str, Any]:
+            return {**near._asdict(), "label": labels[near.label], "trial": info.trial(near.row)}
+
+        yield {
+            "event": "explanation",
+            "source": name,
+            "task": task,
+            "label": decision.label,
+            "confidence": decision.confidence,
+            "nearest": list(map(trial, why.voters)),
+            "rival": None if why.rival is None else trial(why.rival),
+            "pulls": why.pulls,
+            "changes": [{**c._asdict(), "label": labels[c.label]} for c in why.changes],
+        }
+
+
+def text(line: dict[str, Any], info: ModelInfo) -> str:
+    """An explanation for a person."""
+    label, nearest, rival = line["label"], line["nearest"], line["rival"]
+    votes = round(line["confidence"] * len(nearest))
+    lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
+    lines += ["  The nearest training trials, each with its distance:", *map(trial_text, nearest)]
+    if rival:
+        lines += ["  The nearest one with another label:", trial_text(rival)]
+        strongest = list(line["pulls"].items())[:MOST]
+        pulls = ", ".join(f"{name} {pull:+.2f}" for name, pull in strongest)
+        compared = f"for (+) and against (-) {label}, compared with {rival['label']}"
+        lines += wrapped(f"Features {compared}: {pulls}.", "  ")
+    for change in line["changes"][:MOST]:
+        unit = info.units[change["feature"]]
+        plural = f"{unit}s" if unit.isalpha() else unit.removesuffix("1")  # "1" is a ratio's
+        size = f"{change['size']:.2g} {plural}".rstrip()
+        how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
+        if abs(change["mean"]) <= DIRECTED * change["size"]:
+            how = f"varied in another way, by {size} on average"
+        lines += wrapped(f"It would be {change['label']} if {change['feature']} {how}.", "  ")
+    return "\n".join(lines)
+
+
+def trial_text(trial: dict[str, Any]) -> str:
+    """A training trial: distance, name and label."""
+    return f"  {trial['distance']:7.3f}  {trial['trial']}: {trial['label']}"

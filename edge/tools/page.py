@@ -1,0 +1,194 @@
+"""The live page of a skin: its pictures, and the actions that a person can take there."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from edge.errors import InputError
+from edge.events import Decided, Event, Onset
+from edge.recording import Recording, load, save
+from edge.skin.loop import Schedule
+from edge.touch.contact import Contact
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.track import ContactTracker
+
+PICTURE_S = 0.1
+"""Between two pictures."""
+LAST_TRIALS, LAST_NOTICES = 200, 8
+CURVE_S = 5.0
+"""Of a contact, the page draws so many seconds from its onset."""
+MOST_LABELS, LONGEST_LABEL = 16, 80
+
+
+class Page:
+    """The pictures and the actions of a live page.
+
+    Attributes:
+        server: serves the page; `server.link` opens it.
+        labels: {task: label} of the trials that are recorded next.
+        recording: whether contacts are to be saved.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        layout: SkinLayout,
+        *,
+        title: str,
+        folder: Path | None = None,
+        labels: dict[str, str] | None = None,
+        decides: bool = False,
+    ) -> None:
+        """Serve a page.
+
+        Args:
+            address: HOST:PORT, as `WebServer` takes it.
+            layout: the skin, with its thresholds.
+            title: names the skin.
+            folder: of the trials that are recorded; None if none are.
+            labels: of the first trials; without any, recording waits for a person to give some.
+            decides: a model decides on the contacts.
+
+        Raises:
+            InputError: the address cannot be used, or a trial in the folder cannot be read.
+        """
+        from edge.tools.web import WebServer  # commands without a page start sooner without it
+
+        self._folder = folder
+        self.labels = dict(labels or {})
+        self.recording = bool(self.labels)
+        self._trials: dict[str, dict[str, Any]] = {}
+        if folder is not None:
+            for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:]:
+                self.saved(path, load(path))
+        self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
+        self._contact: Contact | None = None
+        self._decisions: dict[str, dict[str, Any]] = {}
+        self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
+        self._due = -float("inf")
+        self._scale = layout.counts_per_newton or 1.0
+        self._fixed = {
+            "title": title,
+            **{key: getattr(layout, key) for key in ("rows", "cols", "wraps", "dead")},
+            "threshold": layout.threshold_counts,
+            "scale": self._scale,
+            "units": {"force": layout.force_unit, "motion": layout.length_unit},
+            "folder": None if folder is None else str(folder),
+            "decides": decides,
+        }
+        self.server = WebServer(address, self._act)
+
+    def push(
+        self, frame: Frame, events: Sequence[Event] = (), schedule: Schedule | None = None
+    ) -> None:
+        """Take in a frame and the events that came with it; now and then, show a picture."""
+        for event in events:
+            if isinstance(event, Onset):
+                self._decisions = {}
+            elif isinstance(event, Decided):
+                self._decisions[event.task] = _decision(event)
+        if not self.server.watched:
+            return
+        self._contact = next(iter(self._tracker.push(frame)), self._contact)
+        if frame.t < self._due:
+            return
+        self._due = frame.t + PICTURE_S * (1.0 - 1e-6)  # the times of frames are rounded
+        picture = {
+            **self._fixed,
+            "t": frame.t,
+            "counts": frame.counts.ravel().tolist(),
+            "invalid": [] if frame.valid is None else (~frame.valid).ravel().nonzero()[0].tolist(),
+            "contact": self._curves(),
+            "decisions": list(self._decisions.values()),
+            "labels": dict(self.labels),
+            "recording": self.recording,
+            "trials": [{"file": name, **trial} for name, trial in list(self._trials.items())],
+            "notices": list(self._notices),
+        }
+        if schedule is not None:
+            picture["missed"] = schedule.missed_ticks
+            picture["rate_hz"] = round(1.0 / schedule.periods.percentile(50), 1)
+        self.server.show(picture)
+
+    def notice(self, text: str) -> None:
+        """Show a sentence, such as the state of a chip."""
+        self._notices.append(text)
+
+    def saved(self, path: Path, trial: Recording) -> None:
+        """Add a trial that has been recorded."""
+        seconds = round(float(trial.t[-1] - trial.t[0]), 2)
+        self._trials[path.name] = {"labels": trial.labels, "seconds": seconds}
+
+    def _curves(self) -> dict[str, Any] | None:
+        """The last contact: its taxels, and its features since onset."""
+        contact, region = self._contact, self._tracker.region
+        if contact is None:
+            return None
+        series = contact.series()
+        return {
+            "ended": contact.ended,
+            "taxels": [] if region is None else region.mask.ravel().nonzero()[0].tolist(),
+            "t": series.t.round(4).tolist(),
+            "force": (series.peak / self._scale).round(4).tolist(),
+            "area": series.area.tolist(),
+            "motion": [None if value != value else round(value, 5) for value in series.motion],
+        }
+
+    def _act(self, action: dict[str, Any]) -> None:
+        """Carry out an action of the page.
+
+        Raises:
+            InputError: it is none, it is not possible here, or a trial cannot be read.
+        """
+        kind = action.get("do")
+        if self._folder is None:
+            raise InputError("this page records nothing; start it with `record --web`")
+        if kind == "labels":
+            self.labels = _labels(action)
+        elif kind == "record":
+            if action.get("on") and not self.labels:
+                raise InputError("give a label first; a trial without one teaches nothing")
+            self.recording = bool(action.get("on"))
+        elif kind not in ("relabel", "delete"):
+            raise InputError(f"{kind!r} is no action")
+        elif (name := action.get("file")) not in list(self._trials):
+            raise InputError(f"{name!r} is none of the trials that this page shows")
+        elif kind == "delete":
+            (self._folder / name).unlink(missing_ok=True)
+            del self._trials[name]
+        else:
+            trial = load(self._folder / name)
+            trial = replace(trial, meta={**trial.meta, "labels": _labels(action)})
+            save(self._folder / name, trial)
+            self.saved(self._folder / name, trial)
+
+
+def _decision(event: Decided) -> dict[str, Any]:
+    """A decision for the page, with the nearest training trials."""
+    line = event.to_dict()
+    distances = [] if event.decision is None else event.decision.distances.round(3).tolist()
+    return {
+        **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
+        "neighbours": list(zip(event.nearest, distances, strict=True)),
+    }
+
+
+def _labels(action: dict[str, Any]) -> dict[str, str]:
+    """The labels of an action.
+
+    Raises:
+        InputError: they are not names with names.
+    """
+    labels = action.get("labels")
+    if not isinstance(labels, dict) or not 1 <= len(labels) <= MOST_LABELS:
+        raise InputError(f"give 1 to {MOST_LABELS} labels, each as TASK=LABEL")
+    for text in (*labels, *labels.values()):
+        printable = isinstance(text, str) and text.strip().isprintable()
+        if not printable or not 0 < len(text.strip()) <= LONGEST_LABEL:
+            raise InputError(
+                f"{text!r} is no label; give 1 to {LONGEST_LABEL} printable characters"
+            )
+    return {task.strip(): label.strip() for task, label in labels.items()}

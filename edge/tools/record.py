@@ -1,0 +1,285 @@
+"""Wait for contacts and save each as a labelled trial.
+
+Waits for a contact, saves it with a short lead-in as one .npz file, and waits for the next one.
+Existing files are never overwritten. With --joints, --fake plays at the original speed. The exit
+status is 1 if nothing was saved, or if --joints gave no angles.
+"""
+
+import argparse
+import math
+import re
+from collections import deque
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
+from edge.commands.output import LOG
+from edge.commands.source import reading
+from edge.errors import InputError
+from edge.files import NameTaken, check_writable, refusing
+from edge.output.event_writer import Lines
+from edge.recording import Recording, save
+from edge.skin.skin import Skin
+from edge.tools import terminal
+from edge.tools.page import Page
+from edge.touch.contact import Contact
+from edge.touch.frame import Frame
+from edge.touch.track import DEBOUNCE, ContactTracker
+
+LONGEST_STEM = 60
+"""Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
+at most 4."""
+LEAD_S = 0.2
+"""Time that a trial keeps from before its onset."""
+LENGTH_S = 2.0
+"""The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
+KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
+DIGITS = "123456789"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_reading(parser, "; labels are given and corrected there")
+    parser.add_argument(
+        "--label",
+        action="append",
+        default=[],
+        type=task_label,
+        metavar="TASK=LABEL",
+        help="what the skin touches, such as object=box; repeat it for several tasks, or in a "
+        "terminal for several labels, which are then chosen by key; not needed with --web",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default="recordings",
+        metavar="FOLDER|FILE.npz",
+        help="a folder for numbered trials (default: %(default)s), or a file for one trial",
+    )
+    parser.add_argument("--trials", type=within(int, 1, 1e9), help="stop after this many trials")
+    parser.add_argument(
+        "--length",
+        type=within(float, 0.1, 600.0),
+        default=LENGTH_S,
+        metavar="SECONDS",
+        help="longest time to keep after onset (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--dof", type=int, help="the number of angles in each line of --joints, without --arm"
+    )
+    add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
+
+
+class Trials:
+    """Cuts a stream of frames into trials, one per contact.
+
+    A trial lasts from the lead-in before onset to the end of the contact, or to `length_s` after
+    onset. No other trial begins while a saved contact continues.
+    """
+
+    def __init__(self, skin: Skin, length_s: float) -> None:
+        self._tracker = ContactTracker(skin.layout, horizon_s=0.0)
+        self._length = length_s
+        self._before: deque[Frame] = deque(maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE)
+        self._frames: list[Frame] | None = None
+        self._saved: Contact | None = None
+
+    def push(self, frame: Frame) -> list[Frame] | None:
+        """Take in a frame; returns the frames of a trial that this frame completes."""
+        contact = next(iter(self._tracker.push(frame)), None)
+        if self._frames is None:
+            self._before.append(frame)
+            if contact is None or contact is self._saved:
+                return None
+            self._saved = contact
+            self._frames = list(self._before)
+        else:
+            self._frames.append(frame)
+        over = contact is None or contact.ended
+        onset_s = math.inf if self._saved is None else self._saved.onset_s
+        return self.rest() if over or frame.t - onset_s >= self._length else None
+
+    def rest(self) -> list[Frame] | None:
+        """End the trial that is under way, if any, and return its frames."""
+        frames, self._frames = self._frames, None
+        self._before.clear()
+        return frames
+
+
+def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
+    """A recording of the frames, with NaN for joint angles that were not known."""
+    valid = np.array([f.valid for f in frames])  # a skin's frames always say which taxels are
+    dof = next((len(f.joints) for f in frames if f.joints is not None), None)
+    joints = np.array([np.full(dof or 0, np.nan) if f.joints is None else f.joints for f in frames])
+    return Recording(
+        t=np.array([f.t - frames[0].t for f in frames]),
+        frames=np.array([f.counts for f in frames]),
+        joints=None if dof is None else joints,
+        valid=None if valid.all() else valid,
+        meta=meta,
+    )
+
+
+def trial_path(out: Path, labels: dict[str, str]) -> Path:
+    """The file for the next trial: `out` itself, or a file with the first free number in `out`.
+
+    Raises:
+        InputError: `out` names a file that exists, or that no folder can hold.
+    """
+    # A listing of the folder omits names that begin with a dot.
+    stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
+    with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
+        if out.suffix != ".npz":
+            taken = {path.name for path in out.glob(f"{stem}-*.npz")}
+            names = (f"{stem}-{number:03}.npz" for number in count(1))
+            return out / next(name for name in names if name not in taken)
+        with suppress(FileNotFoundError):
+            out.lstat()
+            raise InputError(f"{out}: exists already; choose another name or remove it")
+    return out
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Wait for contacts and save them; 1 if there was none."""
+    labels: dict[str, str] = {}
+    for task, label in arguments.label:
+        labels.setdefault(task, label)
+    folder = None if arguments.out.suffix == ".npz" else arguments.out
+    by_key = terminal.is_interactive() and arguments.web is None
+    # Only the page of a folder takes labels.
+    if not labels and (arguments.web is None or folder is None):
+        raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
+    if len(labels) < len(arguments.label) and not by_key:
+        raise InputError("--label names a task twice; only in a terminal do keys choose the label")
+    check_writable(trial_path(arguments.out, labels).parent)
+    arm = open_arm(arguments)
+    dof = arguments.dof if arm is None else arm.dof
+    if arguments.joints is not None and dof is None:
+        raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
+    with (
+        # Angles go by the real clock.
+        reading(arguments, arm=arm, dof=dof, real_time=arguments.joints is not None,
+                folder=folder, labels=labels) as live,
+        closing(live.lines()) as lines,
+        terminal.keys(live.stop) as typed,
+    ):  # fmt: skip
+        if arm is not None and arguments.joints is None and live.dof != dof:
+            raise InputError(
+                f"{live.source} gives {live.dof or 'no'} joint angles, but {arguments.arm} has "
+                f"{dof} joints; name another source with --joints"
+            )
+        names = None if arm is None else arm.names
+        if arguments.joints is None and live.playback is not None:
+            names = live.playback.recording.joint_names
+        skin = live.skin
+        meta = {
+            "skin": skin.layout.to_dict(),
+            "skin_name": skin.file.name,
+            "source": live.source,
+            "rate_hz": skin.file.reading.rate_hz,
+        }
+        if arm is not None:
+            meta["arm"] = arm.to_dict()
+        recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
+        trials = Trials(skin, arguments.length)
+        LOG.info("waiting for a contact" + (KEYS if by_key else ""))
+        choices = arguments.label if by_key else []
+        for digit, (task, label) in zip(DIGITS, choices, strict=False):
+            LOG.info(f"  {digit}  {task}={label}")
+        for frame, faults in live.frames():
+            lines.write(faults)
+            pressed = typed()
+            for key in pressed if by_key else "":
+                recorder.press(key, choices)
+            live.show(frame, faults)
+            recorder.save(trials.push(frame), complete=True)
+            if len(recorder.paths) == (arguments.trials if folder else 1):
+                break
+        else:
+            recorder.save(trials.rest(), complete=False)
+    if not recorder.paths:
+        silent = int((skin.invalid_for > 0).sum())
+        where = f"; taxels without a valid value: {silent}" if silent else ""
+        LOG.warning(f"no contact was saved{where}")
+    elif arguments.joints is not None and not recorder.any_joints:
+        LOG.error("--joints gave no angles at the times of the frames")
+        return 1
+    return 0 if recorder.paths else 1
+
+
+@dataclass
+class Recorder:
+    """Saves trials under the next free names, with their shared metadata.
+
+    Attributes:
+        out: the folder, or the file for a single trial.
+        labels: {task: label} of the next trial.
+        meta: further metadata of every trial.
+        names: the joints' names, or None if they are unknown.
+        lines: where the `saved` and `deleted` events go.
+        page: the live page, which then gives the labels and says whether to save; or None.
+        paths: the trials saved so far and not deleted.
+        any_joints: whether a saved frame had joint angles.
+    """
+
+    out: Path
+    labels: dict[str, str]
+    meta: dict[str, Any]
+    names: Sequence[str] | None
+    lines: Lines
+    page: Page | None = None
+    paths: list[Path] = field(default_factory=list)
+    any_joints: bool = False
+
+    def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
+        """Take a key: the number of a label holds it from now on, d deletes the last trial."""
+        if key in DIGITS[: len(choices)]:
+            task, label = choices[DIGITS.index(key)]
+            self.labels = {**self.labels, task: label}
+            LOG.info("next: " + ", ".join(f"{task}={label}" for task, label in self.labels.items()))
+        elif key in ("d", "D") and self.paths:
+            path = self.paths.pop()
+            path.unlink(missing_ok=True)
+            self.lines.write([{"event": "deleted", "file": str(path)}])
+
+    def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
+        """Save the frames of a trial, if there is one and it is to be saved."""
+        if self.page is not None:
+            self.labels = self.page.labels
+        if frames is None or (self.page is not None and not self.page.recording):
+            return
+        unposed = sum(frame.joints is None for frame in frames)
+        meta = {**self.meta, "labels": self.labels, "complete": complete}
+        if self.names is not None and unposed < len(frames):
+            meta["joint_names"] = list(self.names)
+        trial = recording(frames, meta)
+        while True:
+            path = trial_path(self.out, self.labels)
+            meta["trial"] = path.stem
+            with suppress(NameTaken):  # another recorder in this folder was faster
+                save(path, trial, overwrite=False)
+                break
+        self.paths.append(path)
+        self.any_joints |= trial.joints is not None
+        event = {
+            "event": "saved",
+            "file": str(path),
+            "labels": self.labels,
+            "frames": len(frames),
+            "seconds": round(frames[-1].t - frames[0].t, 3),
+            "joints": trial.joints is not None,
+            "missing_taxels": trial.valid is not None,
+            "complete": complete,
+        }
+        if trial.joints is not None and unposed:
+            LOG.warning(f"{path}: {unposed} of {len(frames)} frames have no joint angles")
+            event["frames_without_joints"] = unposed
+        self.lines.write([event])
+        if self.page is not None:
+            self.page.saved(path, trial)

@@ -1,8 +1,0 @@
-"""Fit and export in the checkout: `PYTHONPATH=. python examples/fit_and_export.py DATA MODEL`."""
-
-import sys
-
-import export
-import train
-
-export.save(sys.argv[2], train.fit(sys.argv[1]))

@@ -1,0 +1,48 @@
+"""Time of the software on top of the wire.
+
+An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls return at once, so
+that only the software takes time.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+import timeit
+from pathlib import Path
+
+from edge.fake.player import calibrated
+from edge.skin import file as skinfile
+from edge.skin.skin import Skin
+from tests.edge.bus.shim import build as shim
+
+ROOT = Path(__file__).parents[2]
+WIRE_S = (12 * 255 + 3 * 20) / 400_000
+"""The shortest time of a frame over three buses: 12 chips and 3 channels on the longest."""
+
+
+def measure() -> float:
+    """Seconds of one full frame over three buses, one after another: processor time of all
+    threads in the best round, without the share of other programs."""
+    with Skin.open(calibrated(skinfile.load(skinfile.shipped("cody")))) as skin:
+        skin.read()
+
+        def frame():
+            for reader in skin.readers:
+                reader.read(reader.slots)
+            skin._assemble(skin.clock.now())
+
+        return min(timeit.repeat(frame, timer=time.process_time, repeat=60, number=20)) / 20
+
+
+def bench_overhead_of_software(note, tmp_path):
+    """An upper bound: one after another, the buses take more time than side by side."""
+    environment = shim.environment(shim.build(tmp_path))
+    command = [
+        sys.executable,
+        "-c",
+        "from tests.bench import bench_bus; print(bench_bus.measure())",
+    ]
+    ours_s = float(subprocess.check_output(command, env=environment, cwd=ROOT))
+    note("the wire at 400 kHz", ours_s / WIRE_S, "at most 0.02", ours_s, WIRE_S)

@@ -1,0 +1,285 @@
+"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and a thing.
+
+The arm is Cody's chain with its masses on gravity-compensated links, driven by an impedance
+controller. Each taxel that can meet the thing is a pad on a spring along its normal, and reads
+the spring's force. The thing stands on a floor under gravity, or is clamped. A soft thing has an
+elastic layer (`mujoco_layer`); a plant is a set of hinged stems.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.recording import Recording
+from edge.touch.arm import Chain
+from tests.bench import mujoco_layer
+from tests.bench.mujoco_layer import ABOVE_FLOOR_M
+from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
+
+MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
+ARM = Chain.cody()
+START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
+RATE_DEG_S = 20.0
+LEAD_S, TOUCH_S, RATE_HZ = 0.3, 1.8, 100
+"""Seconds before the arm meets a rigid thing, and after that at the usual speed."""
+PLACE_M = 0.10
+COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
+RADIUS_M = 0.04604
+ROWS = 16
+FACING_DEG = 76.0
+"""A taxel whose normal lies farther from the push than this cannot meet the thing."""
+PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
+"""A pad's radius around the forearm; its mass; its damping divided by its stiffness."""
+RIGID = "-1e6 -2e3"
+"""Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the mass."""
+RIGID_KINDS = ("box", "drum", "drawer", "door")
+HALF_M = 0.08
+"""Half the length of a thing's foot along the push, and at least half its breadth."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """The thing that is touched.
+
+    Attributes:
+        kind: box, drum, drawer, door, foam, cushion, bale, cloth, limb or plant.
+        mass_kg, floor, skin: its mass, and its friction on the floor and on the skin.
+        height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
+        below_m: how far a rigid face reaches below the middle of the contact (default: the floor).
+        modulus_pa, thick_m: of a soft layer.
+        stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the contact.
+        seed: of a plant's shape.
+        joint: MuJoCo's joint between a movable thing and the room.
+    """
+
+    kind: str
+    mass_kg: float = 1.0
+    floor: float = 0.4
+    skin: float = 0.4
+    height_m: float = 0.2
+    breadth_m: float = 0.1
+    below_m: float = ABOVE_FLOOR_M
+    modulus_pa: float = 8e3
+    thick_m: float = 0.1
+    stems: int = 8
+    stem_n_m: float = 10.0
+    seed: int = 0
+    joint: str = "<freejoint/>"
+
+    @property
+    def soft(self) -> bool:
+        """Whether it yields."""
+        return self.kind not in RIGID_KINDS
+
+    @property
+    def layered(self) -> bool:
+        """Whether it has an elastic layer."""
+        return self.soft and self.kind != "plant"
+
+
+@dataclass(frozen=True)
+class Touch:
+    """How the thing is touched; the defaults are those of a perfect machine.
+
+    Attributes:
+        start_rad: (dof,) added to the arm's first angles.
+        place_m: place of the contact along the forearm, from the wrist.
+        aside_m, yaw_rad: the thing's distance beside the push, and its turn.
+        slope_rad: slope of the table along the push.
+        taxel_n_m: stiffness of the pads.
+        speed, stiffness: of the arm, in units of Cody's; its damping ratio stays.
+        noise: standard deviation in counts, and its stream.
+    """
+
+    thing: Thing
+    fixed: bool
+    start_rad: tuple[float, ...] = (0.0,) * 5
+    place_m: float = PLACE_M
+    aside_m: float = 0.0
+    yaw_rad: float = 0.0
+    slope_rad: float = 0.0
+    taxel_n_m: float = 10e3
+    speed: float = 1.0
+    stiffness: float = 1.0
+    noise: tuple[float, np.random.Generator] | None = None
+
+    @property
+    def pad_n_m(self) -> float:
+        """Stiffness of a pad, in series with the layer beneath it where there is a layer."""
+        if not self.thing.layered:
+            return self.taxel_n_m
+        return 1.0 / (1.0 / self.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(self.thing.modulus_pa))
+
+    @property
+    def rate_rad_s(self) -> NDArray[np.float64]:
+        """(dof,) speed of the equilibrium point: the first joint swings."""
+        return np.eye(ARM.dof)[0] * math.radians(RATE_DEG_S * self.speed)
+
+    @property
+    def lag_rad(self) -> NDArray[np.float64]:
+        """(dof,) by which each joint trails its equilibrium point in free motion."""
+        seconds = np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) / math.sqrt(self.stiffness)
+        return seconds * self.rate_rad_s
+
+
+def joined(numbers: Any) -> str:
+    """Numbers as MuJoCo reads them."""
+    return " ".join(map(str, numbers))
+
+
+def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
+    """The arm's bodies, and the (row, column) of each pad."""
+    links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
+    pads, where = "", []
+    for row in range(ROWS):
+        for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
+            if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
+                continue
+            out = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+            x, y = ((RADIUS_M - PAD_M) * v for v in out)
+            pads += (
+                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}" '
+                f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
+            )
+            where.append((row, column))
+    xml, at = "", "0 0 0"
+    for i, joint in enumerate(ARM.joints):
+        size, mass, centre = links.get(i, ("0.02 0.01", 0.05, "0 0 0"))
+        loss = CODY_DAMPING[i] * math.sqrt(touch.stiffness)
+        xml += (
+            f'<body pos="{at}" gravcomp="1" childclass="link"><joint name="j{i}" '
+            f'axis="{joined(joint.axis)}" damping="{loss}"/>'
+            f'<geom size="{size}" pos="{centre}" mass="{mass}"/>'
+        )
+        at = joined(joint.translate)
+    return xml + pads + "</body>" * ARM.dof, where
+
+
+def stems_xml(thing: Thing) -> str:
+    """The stems of a plant, which bend along the push."""
+    rng = np.random.default_rng(thing.seed)
+    hinge, xml = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2, ""
+    for _ in range(thing.stems):
+        x = 0.012 + rng.uniform(0.0, 0.08)
+        y = rng.uniform(-0.5, 0.5) * min(thing.breadth_m, 0.15)
+        half = rng.uniform(0.34, 0.5) / 2
+        xml += (
+            f'<body pos="{x} {y} 0.02" childclass="stem"><joint stiffness="{hinge}" '
+            f'damping="{0.03 * hinge}"/><geom size="0.006 {half}" pos="0 0 {half}"/></body>'
+        )
+    return xml
+
+
+def upper_xml(thing: Thing) -> tuple[str, str]:
+    """What stands on the thing's foot, and the springs and the face of a layer."""
+    if thing.layered:
+        return mujoco_layer.layer_xml(
+            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m
+        )
+    if thing.soft:
+        return stems_xml(thing), ""
+    half, across = (thing.below_m + thing.height_m / 2) / 2, thing.breadth_m / 2
+    deep, shape = HALF_M, f'type="box" size="{HALF_M} {across} {half}"'
+    if thing.kind == "drum":
+        deep, shape = across + HALF_M, f'type="cylinder" size="{across + HALF_M} {half}"'
+    place = f'pos="{deep} 0 {ABOVE_FLOOR_M + thing.height_m / 2 - half}"'
+    return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
+
+
+def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, int]]]:
+    """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
+    # It warns, and writes a file, of each face that only a layer's knots hold.
+    mujoco.set_mju_user_warning(lambda text: None)
+    thing, k = touch.thing, touch.pad_n_m
+    start, rate = np.radians(START_DEG) + np.array(touch.start_rad), touch.rate_rad_s
+    first = start - touch.lag_rad
+    pose, later = ARM.pose(first + rate * LEAD_S), ARM.pose(first + rate * (LEAD_S + 0.01))
+    on = np.array([0.0, 0.0, touch.place_m, 1.0])
+    point = (pose @ on)[:3]
+    speed = (later @ on)[:3] - point
+    heading = math.atan2(speed[1], speed[0])
+    ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+    across = pose[:3, :3].T @ ahead
+    arm, where = arm_xml(math.degrees(math.atan2(across[1], across[0])), touch)
+    aside = np.array([-ahead[1], ahead[0], 0.0]) * touch.aside_m
+    x, y, z = point + ahead * (RADIUS_M + 0.001) + aside
+    upper, layer = upper_xml(thing)
+    motors = (
+        f'<position joint="j{i}" kp="{CODY_STIFFNESS[i] * touch.stiffness}"/>'
+        for i in range(ARM.dof)
+    )
+    slope, g = touch.slope_rad, 9.81
+    gravity = joined((*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope)))
+    words = {**vars(thing), "x": x, "y": y, "floor_m": z - ABOVE_FLOOR_M}
+    words |= {"pad_n_m": k, "pad_loss": PAD_LOSS_S * k, "pad_kg": PAD_KG, "gravity": gravity}
+    words |= {"contact": RIGID, "dimensions": 3, "turn_rad": heading + touch.yaw_rad}
+    words |= {"foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}", "foot_x": HALF_M}
+    words |= {"foot_kg": thing.mass_kg * 0.8, "motors": "".join(motors)}
+    words |= {"arm": arm, "upper": upper, "layer": layer}
+    if touch.fixed:
+        words["joint"] = ""
+    if thing.layered:
+        words |= {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
+        words["pad_loss"] = 2.0 * math.sqrt(k * PAD_KG)
+    return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
+
+
+def simulate(touch: Touch) -> tuple[Recording, NDArray[np.float64], NDArray[np.float64]]:
+    """One touch, as the board would have recorded it.
+
+    Returns:
+        The recording; (n,) newtons that the pads bear; (n,) metres that the thing has moved at the
+        height of the contact. The skin cannot see the last two.
+    """
+    model, start, where = model_of(touch)
+    thing, rate, dof = touch.thing, touch.rate_rad_s, ARM.dof
+    data = mujoco.MjData(model)
+    data.qpos[:dof] = start - touch.lag_rad
+    data.qvel[:dof] = rate
+    mujoco.mj_forward(model, data)
+    rub = mujoco_layer.Rub(model, thing.skin) if thing.layered else None
+
+    def pressed() -> NDArray[np.float64]:
+        """(pads,) newtons; the pads' joints follow the arm's."""
+        return np.maximum(-touch.pad_n_m * data.qpos[dof : dof + len(where)], 0.0)
+
+    # A soft thing is felt later, the more so the slower the arm.
+    lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
+    t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
+    loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
+    joints, places = np.zeros((len(t), dof)), np.zeros((len(t), 3))
+    row, column = np.array(where).T
+    body = data.body("thing")
+    for i in range(len(t)):
+        loads[i, row, column] = pressed()
+        joints[i] = data.qpos[:dof]
+        places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
+        for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
+            data.ctrl[:] = start + rate * data.time
+            if rub is not None:
+                rub.hold(data, pressed())
+            mujoco.mj_step(model, data)
+    counts = loads * COUNTS_PER_NEWTON
+    if touch.noise is not None:
+        size, generator = touch.noise
+        counts += generator.normal(0.0, size, counts.shape)
+    frames = np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16)
+    condition = "fixed" if touch.fixed else "movable"
+    soft = "soft" if thing.soft else "rigid"
+    labels = {"category": f"{soft}-{condition}", "mobility": condition}
+    labels |= {"softness": soft, "object": thing.kind}
+    skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
+    skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
+    source = "MuJoCo, tests/bench/mujoco_touch.py"
+    meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
+    recording = Recording(t, frames, joints=joints, meta=meta)
+    moved_m = np.hypot(*(places - places[0])[:, :2].T)
+    return recording, loads.sum(axis=(1, 2)), moved_m

@@ -1,0 +1,217 @@
+"""`make stopping`: deciding when sure beside fixed windows and beside others' early decisions.
+
+All decide on the same five folds; ours has the settings of an export. Extra trees decide at the
+first point at which their highest class probability passes a threshold. CALIMERA (Bilski and
+Jastrzebska, CALIMERA: a new early time series classification method, 2023) decides on the same
+features with calibrated ridge classifiers, at several prices of waiting. Columns are compared at
+the same mean time, between two thresholds or prices by interpolation. The gain is by how much
+deciding when sure errs less than the fixed window; its standard error treats the two shares as
+independent, which overstates it.
+
+The second table has rules that choose their mean time themselves: aeon's TEASER (Schäfer and Leser,
+TEASER: early and accurate time series classification, 2020) and its threshold of the probability,
+0.85. Both ask extra trees about the paper's three features at each frame until then, every
+0.2 s. aeon teaches TEASER which answers to trust by answers to whole series.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from aeon.classification.early_classification import TEASER, ProbabilityThresholdEarlyClassifier
+from aeon.classification.sklearn import SklearnClassifierWrapper
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from sklearn.calibration import CalibratedClassifierCV
+from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.linear_model import RidgeClassifier
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from edge.cli import dispatch
+from edge.model.stopping import StoppingRule
+from edge.touch.features import FEATURES, SAMPLES
+from train.dataset import read
+from train.evaluate import stratified_folds
+from train.feature_sets import expand
+from train.rules import NEVER, THRESHOLDS, Course
+from train.stopping import finest
+from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
+from train.tradeoff.choices import followed
+from train.tradeoff.early import FOLDS, compare_stopping
+
+SECONDS = np.array(DECISION_POINTS_S)
+RATE_HZ = 100
+"""Frames of the series that aeon's rules look at."""
+WAITING = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
+"""Prices of waiting for the full window, in wrong decisions."""
+AEON = {"TEASER": TEASER, "threshold 0.85": ProbabilityThresholdEarlyClassifier}
+NAMES = ("paper", "contact")
+"""The features of the extra trees and of CALIMERA."""
+Curve = list[tuple[float, float]]
+"""(mean seconds, share wrong) at each threshold or price."""
+
+
+def decided(stops: NDArray[np.int64], right: NDArray[np.bool_]) -> tuple[float, float]:
+    """(mean seconds, share wrong) of trials that are decided at the points `stops` (n,)."""
+    return float(SECONDS[stops].mean()), 1.0 - float(right[stops, np.arange(len(stops))].mean())
+
+
+def extra_trees(
+    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
+) -> Curve:
+    """Extra trees at each decision point, X (points, n, p), that decide when sure."""
+    model, split = ExtraTreesClassifier(random_state=0), PredefinedSplit(folds)
+    shares = np.stack(
+        [cross_val_predict(model, x, labels, cv=split, method="predict_proba") for x in X]
+    )
+    right, confidence = np.unique(labels)[shares.argmax(axis=2)] == labels, shares.max(axis=2)
+    confidence[-1] = 1.0
+    return [decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS]
+
+
+def halts(
+    known: NDArray[np.float64], new: NDArray[np.float64], waiting: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """(m,) the point at which CALIMERA decides: the first at which no later one is cheaper.
+
+    At each point but the last a kernel ridge regression on the two highest probabilities predicts
+    how much cheaper it is to go on, from the last point to the first.
+
+    Args:
+        known: (points, n, classes) probabilities of trials that no part of their model has seen.
+        new: (points, m, classes) probabilities of the trials to decide.
+        waiting: (points,) price of waiting, in wrong decisions.
+    """
+    known, new = np.sort(known)[..., -2:], np.sort(new)[..., -2:]
+    prices = 1.0 - known[..., -1] + waiting[:, None]
+    best, at = prices[-1], np.full(new.shape[1], len(waiting) - 1)
+    for point in range(len(waiting) - 2, -1, -1):
+        model = KernelRidge(kernel="rbf").fit(known[point], prices[point] - best)
+        best = np.where(model.predict(known[point]) <= 0.0, prices[point], best)
+        at[model.predict(new[point]) <= 0.0] = point
+    return at
+
+
+def calimera(X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]) -> Curve:
+    """CALIMERA at each decision point, X (points, n, p), a row for each of `WAITING`."""
+    stops = np.empty((len(WAITING), len(labels)), dtype=np.int64)
+    right = np.empty(X.shape[:2], dtype=bool)
+    ridge = make_pipeline(StandardScaler(), RidgeClassifier(alpha=10.0))
+    model = CalibratedClassifierCV(ridge, cv=2)
+    for fold in range(FOLDS):
+        test = folds == fold
+        known, new = [], []
+        for point, vectors in enumerate(X):
+            train = vectors[~test], labels[~test]
+            known.append(cross_val_predict(model, *train, cv=3, method="predict_proba"))
+            new.append(model.fit(*train).predict_proba(vectors[test]))
+            right[point, test] = model.classes_[new[-1].argmax(axis=1)] == labels[test]
+        for i, price in enumerate(WAITING):
+            waiting = price * SECONDS / SECONDS[-1]
+            stops[i, test] = halts(np.array(known), np.array(new), waiting)
+    return [decided(at, right) for at in stops]
+
+
+def of_aeon(
+    make: Callable[..., Any], series: NDArray, labels: NDArray, folds: NDArray
+) -> tuple[float, float]:
+    """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames * features)."""
+    trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
+    looks = SECONDS[::2]  # half as many, as TEASER is slow
+    points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
+    seconds, right = np.empty(len(labels)), np.empty(len(labels), dtype=bool)
+    for fold in range(FOLDS):
+        test = folds == fold
+        model = make(trees, classification_points=points, random_state=0)
+        model.fit(series[~test], labels[~test]).predict(series[test])
+        stop, _, said, _ = model.get_state_info().T
+        seconds[test], right[test] = looks[stop], model.classes_[said] == labels[test]
+    return float(seconds.mean()), 1.0 - float(right.mean())
+
+
+def peers(
+    X: NDArray, series: NDArray, labels: NDArray, folds: NDArray
+) -> tuple[list[Curve], dict[str, tuple[float, float]]]:
+    """The curves of extra trees and of CALIMERA on a task, and the points of aeon's rules."""
+    curves = [extra_trees(X, labels, folds), calimera(X, labels, folds)]
+    return curves, {name: of_aeon(make, series, labels, folds) for name, make in AEON.items()}
+
+
+def at(rows: Curve, seconds: float) -> float:
+    """The percentage wrong at a mean time, interpolated; NaN before the soonest decision."""
+    times, wrong = zip(*sorted(rows), strict=True)
+    return 100.0 * float(np.interp(seconds, times, wrong, left=np.nan))
+
+
+def cell(percentage: float) -> str:
+    """A percentage for a table; a dash where it is NaN."""
+    return "-" if np.isnan(percentage) else f"{percentage:.1f}"
+
+
+def when_sure(course: Course) -> Curve:
+    """Stopping at each threshold."""
+    curve = []
+    for threshold in (NEVER, *THRESHOLDS.tolist()):
+        stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1))
+        curve.append((float(SECONDS[stops].mean()), float(wrong.mean())))
+    return curve
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and print the tables."""
+    dataset = followed(read(arguments.data), NAMES, quick=arguments.quick)
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    folds = stratified_folds(y[finest(y)], FOLDS)
+    X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
+    frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
+    paper, n = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES), len(folds)
+    series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
+    form = {"quick": arguments.quick, "jobs": arguments.jobs}
+    compared = compare_stopping(dataset, DECISION_POINTS_S, **form)
+    others = Parallel(n_jobs=arguments.jobs)(
+        delayed(peers)(X, series, y[task], folds) for task in compared
+    )
+    print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | CALIMERA |")
+    print("|---" * 7 + "|")
+    table = ["| task | rule | mean time, s | % wrong | when sure, at that time |", "|---" * 5 + "|"]
+    for (task, ours), (curves, points) in zip(compared.items(), others, strict=True):
+        fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
+        sure = when_sure(ours.course)
+        for seconds in DECISION_POINTS_S:
+            waited, stopped, *others_wrong = (at(way, seconds) for way in (fixed, sure, *curves))
+            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)
+            gain = "-" if np.isnan(error) else f"{waited - stopped:.1f} ± {error:.1f}"
+            cells = [cell(waited), cell(stopped), gain, *map(cell, others_wrong)]
+            print(f"| {task} | {seconds:.1f} |", " | ".join(cells), "|")
+        for name, (seconds, wrong) in points.items():
+            cells = f"{seconds:.2f} | {100 * wrong:.1f} | {cell(at(sure, seconds))}"
+            table.append(f"| {task} | {name} | {cells} |")
+    print("", *table, "", sep="\n")
+    for task, ours in compared.items():
+        for rule in ours.certified:
+            print(
+                f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
+                f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) at {rule.mean_s:.2f} s"
+            )
+    return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    top = argparse.ArgumentParser(prog="tests.bench.stopping", description=__doc__)
+    top.add_argument("--data", nargs="+", required=True, metavar="REC", help=".npz or folders")
+    top.add_argument("--quick", action="store_true", help="the settings of a quick export")
+    top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
+    top.set_defaults(run=run)
+    return dispatch(top, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

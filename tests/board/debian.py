@@ -1,0 +1,93 @@
+"""Debian packages in a folder: fetched with the machine's own apt, without installing anything."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from string import Template
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+APT = Template((CHECKOUT / "tests" / "board" / "apt.conf").read_text())
+
+
+class Unavailable(Exception):
+    """This machine lacks something that the test needs; the message is a sentence."""
+
+
+@contextmanager
+def skipping() -> Iterator[None]:
+    """Skip the test where something is unavailable, but not in CI."""
+    try:
+        yield
+    except Unavailable as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(str(error))
+
+
+def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
+    """Make a folder, unless it was made by the same recipe before; a failed one is not kept."""
+    stamp = target / ".made-from"
+    if not (stamp.is_file() and stamp.read_text() == recipe):
+        fresh = target.with_name(target.name + ".new")
+        for old in (fresh, target):
+            shutil.rmtree(old, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        make(fresh)
+        (fresh / stamp.name).write_text(recipe)
+        fresh.rename(target)
+    return target
+
+
+def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
+    """A folder with packages and their dependencies; their installation scripts do not run.
+
+    Raises:
+        Unavailable: apt cannot fetch them.
+    """
+
+    def unpack(fresh: Path) -> None:
+        apt = fresh.with_suffix(".apt")
+        shutil.rmtree(apt, ignore_errors=True)
+        for folder in ("lists/partial", "archives/partial"):
+            (apt / folder).mkdir(parents=True)
+        (apt / "status").touch()
+        (apt / "apt.conf").write_text(APT.substitute(architecture=architecture, folder=apt))
+        hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
+        get = ["env", f"APT_CONFIG={apt}/apt.conf", "apt-get", "--quiet"]
+        run([*get, "update"], hint)
+        run([*get, "install", "--download-only", "--yes", *packages], hint)
+        for archive in sorted((apt / "archives").glob("*.deb")):
+            run(["dpkg", "--extract", str(archive), str(fresh)])
+        shutil.rmtree(apt)
+
+    return once(target, "\n".join((architecture, *packages)), unpack)
+
+
+def program(system: Path, name: str) -> list[str]:
+    """The command of a program among unpacked packages, with their loader and libraries."""
+    loader = next(system.glob("lib*/ld-linux*"))
+    libraries = {str(path.parent) for path in system.rglob("*-linux-gnu*/lib*.so.*")}
+    return [str(loader), "--library-path", ":".join(libraries), f"{system}/usr/bin/{name}"]
+
+
+def run(command: Sequence[str], hint: str = "") -> str:
+    """The text that a command prints.
+
+    Raises:
+        Unavailable: it fails; the sentence has the hint and the command's last words.
+    """
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise Unavailable(f"{command[0]} is not on this machine; use Debian or Ubuntu") from None
+    if done.returncode:
+        last = "; ".join((done.stderr.strip() or done.stdout.strip()).splitlines()[-2:])
+        raise Unavailable(f"{hint or command[0]}: {last}")
+    return done.stdout.strip()

@@ -1,0 +1,77 @@
+"""The wheel in an empty environment outside the checkout, as an owner installs it.
+
+`make wheel-test` builds it and runs this.
+"""
+
+import os
+import subprocess
+import sys
+import zipfile
+from email.parser import Parser
+
+import pytest
+
+import edge
+from tests.board.debian import CHECKOUT
+
+LARGEST = 240_000
+
+
+@pytest.fixture(scope="session")
+def contents(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture(scope="session")
+def command(wheel, tmp_path_factory):
+    """Runs `edge-classify ...` from a fresh environment, in an empty folder."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    programs = folder / "env" / "bin"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", programs.parent], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet"]
+    subprocess.run([*pip, "-c", CHECKOUT / "constraints.txt", wheel], check=True)
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+
+    def run(*arguments, program="edge-classify"):
+        command = [programs / program, *map(str, arguments)]
+        caught = {"capture_output": True, "text": True, "check": False}
+        return subprocess.run(command, cwd=folder, env=environment, **caught)
+
+    return run
+
+
+def test_it_is_small(wheel):
+    assert wheel.stat().st_size <= LARGEST
+
+
+def test_it_holds_edge_alone_and_all_of_it(contents):
+    inside = {name for name in contents if ".dist-info/" not in name}
+    tracked = subprocess.check_output(["git", "ls-files", "edge"], cwd=CHECKOUT, text=True)
+    assert inside == set(tracked.split())
+
+
+def test_it_names_three_dependencies_one_version_and_a_licence(contents):
+    (metadata,) = (v for k, v in contents.items() if k.endswith(".dist-info/METADATA"))
+    fields = Parser().parsestr(metadata.decode())
+    needed = [n.split(">")[0] for n in fields.get_all("Requires-Dist") if "extra ==" not in n]
+    assert sorted(needed) == ["numpy", "onnxruntime", "smbus2"]
+    assert fields["Version"] == edge.__version__
+    assert fields["License-Expression"] == "BSD-3-Clause"
+    assert any(name.endswith("/LICENSE") for name in contents)
+
+
+def test_the_demo_decides_rightly_and_meets_its_golden_outputs(command):
+    done = command("demo")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "edge-classify: 12 of 12 decisions are right\n"
+    where = command("-c", "import edge.demo; print(edge.demo.MODEL)", program="python")
+    golden = CHECKOUT / "tests" / "golden" / "demo.npz"
+    done = command("verify", "--model", where.stdout.strip(), "--golden", golden)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_command_without_hardware_says_so_in_one_sentence(command):
+    done = command("run", "--model", "model.onnx", "--skin", "skin.toml")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("edge-classify: ")

@@ -1,0 +1,92 @@
+"""The mux: each channel is a bus, and no two muxes are open at once."""
+
+import errno
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+from edge.bus.i2c import BusFault
+from edge.bus.tca9548a import LEAVE_ATTEMPTS, TCA9548A, FakeTCA9548A
+from edge.chips.ad7147 import AD7147, FakeAD7147
+from tests.edge.chips.chips import parsed
+from tests.faulty import Fault, FaultyBus
+
+
+def muxed(**options):
+    bus = FaultyBus(chips={0x70: FakeTCA9548A(), 0x71: FakeTCA9548A()})
+    for m, mux in enumerate((0x70, 0x71)):
+        for n in range(8):
+            value = np.full(12, 1000 * (m + 1) + n, dtype=np.uint16)
+            bus.chips[mux].channels[n][0x2C] = FakeAD7147(lambda t, v=value: v)
+    return bus, TCA9548A(bus, 0x70, **options)
+
+
+def test_each_channel_is_a_bus_with_its_own_chip():
+    _, mux = muxed()
+    chips = [AD7147(mux.channel(n), 0x2C) for n in range(8)]
+    for chip in chips:
+        list(chip.settings())
+    for n in (3, 3, 0, 7):
+        assert parsed(chips[n])[0].tolist() == [1000 + n] * 12
+
+
+def beside(bus):
+    """Both muxes of a bus, which know of each other."""
+    muxes = []
+    for address in (0x70, 0x71):
+        muxes.append(TCA9548A(bus, address, beside=muxes))
+    return muxes
+
+
+def test_two_muxes_on_one_bus_are_never_open_at_once():
+    bus, _ = muxed()
+    chips = [AD7147(mux.channel(2), 0x2C) for mux in beside(bus)]
+    for chip in chips:
+        list(chip.settings())
+    for i in (0, 1, 0, 1):
+        assert parsed(chips[i])[0].tolist() == [1000 * (i + 1) + 2] * 12
+        assert [m.connected for m in bus.chips.values()].count([2]) == 1
+
+
+@pytest.mark.parametrize(("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)])
+def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(absent, opens):
+    """One that has gone must not cost the chips of this one."""
+    bus, _ = muxed()
+    first, second = beside(bus)
+    second.select(5)
+    bus.inject([Fault(address=0x71, at=range(absent))])
+    first.select(3)
+    assert first.control == 1 << 3
+    assert bus.met == absent
+    assert (bus.chips[0x71].connected == []) == opens
+
+
+@pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
+def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(verify, bits):
+    bus, mux = muxed(verify=verify)
+    for spent in (bits, 0):
+        before = bus.bits
+        mux.select(6)
+        assert bus.bits - before == spent
+
+
+def test_after_an_error_the_channel_is_selected_again():
+    bus, mux = muxed()
+    channel = mux.channel(4)
+    chip = AD7147(channel, 0x2C)
+    bus.inject([Fault(code=errno.EIO, at=[0])])
+    with pytest.raises(BusFault):
+        channel.transfer(chip.frame)
+    assert mux.control is None
+    channel.transfer(chip.frame)
+    assert mux.control == 1 << 4
+
+
+def test_a_wrong_channel_is_caught_by_reading_back_and_only_by_it():
+    for verify in (True, False):
+        bus, mux = muxed(verify=verify)
+        bus.inject([Fault(kind="misroute", at=[0])])
+        with pytest.raises(BusFault) if verify else nullcontext():
+            mux.select(1)
+        assert (mux.control, bus.chips[0x70].connected) == (None if verify else 2, [2])

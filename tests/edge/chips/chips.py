@@ -1,0 +1,32 @@
+"""The fake chips that the drivers' tests share, and the values that they sense."""
+
+import numpy as np
+
+from edge.chips import ad7147, block, mpr121
+from edge.chips.ad7147 import AD7147, FakeAD7147
+from edge.chips.block import Block, FakeBlock
+from edge.chips.chip import ChipSpec
+from edge.chips.mpr121 import MPR121, FakeMPR121
+
+VALUES = np.arange(12, dtype=np.uint16) * 37 + 300
+
+
+def sense(t):
+    return VALUES
+
+
+def parsed(chip, bits=16):
+    """Read a chip of 12 taxels: its values, and which of them are intact."""
+    chip.read()
+    kind = {AD7147: ad7147.KIND, MPR121: mpr121.KIND, Block: block.KIND}[type(chip)]
+    spec = ChipSpec(kind, chip.address, tuple(range(12)), options={"bits": bits})
+    values, intact = kind.parse(chip.frame.buffer[None], spec)
+    return values[0], intact[0]
+
+
+CHIPS = {
+    "ad7147": (AD7147, FakeAD7147, 0x2C, {}),
+    "mpr121": (MPR121, FakeMPR121, 0x5A, {}),
+    "block16": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 16}),
+    "block12": (Block, FakeBlock, 0x28, {"taxels": 12, "bits": 12}),
+}

@@ -1,0 +1,118 @@
+"""The list of chips: a further chip is one entry. The defaults that a skin file need not give."""
+
+import numpy as np
+import pytest
+
+from edge.bus.i2c import fetch
+from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Option
+from edge.chips.kinds import KINDS
+from edge.errors import InputError
+from edge.fake.player import fake_skin
+from edge.recording import Recording, save
+from edge.skin import file as skinfile
+from edge.skin.file import Signal, parse
+from tests.edge.skin.small import mpr121
+
+
+def test_an_mpr121_works_without_a_single_setting():
+    """Its values fall with a touch, and a touch takes some tens of its 10 bits."""
+    file = parse(mpr121())
+    assert file.chips[0].sign == -1
+    shipped = skinfile.load(skinfile.shipped("mpr121"))
+    assert file.signal == shipped.signal
+    layouts = (file.layout, shipped.layout)
+    assert {(layout.threshold_counts, layout.onset) for layout in layouts} == {(8, 16)}
+
+
+def test_values_of_the_file_replace_the_defaults():
+    file = parse(mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1"))
+    assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
+    assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)
+
+
+def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
+    text = mpr121(skin="threshold_counts = 5").replace("rows = 3", "rows = 6")
+    more = '[[bus]]\ndevice = 2\nkind = "block"\n'
+    file = parse(text + more + "chips = [{ address = 0x28, first = [3, 0], block = [3, 4] }]")
+    assert [chip.sign for chip in file.chips] == [-1, 1]
+    assert file.signal == Signal()
+
+
+class Toy(Chip):
+    """A chip of four taxels of 8 bits behind the pointer 0x10, with an identity at 0x00."""
+
+    def __init__(self, bus, address, into):
+        super().__init__(bus, address, b"\x10", into)
+        if fetch(bus, address, b"\x00", 1) != b"\x70":
+            raise self.wrong("not a toy")
+
+    def healthy(self):
+        return fetch(self.bus, self.address, b"\x00", 1) == b"\x70"
+
+
+class FakeToy(FakeChip):
+    def __init__(self, sense):
+        self.sense = sense
+        self.reset()
+
+    def reset(self):
+        self.pointer = 0
+
+    def write(self, data, t):
+        self.pointer = data[0]
+
+    def read(self, n, t):
+        return b"\x70" if self.pointer == 0 else self.sense(t).astype(np.uint8).tobytes()
+
+
+TOY = ChipKind(
+    name="toy",
+    description="a toy",
+    driver=lambda bus, spec, into: Toy(bus, spec.address, into),
+    parse=lambda data, spec: (data.astype(np.uint16), data > 0),
+    fake=lambda spec, sense, timed, power_up: FakeToy(sense),
+    frame_bytes=lambda spec: 4,
+    highest=lambda spec: 200,
+    rest=lambda spec: 20,
+    stages=4,
+    options={"speed": Option(1, (1, 2))},
+    defaults=lambda options: Defaults(threshold_counts=options["speed"] * 10, onset_counts=30),
+)
+TOY_SKIN = """[skin]
+rows = 2
+cols = 4
+[[bus]]
+device = 1
+kind = "toy"
+speed = 2
+block = [2, 2]
+chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
+"""
+
+
+def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
+    """The file, the skin, the fake, `scan` and `calibrate` know it from its descriptor."""
+    monkeypatch.setitem(KINDS, "toy", TOY)
+    file = parse(TOY_SKIN)
+    assert (file.layout.threshold_counts, file.layout.onset) == (20, 30)
+    picture = np.arange(8, dtype=np.uint16).reshape(2, 4) * 10
+    with fake_skin(file, lambda t: picture) as skin:
+        np.testing.assert_array_equal(skin.read().counts, picture)
+        assert (skin.raw()[0] == picture + 20).all()
+    path, recording = tmp_path / "toy.toml", tmp_path / "rest.npz"
+    path.write_text(TOY_SKIN)
+    save(recording, Recording(np.arange(50) / 100.0, np.zeros((50, 2, 4), np.uint16)))
+    fake = ("--skin", path, "--fake", recording)
+    status, events, _ = edge("scan", *fake)
+    assert status == 0
+    assert [(event["kind"], event["state"]) for event in events] == [("toy", "running")] * 2
+    assert edge("calibrate", *fake, "--frames", 40)[0] == 0
+    assert (skinfile.load(path).calibration.baseline == 20).all()
+
+
+def test_an_option_belongs_to_its_kind(monkeypatch):
+    monkeypatch.setitem(KINDS, "toy", TOY)
+    with pytest.raises(InputError, match="speed must be one of 1, 2, not 3"):
+        parse(TOY_SKIN.replace("speed = 2", "speed = 3"))
+    with pytest.raises(InputError, match="bus 0 chip 0: unknown key speed"):
+        parse(mpr121().replace("first", "speed = 1, first"))

@@ -1,0 +1,97 @@
+"""`edge-classify run` as a service: under a stand-in for systemd's socket, and the unit itself."""
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from configparser import ConfigParser
+from pathlib import Path
+
+import pytest
+
+from edge import demo
+from edge.cli import parser
+from tests.conftest import ROOT
+from train.touch_map import TouchMap
+
+UNIT = ROOT / "docs" / "examples" / "service" / "edge-classify.service"
+TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
+
+
+def start(manager, *arguments):
+    fake = ("--fake", str(TOUCH), "--loop")
+    return subprocess.Popen(
+        [sys.executable, "-m", "edge", "run", "--model", str(demo.MODEL), *fake, *arguments],
+        cwd=ROOT,
+        env={**os.environ, "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, tmp_path):
+    place = tmp_path / "map.jsonl"
+    with start(manager, "--map", str(place)) as process:
+        assert manager.recv(4096) == f"READY=1\nSTATUS=reading fake {TOUCH}".encode()
+        for _ in range(3):
+            assert manager.recv(4096) == b"WATCHDOG=1"
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+        said = {manager.recv(4096)}
+        while b"STOPPING=1" not in said:
+            said.add(manager.recv(4096))
+    assert said <= {b"WATCHDOG=1", b"STOPPING=1"}
+    assert (process.returncode, err) == (0, "")
+    assert out.endswith("\n")
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert lines[-1]["event"] == "end"
+    assert len(list(TouchMap(place))) == len(
+        {line["contact"] for line in lines if line["event"] == "decision"}
+    )
+
+
+@pytest.fixture
+def unit():
+    config = ConfigParser(interpolation=None, delimiters=("=",))
+    config.optionxform = str
+    config.read(UNIT)
+    return config
+
+
+def examples():
+    """The arguments in the unit's environment file: those that hold, and those in a comment."""
+    lines = UNIT.with_suffix(".env").read_text().splitlines()
+    return [line.partition("=")[2] for line in lines if line.lstrip("#").startswith("ARGUMENTS=")]
+
+
+def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_takes(unit):
+    program, *words = shlex.split(unit["Service"]["ExecStart"])
+    assert (Path(program).name, words.pop()) == ("edge-classify", "$ARGUMENTS")
+    without, arm = (
+        parser().parse_args([*words, *shlex.split(*shlex.split(e))]) for e in examples()
+    )
+    assert (without.udp, without.joints, arm.joints) == ("127.0.0.1:47400", None, "udp:47401")
+    assert arm.map == f"/var/lib/{unit['Service']['StateDirectory']}/map.jsonl"
+
+
+def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):
+    """A robot whose buses appear a minute after boot must not stay without decisions.
+
+    `make service-test` starts it under a real systemd.
+    """
+    service = unit["Service"]
+    assert (service["Restart"], service["RestartPreventExitStatus"]) == ("always", "2")
+    assert int(service["WatchdogSec"]) > 2  # a stuck adapter's time-out of 1 s is no dead loop
+    assert unit["Unit"]["StartLimitIntervalSec"] == "0"
+    assert int(service["RestartSec"]) < int(service["RestartMaxDelaySec"]) <= 60
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+def test_systemd_finds_the_unit_little_exposed():
+    command = ["systemd-analyze", "security", "--offline=true", "--threshold=25", str(UNIT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-500:]

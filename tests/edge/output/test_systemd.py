@@ -1,0 +1,99 @@
+"""sd_notify(3) as its receiver sees it."""
+
+import os
+import socket
+
+import pytest
+
+from edge.fake.clock import VirtualClock
+from edge.output.systemd import Notifier
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock(start=100.0)
+
+
+def said(listener):
+    listener.setblocking(False)
+    lines = []
+    while True:
+        try:
+            lines.append(listener.recv(4096).decode())
+        except BlockingIOError:
+            return lines
+
+
+def test_ready_and_stopping_are_one_datagram_each(manager, clock):
+    notifier = Notifier({"NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
+    notifier.ready("reading skin.toml")
+    notifier.stopping()
+    assert said(manager) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
+
+
+def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
+    manager, clock
+):
+    environment = {"NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "10000000"}
+    environment["WATCHDOG_PID"] = str(os.getpid())
+    notifier = Notifier(environment, now=clock.now)
+    for tick in range(2001):  # 20 s at 100 Hz
+        clock.sleep_until(100.0 + tick / 100)
+        notifier.alive()
+    assert said(manager) == ["WATCHDOG=1"] * 5
+
+
+def test_a_name_in_the_abstract_namespace(clock):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        name = f"edge-classify-{os.getpid()}"
+        listener.bind("\0" + name)
+        Notifier({"NOTIFY_SOCKET": "@" + name}, now=clock.now).ready()
+        assert listener.recv(64) == b"READY=1"
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"},
+    ],
+)
+def test_nobody_watches(manager, clock, environment):
+    notifier = Notifier({**environment, "NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
+    notifier.alive()
+    clock.sleep_until(1100.0)
+    notifier.alive()
+    assert said(manager) == []
+
+
+@pytest.mark.parametrize("address", ["", "relative"])
+def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
+    opened = []
+    monkeypatch.setattr(socket, "socket", lambda *kind: opened.append(kind))
+    notifier = Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1"}, now=clock.now)
+    notifier.ready()
+    notifier.alive()
+    notifier.stopping()
+    assert opened == []
+
+
+def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(tmp_path, clock):
+    address = str(tmp_path / "notify")
+    environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "2000000"}
+    notifier = Notifier(environment, now=clock.now)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        notifier.ready()
+        notifier.alive()
+        listener.bind(address)
+        clock.sleep_until(101.0)
+        notifier.alive()
+        assert said(listener) == ["WATCHDOG=1"]
+
+
+def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
+    notifier = Notifier({"NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
+    for _ in range(10_000):  # far more than a socket's queue takes
+        notifier.stopping()
+    assert 1 <= len(said(manager)) < 10_000

@@ -1,0 +1,85 @@
+"""`edge-classify bench`: a board's figures in one file, written whole."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from edge import __version__
+from edge.cli import main
+from edge.tools import bench
+from edge.tools.bench import summary, touch
+from edge.touch.track import ContactTracker, first_contact
+
+
+@pytest.fixture(scope="module")
+def board(exported, tmp_path_factory):
+    out = tmp_path_factory.mktemp("bench") / "board.json"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench, "ROUNDS", 20)
+        given = ["--model", str(exported / "model.onnx"), "--out", str(out)]
+        assert main(["bench", *given]) == 0
+    return json.loads(out.read_text())
+
+
+def test_every_stage_has_a_median_and_a_99th_percentile(board):
+    stages = ["region", "track", "features", "decision", "answer", "frame", "last"]
+    assert list(board["stages"]) == stages
+    for stage in board["stages"].values():
+        assert 0.0 < stage["median_us"] <= stage["p99_us"]
+        assert stage["n"] >= 4
+
+
+def test_a_busy_machine_is_named_and_the_fastest_round_counts(model, monkeypatch, caplog):
+    """The process gets a quarter of the time; each of its rounds is slower than the one before."""
+    rounds = iter(range(1, 6))
+    monkeypatch.setattr(bench.time, "process_time", iter((0.0, 0.25)).__next__)
+    monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
+    monkeypatch.setattr(bench, "time_stages", lambda *_: {"answer": {"median_us": next(rounds)}})
+    monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
+    board = bench.measure(model)
+    assert board["stages"] == {"answer": {"median_us": 1}}
+    assert board["load"]["waited"] == 0.75
+    assert "this machine is busy: bench waited 75% of the time" in caplog.text
+
+
+def test_memory_cold_start_and_machine_are_named(board):
+    assert 10.0 < board["memory_mb"] < 10_000.0
+    assert board["cold_start_ms"] > 10.0
+    machine = board["machine"]
+    assert machine["kind"]
+    assert machine["cores"] >= 1
+    assert machine["edge-classify"] == __version__
+
+
+def test_the_model_is_named_by_its_digest(board, model):
+    data = Path(model.path).read_bytes()
+    assert board["model"]["sha256"] == hashlib.sha256(data).hexdigest()
+    assert board["model"]["bytes"] == len(data)
+    assert board["model"]["data_digest"] == model.info.data_digest
+
+
+def test_percentiles_are_by_nearest_rank():
+    expected = {"median_us": 100.5, "p99_us": 198.0, "n": 200}
+    assert summary([float(i) for i in range(1, 201)]) == expected
+
+
+def test_the_touch_is_a_contact_that_grows_over_the_whole_window(model):
+    info = model.info
+    frames = touch(model, info.window_s)
+    tracker = ContactTracker(info.layout, info.debounce, chain=info.chain, horizon_s=info.window_s)
+    onset, series = first_contact(frames, tracker)
+    assert onset == 0.0
+    assert series.t[-1] == pytest.approx(info.window_s)
+    assert series.area[-1] > series.area[0] > 1
+    assert series.peak[-1] > series.peak[0]
+
+
+def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, capsys):
+    out = tmp_path / "board.json"
+    assert main(["bench", "--model", "missing.onnx", "--out", str(out)]) == 2
+    err = capsys.readouterr().err
+    assert "missing.onnx: no such model" in err
+    assert err.count("\n") == 1
+    assert not out.exists()

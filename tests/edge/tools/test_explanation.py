@@ -1,0 +1,162 @@
+"""Why a model answers as it does, by hand and by the graph's own distances."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from edge.model.model import Model
+from edge.tools.explanation import Change, Explanation, Near, Space, explain
+from tests.sequential import fitted_model
+from train.pipeline import Choice
+
+GOLDEN = Path(__file__).parents[2] / "golden"
+
+BY_HAND = Space(
+    columns=np.arange(3),
+    mean=np.array([10.0, 10.0, 0.0]),
+    gain=np.array([0.5, 0.5, 2.0]),
+    weights=np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
+    rows=np.array([[2.0, 0.0], [-2.0, 0.0]]),
+    labels=np.array([0, 1]),
+)
+"""Two trials, of a force with two samples and of an area, which stand on either side of a mean."""
+
+
+def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
+    why = explain(BY_HAND, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    # z = (0.5 + 1, 0.5); to (2, 0): 0.25 + 0.25 = |z|^2 + |b|^2 - 6 = 2.5 + 4 - 6.
+    assert why.voters == (Near(0, 0, np.sqrt(0.5), {"force": 6.0, "area": 0.0}),)
+    assert why.rival == Near(1, 1, np.sqrt(12.5), {"force": -6.0, "area": 0.0})
+    assert why.pulls == {"force": 12.0, "area": 0.0}
+    # The trials are equally near at z = 0 in force, so that each sample falls by 1.5 units; a fifth
+    # more makes the other one nearer, as of equal ones the earlier counts.
+    assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
+
+
+def test_the_feature_that_has_to_change_least_comes_first():
+    # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples, or 3.5.
+    space = BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]]))
+    why = explain(space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    assert [change.feature for change in why.changes] == ["force", "area"]
+
+
+def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
+    space = Space(
+        columns=np.arange(4),
+        mean=np.zeros(4),
+        gain=np.ones(4),
+        weights=np.array([[0.0, 0.0], [1.0, 2.0], [0.5, 0.0], [0.25, 0.0]]),
+        rows=np.array([[0.0, 0.0], [2.0, 0.0], [1.5, 3.0], [5.5, 11.0]]),
+        labels=np.array([0, 1, 0, 1]),
+    )
+    names = ["still", "across", "quick", "slow"]
+    why = explain(space, np.zeros(4), [0], 0, names, [1] * 4)
+    # The nearest other trial is as near where the first coordinate is 1; a fifth more makes it
+    # nearer. Across, a trial of the answer lies in between for up to four times as much.
+    assert why.changes == tuple(
+        Change(name, 1, pytest.approx(size), pytest.approx(size))
+        for name, size in (("quick", 2.4), ("across", 4.0), ("slow", 4.8))
+    )
+
+
+VOTES = Space(
+    columns=np.arange(1),
+    mean=np.zeros(1),
+    gain=np.ones(1),
+    weights=np.ones((1, 1)),
+    rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [5.0], [np.inf]]),
+    labels=np.array([1, 0, 0, 1, 0, -1]),
+)
+"""The first three trials vote at 0, one for label 1 and two for label 0. The last has no label."""
+
+
+@pytest.mark.parametrize("outvoted", [-1.0, -2.5], ids=["the nearest", "the farthest"])
+def test_a_change_is_found_where_a_trial_was_outvoted(outvoted):
+    space = VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]]))
+    why = explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
+    assert (why.rival.row, why.rival.distance) == (0, -outvoted)
+    # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
+    assert why.changes == (Change("force", 1, pytest.approx(0.6), pytest.approx(-0.6)),)
+
+
+def test_a_trial_on_the_way_makes_the_least_change_smaller():
+    space = VOTES._replace(
+        weights=np.array([[1.0, 3.0]]),
+        rows=np.array([[0.0, 0.0], [2.0, 0.0], [0.6, 2.5]]),
+        labels=np.array([0, 1, 1]),
+    )
+    why = explain(space, np.zeros(1), [0], 0, ["force"], [1])
+    assert why.rival.row == 1
+    assert why.changes == (Change("force", 1, 0.5, 0.5),)
+
+
+def test_an_answer_that_its_votes_do_not_give_has_no_change():
+    """Tasks that are decided together may give it; a label of its votes would be no change."""
+    assert explain(VOTES, np.zeros(1), [0, 1, 2], 1, ["force"], [1]).changes == ()
+
+
+def test_a_trial_without_a_label_is_no_rival():
+    space = VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))
+    assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
+
+
+def why_of(model, task, vector, decision):
+    """The explanation of a model's decision, and the distances of the trials that voted."""
+    rows, label = decision.neighbours.tolist(), model.info.tasks[task].labels.index(decision.label)
+    named = (model.info.features, model.info.widths)
+    why = explain(Space.of(model, task), vector, rows, label, *named)
+    return why, [near.distance for near in why.voters]
+
+
+def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(model, tmp_path):
+    """Three decision points; one task takes one feature, the other lacks labels."""
+    info = replace(model.info, decision_points_s=(0.3, 0.6, 1.2))
+    choices = {
+        "of_area": Choice("none", 4, 3, features=("contact_area",)),
+        "partial": Choice("none", 4, 3),
+    }
+    rng = np.random.default_rng(0)
+    X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
+    vectors[-1] *= 1e3  # beyond the reach of features and coordinates
+    y = {"of_area": np.array(["a", "b", "c"] * 20), "partial": np.array(["d", "e", "", "d"] * 15)}
+    _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
+    assert model.decide(vectors[-1])["partial"].out_of_range
+    for name, task in model.info.tasks.items():
+        for vector in vectors:
+            decision = model.decide(vector)[name]
+            why, distances = why_of(model, name, vector, decision)
+            assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
+            for near in (*why.voters, why.rival):
+                assert task.labels[near.label] == y[name][near.row]
+
+
+def test_without_another_label_there_is_no_rival():
+    space = BY_HAND._replace(labels=np.array([0, 0]))
+    why = explain(space, np.array([11.0, 12.0, 0.25]), [1], 0, ["force", "area"], [2, 1])
+    assert why == Explanation((Near(1, 0, np.sqrt(12.5), {"force": -6.0, "area": 0.0}),))
+
+
+@pytest.mark.parametrize("name", ["golden", "exported"])
+def test_the_parts_add_up_to_the_graphs_distances(name, exported):
+    folder = exported if name == "exported" else GOLDEN
+    model, golden = Model(folder / "model.onnx"), np.load(folder / "golden.npz")
+    info = model.info
+    for task in info.tasks:
+        space = Space.of(model, task)
+        reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
+        for i in range(24):
+            rows, label = golden[f"{task}_neighbours"][i], int(golden[f"{task}_label"][i])
+            vector = golden["vectors"][i]
+            why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
+            z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
+            for near, distance in zip(why.voters, golden[f"{task}_distances"][i], strict=True):
+                parts = z @ z + space.rows[near.row] @ space.rows[near.row]
+                assert near.distance == pytest.approx(distance, abs=1e-5 * reach)
+                assert parts - sum(near.pulls.values()) == pytest.approx(
+                    distance**2, abs=1e-5 * reach**2
+                )
+            assert space.vote(z, info.tasks[task].k) == label
+            assert why.rival.label != label
+            assert why.rival.distance >= why.voters[0].distance

@@ -1,0 +1,49 @@
+"""`edge-classify fake`: a skin of any size is rehearsed without hardware."""
+
+import signal
+from contextlib import contextmanager
+
+from edge import demo
+from edge.commands.output import Output
+from edge.recording import load
+from edge.skin import file as skinfile
+from edge.tools import fake
+from tests.edge.skin.small import one_chip
+
+
+def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch):
+    monkeypatch.setattr(Output, "of", classmethod(lambda cls, arguments: cls(arguments.json)))
+    skin = skinfile.shipped("matrix")
+    status, out, _ = edge("fake", "--skin", skin, "--out", tmp_path, "--trials", 1, text=True)
+    assert status == 0
+    still = tmp_path / "still.npz"
+    asked = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
+    (frames,) = (s for s in out.splitlines() if s.strip().startswith(asked))
+    assert int(frames.split()[-1]) == len(load(still).t)
+
+
+def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeypatch):
+    plugged = []
+
+    @contextmanager
+    def pretended(adapter):
+        plugged.append(adapter.bus.name)
+        signal.raise_signal(signal.SIGINT)
+        yield f"/dev/i2c-{6 + len(plugged)}"
+        plugged.clear()
+
+    monkeypatch.setattr(fake, "plugged", pretended)
+    status, (event,), _ = edge("fake", "--skin", skinfile.shipped("mpr121"), "--plug")
+    assert (status, event.pop("event")) == (0, "plugged")
+    assert event == {"bus": "/dev/i2c-1", "device": "/dev/i2c-7"}
+    assert plugged == []
+
+
+def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(edge, tmp_path):
+    skin = tmp_path / "serial.toml"
+    skin.write_text(one_chip(1, 2, bus='serial = "/dev/ttyACM0"', at=""))
+    status, _, err = edge("fake", "--skin", skin, "--plug")
+    assert (status, "/dev/ttyACM0 is a serial port" in err) == (2, True)
+    given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
+    status, _, err = edge("fake", *given)
+    assert (status, "name its own skin file" in err) == (2, True)

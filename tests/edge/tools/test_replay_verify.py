@@ -1,0 +1,155 @@
+"""`edge-classify replay` and `verify`, as a user runs them."""
+
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from edge.cli import main
+from edge.tools.replay import Summary
+from tests.conftest import ROOT, python
+
+
+@pytest.fixture
+def replay(exported, edge):
+    return lambda *arguments: edge("replay", "--model", exported / "model.onnx", *arguments)
+
+
+def test_a_folder_is_replayed_and_summed_up(replay, recordings):
+    status, events, err = replay(recordings, "--summary")
+    assert status == 0
+    decisions = [e for e in events if e["event"] == "decision"]
+    assert len(decisions) == 32
+    keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
+    assert all(keys <= set(e) for e in decisions)
+    # Every trial is its own nearest neighbour here, so nothing can be wrong.
+    assert all(e["label"] == e["expected"] for e in decisions if e["task"] == "category")
+    assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
+    assert "rigid-fixed            8           ." in err
+    assert "16 of 16 recordings match a training trial to the last bit" in err
+
+
+def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):
+    good = recordings / "hard_0.npz"
+    (tmp_path / "short.npz").write_bytes(good.read_bytes()[:5000])
+    np.savez(tmp_path / "skin.npz", t=np.zeros(1), frames=np.zeros((1, 3, 3), np.uint16), meta="{}")
+    missing = tmp_path / "missing.npz"
+    status, events, err = replay(tmp_path / "short.npz", missing, good, tmp_path / "skin.npz")
+    assert status == 2
+    assert [e["task"] for e in events if e["event"] == "decision"] == ["category", "object"]
+    said = err.splitlines()
+    assert len(said) == 3
+    assert "short.npz: not a readable .npz file" in said[0]
+    assert "missing.npz: cannot be read: No such file" in said[1]
+    assert "skin.npz: has no joint angles" in said[2]
+
+
+def test_a_recording_without_contact_says_so(replay, quiet):
+    status, events, err = replay(quiet, "--summary")
+    assert (status, [e["event"] for e in events]) == (0, ["no_contact"])
+    assert "0 of 1 right" in err
+
+
+def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, capsys):
+    assert replay(tmp_path)[0] == 2
+    assert main(["replay", "--model", str(tmp_path / "no.onnx"), str(tmp_path)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("edge-classify: ")
+    assert err.count("\n") == 1
+
+
+@pytest.fixture
+def verify(exported, edge):
+    return lambda golden: edge("verify", "--model", exported / "model.onnx", "--golden", golden)
+
+
+def test_the_golden_file_is_met(verify, exported):
+    status, checks, err = verify(exported / "golden.npz")
+    assert status == 0
+    assert [c["name"] for c in checks] == [
+        "series length",
+        "series counts",
+        "onset",
+        "features",
+        *(f"category_{part}" for part in ("label", "neighbours", "scores", "distances")),
+        *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
+    ]
+    assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
+    assert "all 12 results agree with the golden file" in err
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "row", "change"),
+    [
+        ("object_label", "object_label", 5, 1),
+        ("object_neighbours", "object_neighbours", 7, 1),
+        ("object_distances", "object_distances", 30, 1e-9),
+        ("category_scores", "category_scores", 2, 1e-12),
+        ("series_counts", "series counts", 11, 1),
+        ("onset_s", "onset", 1, 1e-6),
+    ],
+)
+def test_a_difference_names_the_worst_row(verify, exported, tmp_path, key, name, row, change):
+    arrays = dict(np.load(exported / "golden.npz"))
+    arrays[key][row] += np.array(change).astype(arrays[key].dtype)
+    np.savez(tmp_path / "golden.npz", **arrays)
+    status, checks, err = verify(tmp_path / "golden.npz")
+    (failed,) = (check for check in checks if not check["passed"])
+    assert (status, failed["name"], failed["worst_row"]) == (1, name, row)
+    assert f"results that differ from the golden file: {name}" in err
+    assert ("may run the model in float32" in err) == name.endswith("distances")
+
+
+def test_a_damaged_golden_file_is_one_sentence(verify, exported, tmp_path):
+    path = tmp_path / "golden.npz"
+    arrays = dict(np.load(exported / "golden.npz"))
+    for key in ("start", "vectors", "meta", "object_label", "series_counts"):
+        np.savez(path, **{k: v for k, v in arrays.items() if k != key})
+        status, _, err = verify(path)
+        assert (status, err.count("\n")) == (2, 1), key
+        assert str(path) in err
+    for shape in ((1, 1_000_000), (len(arrays["series_counts"]), 3), (7,)):
+        np.savez(path, **{**arrays, "series_counts": np.zeros(shape, np.int64)})
+        status, checks, _ = verify(path)
+        assert (status, checks[1]["expected"]) == (1, str(shape))
+    np.savez(path, **{**arrays, "vectors": arrays["vectors"][:, :50]})
+    assert "50), but" in verify(path)[2]
+    shutil.copy(exported / "model.onnx", path)
+    assert verify(path)[0] == 2
+
+
+def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
+    model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
+    line = f"{sys.executable} -m edge {' '.join(model)} | head -1"
+    piped = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (piped.stdout.count("\n"), piped.stderr) == (1, "")
+
+
+def test_output_without_room_is_one_sentence(exported, recordings):
+    given = ("--model", exported / "model.onnx", recordings / "hard_0.npz")
+    with open("/dev/full", "w") as full:
+        run = python("-m", "edge", "replay", *given, stdout=full)
+    assert run.returncode == 2
+    assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_label_cannot_send_escape_sequences_to_the_terminal():
+    summary = Summary({"object": None})
+    event = {"event": "decision", "task": "object", "label": "\x1b]0;a\x07", "flags": []}
+    summary.add({"object": "\u202ebox\x9b"}, [event])
+    assert all(line.isprintable() for line in summary.text().splitlines())
+    assert "\\x1b]0;a\\x07" in summary.text()
+
+
+def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
+    summary = Summary({"object": None})
+    labels = [f"a thing with a long name {i:02d}" for i in range(12)]
+    for label in labels:
+        event = {"event": "decision", "task": "object", "label": label, "flags": []}
+        summary.add({"object": label}, [event])
+    head, *rows = summary.text().splitlines()[-13:]
+    assert head.split() == [row.split()[0] for row in rows] == [str(i + 1) for i in range(12)]
+    assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12

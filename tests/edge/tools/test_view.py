@@ -1,0 +1,46 @@
+"""`view`, as a user runs it over the fake: a picture at a bounded rate."""
+
+import os
+import pty
+import subprocess
+import sys
+
+from edge.tools import view
+
+
+def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
+    path = recordings / "hard_0.npz"
+    given = ("--fake", path, "--model", exported / "model.onnx")
+    status, text, err = edge("view", *given, text=True)
+    assert (status, err) == (0, "")
+    pictures = text.split("\x1b[H")[1:]
+    assert len(pictures) == 18  # 1.8 s at ten a second
+    assert "category: rigid-fixed (100%)" in pictures[-1]
+    assert "object: hard " in pictures[-1]
+    assert "taxels at row" in pictures[-1]
+    assert pictures[-1].count("▀") == 8 * 24 * 2
+    assert max(map(len, pictures)) < 4000
+    assert text.endswith("\x1b[0m\x1b[?25h")
+
+
+def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
+    """Half a frame early or late, so that a clock that shifts by less does not skip one."""
+    drawn = []
+    monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ".")
+    assert edge("view", "--fake", recordings / "hard_0.npz", text=True)[0] == 0
+    assert [round(t - drawn[0], 2) for t in drawn] == [round(0.1 * i, 2) for i in range(18)]
+
+
+def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
+    terminal, own_side = pty.openpty()
+    command = [sys.executable, "-m", "edge", "view", "--loop", "--fake", recordings / "hard_0.npz"]
+    process = subprocess.Popen(
+        command, stdin=own_side, stdout=own_side, stderr=subprocess.PIPE, text=True
+    )
+    os.close(own_side)
+    os.read(terminal, 100)
+    os.close(terminal)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert err.startswith("edge-classify: standard output cannot be written: Input/output error")
+    assert err.count("\n") == 1

@@ -1,0 +1,132 @@
+"""The server of the live page: who may ask, what it answers, and that nobody holds up the loop."""
+
+import http.client
+import json
+import socket
+import time
+from contextlib import closing
+
+import pytest
+
+from edge.errors import InputError
+from edge.tools import web
+from edge.tools.web import WebServer
+
+
+def ask(server, path="/", method="GET", body=None, token=None):
+    """The status, headers and body of a request with the server's token, unless given."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=5)
+    connection.request(method, f"{path}?token={server.token if token is None else token}", body)
+    answer = connection.getresponse()
+    return answer.status, dict(answer.getheaders()), answer.read()
+
+
+def post(server, action, **options):
+    return ask(server, "/action", "POST", json.dumps(action), **options)
+
+
+def refuse(action):
+    raise InputError(f"{action['do']} is not possible")
+
+
+@pytest.fixture
+def taken():
+    return []
+
+
+@pytest.fixture
+def server(taken):
+    with closing(WebServer("127.0.0.1:0", taken.append)) as server:
+        yield server
+
+
+@pytest.mark.parametrize("path", ["/", "/page.js", "/page.css"])
+def test_serves_the_page_under_a_strict_policy(server, path):
+    status, headers, body = ask(server, path)
+
+    assert status == 200
+    assert body
+    assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self'")
+    assert headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_no_other_file_is_served(server):
+    assert ask(server, "/../web.py")[0] == 404
+
+
+@pytest.mark.parametrize("token", ["", "wrong", "caf%C3%A9"])
+def test_without_the_token_nothing_is_served_and_no_action_taken(server, taken, token):
+    server.show({"t": 1.5})
+    assert [ask(server, path, token=token)[0] for path in ("/", "/picture")] == [401] * 2
+    assert post(server, {"do": "record"}, token=token)[0] == 401
+    assert (taken, server.watched) == ([], False)
+
+
+def test_the_link_has_the_token_and_each_start_one_of_its_own(server):
+    assert server.link == f"http://127.0.0.1:{server.server_port}/?token={server.token}"
+    with closing(WebServer("0.0.0.0:0", refuse)) as other:
+        assert "0.0.0.0" not in other.link
+        assert len({server.token, other.token}) == 2
+        assert len(server.token) >= 16
+
+
+def test_an_action_of_the_page_is_carried_out(server, taken):
+    action = {"do": "record", "on": True}
+
+    assert post(server, action)[0] == 204
+    assert taken == [action]
+
+
+@pytest.mark.parametrize("body", ["[" * 4000, "[1]", "{", json.dumps({"do": "x" * 5000})])
+def test_what_is_no_action_is_refused(server, taken, body):
+    assert ask(server, "/action", "POST", body)[0] == 400
+    assert taken == []
+
+
+def test_an_action_that_fails_says_why():
+    with closing(WebServer("127.0.0.1:0", refuse)) as server:
+        status, _, body = post(server, {"do": "relabel"})
+
+    assert (status, body) == (400, b"relabel is not possible")
+
+
+def test_every_browser_gets_the_latest_picture(server):
+    assert ask(server, "/picture")[0] == 204
+    for t in (1.5, 2.5):
+        server.show({"t": t})
+        assert [ask(server, "/picture")[2] for _ in range(3)] == [b'{"t":%.1f}' % t] * 3
+
+
+def test_it_is_watched_as_long_as_a_browser_asks_for_pictures(server, monkeypatch):
+    assert not server.watched
+    ask(server, "/picture")
+    assert server.watched
+    monkeypatch.setattr(web, "WATCHED_S", 0.0)
+    assert not server.watched
+
+
+def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
+    monkeypatch.setattr(web._Handler, "timeout", 0.2)
+    server.show({"counts": "0" * 20_000_000})
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=5) as sleeper:
+        sleeper.sendall(b"GET /picture?token=%s HTTP/1.0\r\n\r\n" % server.token.encode())
+        ends = time.monotonic() + 10.0
+        while not server.watched:
+            assert time.monotonic() < ends
+            time.sleep(0.01)
+        time.sleep(0.5)
+        received = 0
+        while piece := sleeper.recv(1 << 20):
+            received += len(piece)
+    assert received < 10_000_000
+
+
+@pytest.mark.parametrize("address", ["8000", "127.0.0.1:x", "127.0.0.1:70000", "nowhere.invalid:1"])
+def test_an_address_that_cannot_be_used_is_named(address):
+    with pytest.raises(InputError, match=f"--web {address}"):
+        WebServer(address, refuse)
+
+
+def test_a_port_in_use_is_named(server):
+    with pytest.raises(InputError, match=r"cannot be listened at: Address already in use"):
+        WebServer(f"127.0.0.1:{server.server_port}", refuse)

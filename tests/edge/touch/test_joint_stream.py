@@ -1,0 +1,259 @@
+"""Joint angles from outside: their own clock, and never a stale pose."""
+
+import json
+import os
+import socket
+import time
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.touch.joint_stream import LONGEST_LINE, Datagrams, Joints, from_file
+
+
+class Wire:
+    """Lines that arrive at times of our clock."""
+
+    def __init__(self, **options):
+        self.now, self.data = 0.0, b""
+        self.joints = Joints(self.take, dof=2, now=lambda: self.now, **options)
+
+    def take(self):
+        data, self.data = self.data, b""
+        return data
+
+    def send(self, t, q, **more):
+        self.data += json.dumps({"t": t, "q": q, **more}).encode() + b"\n"
+
+    def at(self, t=None):
+        q = self.joints.at(self.now if t is None else t)
+        return None if q is None else q.tolist()
+
+
+@pytest.fixture
+def wire():
+    return Wire()
+
+
+def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
+    """What is known after each line, of poses [t, -t] whose sender's clock is ahead of ours."""
+    known = []
+    for i in lines:
+        wire.now = i / hz + 0.002
+        wire.send(i / hz + ahead(i), [i / hz, -i / hz])
+        known.append(wire.at())
+    return known
+
+
+def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(wire):
+    wire.data = b"\n" * 80
+    wire.send(5.0, [1.0, 2.0])
+    assert wire.at(0.0) == [1.0, 2.0]
+    assert wire.joints.malformed == 81 - 64
+
+
+@pytest.mark.parametrize("ahead", [-50.0, 0.0, 1.7e9])
+def test_the_senders_clock_need_not_be_ours(wire, ahead):
+    stream(wire, ahead=lambda _: ahead)
+    # A clock of 1.7e9 s resolves 0.24 us.
+    assert wire.at(0.087) == pytest.approx([0.085, -0.085], abs=1e-6)
+
+
+def test_a_pose_between_two_lines_is_interpolated(wire):
+    stream(wire)
+    assert wire.at(0.0645) == pytest.approx([0.0625, -0.0625])
+
+
+def test_the_last_pose_holds_no_longer_than_allowed(wire):
+    stream(wire)
+    assert wire.at(0.092 + 0.049) == pytest.approx([0.09, -0.09])
+    assert wire.at(0.092 + 0.051) is None
+
+
+def test_a_line_that_comes_late_is_as_old_as_it_is(wire):
+    stream(wire)
+    wire.now = 0.2
+    wire.send(1000.1, [9.0, 9.0])  # sent at 0.1: 98 ms late
+    assert wire.at() is None
+    assert wire.at(0.102) == [9.0, 9.0]
+
+
+def test_a_gap_is_not_bridged(wire):
+    stream(wire)
+    wire.now = 0.402
+    wire.send(1000.4, [1.0, 1.0])
+    assert wire.at() == [1.0, 1.0]
+    assert wire.at(0.25) is None
+
+
+def test_a_sender_that_starts_anew_is_believed(wire):
+    stream(wire)
+    wire.now = 0.15
+    wire.send(3.0, [7.0, 7.0])
+    assert wire.at() == [7.0, 7.0]
+    assert wire.joints.malformed == 0
+
+
+def test_the_clocks_may_drift_apart(wire):
+    """A sender whose clock is slow by 100 ppm: after an hour it is off by 0.36 s."""
+    for i in range(36_000):
+        wire.now = i * 0.1
+        wire.send(wire.now * (1.0 - 1e-4), [wire.now, 0.0])
+        q = wire.at()
+        # In the window of 20 s the drift is 2 ms.
+        assert q is not None
+        assert abs(q[0] - wire.now) < 0.0021
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        (b"not json", "is not"),
+        (b'{"t": 1.0}', "is not"),
+        (b'{"t": 1.0, "q": 3}', "is not"),
+        (b'{"t": "1", "q": [1, 2]}', "is not"),
+        (b'{"t": 1.0, "q": [1, true]}', "is not"),
+        (b'{"t": 1.0, "q": "12"}', "is not"),
+        (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm has 2"),
+        (b'{"t": 1.0, "q": [1, NaN]}', "a line is not"),
+        (b'{"t": Infinity, "q": [1, 2]}', "a line is not"),
+        (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "a line is not"),
+        (b"[" * 100_000, "longer than"),
+        (b"\xff\xfe", "is not"),
+    ],
+)
+def test_a_malformed_line_is_counted_and_changes_nothing(wire, line, problem):
+    wire.send(1.0, [0.5, 0.5])
+    assert wire.at() == [0.5, 0.5]
+    wire.data += line + b"\n" * (len(line) < LONGEST_LINE)
+    assert wire.at() == [0.5, 0.5]
+    assert wire.joints.malformed == 1
+    assert problem in wire.joints.problem
+
+
+def test_a_line_may_come_in_pieces(wire):
+    line = b'{"t": 1.0, "q": [0.25, 0.5]}\n'
+    for byte in line[:-1]:
+        wire.data = bytes([byte])
+        assert wire.at() is None
+    wire.data = line[-1:]
+    assert wire.at() == [0.25, 0.5]
+
+
+def test_a_pipe_is_read_without_waiting_and_its_end_is_noticed():
+    reader, writer = os.pipe()
+    source = from_file(reader)
+    assert source() == b""
+    os.write(writer, b"abc")
+    assert source() == b"abc"
+    os.close(writer)
+    assert source() is None
+    os.close(reader)
+
+
+def test_udp_is_bound_to_loopback_unless_told_otherwise():
+    with closing(Datagrams("0")) as source, udp() as sender:
+        host, port = source.listener.getsockname()
+        assert host == "127.0.0.1"
+        assert source() == b""
+        sender.sendto(b'{"t": 1.0, "q": [2.0]}', (host, port))
+        joints = Joints(source, dof=1, now=lambda: 1.0)
+        time.sleep(0.05)
+        assert joints.at(1.0).tolist() == [2.0]
+
+
+@pytest.mark.parametrize("address", ["", "port", "70000", "host:x", "999.1.1.1:5000"])
+def test_an_address_that_cannot_be_bound_is_one_sentence(address):
+    with pytest.raises(InputError, match=f"joints udp:{address}: "):
+        Datagrams(address)
+
+
+def test_named_angles_are_put_in_the_arms_order():
+    named = Wire(names=("shoulder", "elbow"))
+    named.send(5.0, [0.3, 9.0, 0.1], names=["elbow", "wheel", "shoulder"])
+    assert named.at() == [0.1, 0.3]
+    named.send(5.01, [0.2, 0.4])
+    named.now = 0.01
+    assert named.at() == [0.2, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("q", "names", "problem"),
+    [
+        ([0.1, 0.2], ["elbow", "wrist"], "a line has no angle of the arm's joint shoulder"),
+        ([0.1, 0.2], ["elbow"], "a line's names are not one for each angle"),
+        ([0.1, 0.2], "elbow", "a line's names are not one for each angle"),
+    ],
+)
+def test_names_that_do_not_suit_are_refused(q, names, problem):
+    named = Wire(names=("shoulder", "elbow"))
+    named.send(5.0, q, names=names)
+    assert named.at() is None
+    assert named.joints.problem.startswith(problem)
+
+
+@pytest.mark.parametrize("ahead_s", [0.03, 0.3, 100.0])
+def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
+    stream(wire, range(50))
+    wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
+    assert wire.at() is not None
+    known = stream(wire, range(50, 100))
+    np.testing.assert_allclose(known, [[i / 100, -i / 100] for i in range(50, 100)], atol=1e-6)
+
+
+def test_a_line_out_of_order_begins_anew(wire):
+    stream(wire)
+    wire.send(1000.085, [0.085, 0.0])
+    assert wire.at() == [0.085, 0.0]
+    assert wire.at(wire.now - 0.01) is None
+    assert stream(wire, range(10, 12))[-1] == pytest.approx([0.11, -0.11])
+
+
+@pytest.mark.parametrize(("place", "hz"), [(0, 25), (8, 100)])
+def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
+    wire, place, hz
+):
+    known = stream(wire, range(2 * hz), hz=hz, ahead=lambda i: 1000.0 + 0.3 * (i == place))
+    assert None not in known[place + hz :]
+
+
+@pytest.mark.parametrize("step_s", [0.5, -0.5])
+def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
+    stream(wire, range(50))
+    known = stream(wire, range(50, 150), ahead=lambda _: 1000.0 + step_s)
+    assert None not in known[60:]
+    assert known[-1] == pytest.approx([1.49, -1.49], abs=1e-6)
+
+
+def test_a_flood_of_lines_is_bounded_in_each_frame(wire):
+    reads = []
+
+    def flood():
+        reads.append(1)
+        return b"{}\n" * 20_000
+
+    joints = Joints(flood, dof=2, now=lambda: 0.0)
+    assert joints.at(0.0) is None
+    assert len(reads) <= 2
+    assert joints.malformed >= 20_000
+
+
+def test_of_two_senders_one_is_heard_and_the_other_counted(caplog):
+    now = [0.0]
+    source = Datagrams("0", lambda: now[0])
+    with closing(source), udp() as first, udp() as second:
+        for sender, text in ((first, b"a"), (second, b"b"), (first, b"c")):
+            sender.sendto(text, source.listener.getsockname())
+        time.sleep(0.05)
+        assert [source().strip() for _ in range(4)] == [b"a", b"", b"c", b""]
+        now[0] = 2.0  # the first has fallen silent
+        second.sendto(b"d", source.listener.getsockname())
+        time.sleep(0.05)
+        assert source().strip() == b"d"
+    assert caplog.messages == ["--joints: ignored datagrams from another sender: 1"]
+
+
+def udp():
+    return socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
