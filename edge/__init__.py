@@ -1,12 +1,15 @@
-"""What the board runs: from the taxels of a skin to a decision about the object it touches.
+"""What the board runs: from the taxels of a skin to a decision about the object it
+touches.
 
-Only the names below are public; everything else may move. Each is loaded at its first use, so that
-`import edge` alone is quick.
+Only the names below are public; everything else may move. Each is loaded at its first
+use, so that `import edge` alone is quick.
 """
 
 from importlib import import_module
 
-TYPE_CHECKING = False  # type checkers read it as true; to load typing would take longer than edge
+TYPE_CHECKING = (
+    False  # type checkers read it as true; to load typing would take longer than edge
+)
 if TYPE_CHECKING:
     from edge.classifier import Classifier as Classifier
     from edge.errors import EdgeError as EdgeError

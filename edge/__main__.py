@@ -1,4 +1,5 @@
-"""The start of a program: Ctrl-C ends it without a traceback, also while it is loading."""
+"""The start of a program: Ctrl-C ends it without a traceback, also while it is
+loading."""
 
 import sys
 from collections.abc import Sequence

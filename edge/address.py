@@ -9,7 +9,8 @@ def parse_address(
     """Host and port of `HOST:PORT`, or of `PORT` alone where there is a default host.
 
     Raises:
-        InputError: the text is not of that form; the message names the option and an example.
+        InputError: the text is not of that form; the message names the option and an
+            example.
     """
     given, _, port = text.rpartition(":")
     host = given.strip("[]") or host

@@ -50,7 +50,9 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         epilog="`edge-classify COMMAND --help` explains a command. Commands print text to a "
         "terminal, and one JSON object per line to a pipe or a file.",
     )
-    top.add_argument("--version", action="version", version=f"edge-classify {__version__}")
+    top.add_argument(
+        "--version", action="version", version=f"edge-classify {__version__}"
+    )
     for command in add_commands(top, {name: COMMANDS[name] for name in names}):
         flag = partial(command.add_argument, action="store_true")
         flag("--json", help="print JSON lines even to a terminal")
@@ -61,11 +63,12 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
 def add_commands(
     top: argparse.ArgumentParser, modules: Mapping[str, str]
 ) -> Iterator[argparse.ArgumentParser]:
-    """Add each module as the subcommand of its name, and yield the subcommands' parsers.
+    """Add each module as the subcommand of its name, and yield the subcommands'
+    parsers.
 
-    A module's docstring is its help: the first line stands in the list of commands, the rest in the
-    command's own help. The module has `add_options(parser)` and `run(arguments)`, which returns the
-    exit status.
+    A module's docstring is its help: the first line stands in the list of commands, the
+    rest in the command's own help. The module has `add_options(parser)` and
+    `run(arguments)`, which returns the exit status.
     """
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, path in modules.items():
@@ -82,9 +85,9 @@ def add_commands(
 def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse the arguments and run the command; returns the exit status.
 
-    An expected error becomes one sentence on stderr and exit status 2 or 3. Meanwhile, log messages
-    are printed to stderr, one line each. A shell that asks for completions gets them if argcomplete
-    is installed.
+    An expected error becomes one sentence on stderr and exit status 2 or 3. Meanwhile,
+    log messages are printed to stderr, one line each. A shell that asks for completions
+    gets them if argcomplete is installed.
     """
     _open_missing_streams()
     if "_ARGCOMPLETE" in os.environ:
@@ -94,7 +97,9 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
             argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
     handler = logging.StreamHandler()
-    handler.setLevel(logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO)
+    handler.setLevel(
+        logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
+    )
     handler.setFormatter(logging.Formatter(f"{top.prog}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
     for logger in loggers:
@@ -106,12 +111,15 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
         return status
     except EdgeError as error:
         print(f"{top.prog}: {error}", file=sys.stderr)
-        return 2 if isinstance(error, InputError) else 3  # a device may be there a moment later
+        return (
+            2 if isinstance(error, InputError) else 3
+        )  # a device may be there a moment later
     except BrokenPipeError:
         _discard_output()  # the reader of the output has closed the pipe
         return 0
     except OSError as error:
-        # An error of a file has a name, or `edge.files` has reported it: this one is of stdout.
+        # An error of a file has a name, or `edge.files` has reported it: this one is of
+        # stdout.
         if error.filename is not None or error.errno not in UNWRITABLE:
             raise
         _discard_output()
@@ -126,10 +134,12 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
 
 def _open_missing_streams() -> None:
-    """Open the null device for each standard stream that was closed before the program began.
+    """Open the null device for each standard stream that was closed before the program
+    began.
 
-    Otherwise the next file to be opened would take the stream's descriptor, and receive the printed
-    lines. Characters that the output's encoding lacks are then written as escapes.
+    Otherwise the next file to be opened would take the stream's descriptor, and receive
+    the printed lines. Characters that the output's encoding lacks are then written as
+    escapes.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -141,7 +151,8 @@ def _open_missing_streams() -> None:
 
 
 def _discard_output() -> None:
-    """Redirect stdout to the null device, so that flushing it at exit cannot fail again."""
+    """Redirect stdout to the null device, so that flushing it at exit cannot fail
+    again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -149,7 +160,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 for success, 1 if a check failed, 2 for bad usage or input, 3 for a device that fails.
+        0 for success, 1 if a check failed, 2 for bad usage or input, 3 for a device
+        that fails.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     command = [word for word in words[:1] if word in COMMANDS]
@@ -161,12 +173,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         from difflib import get_close_matches  # rarely needed, and slow to load
 
         near = get_close_matches(words[0], COMMANDS, 1, 0.5)
-        hint = f"did you mean {near[0]!r}?" if near else f"the commands are {', '.join(COMMANDS)}"
+        hint = (
+            f"did you mean {near[0]!r}?"
+            if near
+            else f"the commands are {', '.join(COMMANDS)}"
+        )
         print(f"{top.prog}: there is no command {words[0]!r}; {hint}", file=sys.stderr)
         return 2
     return dispatch(top, words)
 
 
-# The interpreter's last garbage collection would visit every imported object, which doubles the
-# time that the program takes to end.
+# The interpreter's last garbage collection would visit every imported object, which
+# doubles the time that the program takes to end.
 atexit.register(gc.freeze)

@@ -1,10 +1,12 @@
-"""The clock of a skin and its loop; a fake skin may have a virtual one (`edge.fake.clock`)."""
+"""The clock of a skin and its loop; a fake skin may have a virtual one
+(`edge.fake.clock`)."""
 
 import time
 from typing import Protocol
 
 TIME_ROUNDING_S = 5e-7
-"""Rounding may put the time of a sample below the sample's true time, by less than this."""
+"""Rounding may put the time of a sample below the sample's true time, by less than
+this."""
 
 
 class Clock(Protocol):

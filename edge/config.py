@@ -17,7 +17,8 @@ from edge.files import parsing, read_bytes, read_text
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 LONGEST_WHOLE = 40
-"""Most digits of a whole number; no key needs more than 20, and a float holds at most 309."""
+"""Most digits of a whole number; no key needs more than 20, and a float holds at most
+309."""
 _repr = reprlib.Repr()
 _repr.maxstring = _repr.maxother = 60
 
@@ -47,11 +48,14 @@ def _finite(text: str) -> float:
     return value
 
 
-_DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_finite, parse_constant=_finite)
+_DECODER = json.JSONDecoder(
+    parse_int=_whole, parse_float=_finite, parse_constant=_finite
+)
 
 
 def _decoded(text: str | bytes) -> Any:
-    """The value of a JSON text; half of a surrogate pair raises UnicodeError, as UTF-8 has none."""
+    """The value of a JSON text; half of a surrogate pair raises UnicodeError, as UTF-8
+    has none."""
     value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
     json.dumps(value, ensure_ascii=False).encode()
     return value
@@ -81,16 +85,17 @@ def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[An
     """The value of a JSON file, for a block that takes it apart.
 
     Raises:
-        InputError: the file cannot be read; or it is not JSON, or the block failed, as it does at
-            a missing key or a wrong type. The message then says that the file is not `kind`, and
-            ends with the remedy `mend`.
+        InputError: the file cannot be read; or it is not JSON, or the block failed, as
+            it does at a missing key or a wrong type. The message then says that the
+            file is not `kind`, and ends with the remedy `mend`.
     """
     with parsing(os.fspath(path), kind, f"; {mend}"):
         yield _decoded(read_bytes(path))
 
 
 class ConfigTable:
-    """A table of a file, read key by key; `done` refuses the keys that were never asked for.
+    """A table of a file, read key by key; `done` refuses the keys that were never asked
+    for.
 
     >>> table = ConfigTable({"rate_hz": 100}, "skin.toml", "read.")
     >>> table.number("rate_hz", low=0.1, high=1e4)
@@ -105,8 +110,8 @@ class ConfigTable:
 
         Args:
             raw: the parsed value, which should be a mapping.
-            where: the name of the file in errors, followed by `: ` and the part of the file
-                that the table is, if that has a name: `box.npz: meta.arm`.
+            where: the name of the file in errors, followed by `: ` and the part of the
+                file that the table is, if that has a name: `box.npz: meta.arm`.
             prefix: put before a key in errors: `read.` in a table `[read]`.
 
         Raises:
@@ -154,7 +159,9 @@ class ConfigTable:
             if not isinstance(allowed, range):
                 raise self.fail(key, f"one of {', '.join(map(str, allowed))}")
             wanted = f"{allowed[0]:{form}} to {allowed[-1]:{form}}"
-            raise self.fail(key, wanted if form != "d" else f"a whole number from {wanted}")
+            raise self.fail(
+                key, wanted if form != "d" else f"a whole number from {wanted}"
+            )
         return value
 
     def number(
@@ -169,7 +176,8 @@ class ConfigTable:
     ) -> float:
         """A finite number from `low` (or above it where `open_low`) to `high`.
 
-        It is the key's, or a given value that belongs to the key, such as an entry of its list.
+        It is the key's, or a given value that belongs to the key, such as an entry of
+        its list.
         """
         value = self.get(key, default) if value is REQUIRED else value
         number = math.nan
@@ -200,8 +208,12 @@ class ConfigTable:
         """A list of numbers; with a count, of exactly that many."""
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or count not in (None, len(value)):
-            raise self.fail(key, f"a list of {'' if count is None else f'{count} '}numbers")
-        return tuple(self.number(key, 0, low, high, open_low=open_low, value=x) for x in value)
+            raise self.fail(
+                key, f"a list of {'' if count is None else f'{count} '}numbers"
+            )
+        return tuple(
+            self.number(key, 0, low, high, open_low=open_low, value=x) for x in value
+        )
 
     def flag(self, key: str, default: Any = REQUIRED) -> bool:
         """True or false."""
@@ -234,7 +246,9 @@ class ConfigTable:
 
     def _list(self, key: str, default: Any, kind: type, plural: str) -> tuple[Any, ...]:
         value = self.get(key, default)
-        if not isinstance(value, list | tuple) or any(type(x) is not kind for x in value):
+        if not isinstance(value, list | tuple) or any(
+            type(x) is not kind for x in value
+        ):
             raise self.fail(key, f"a list of {plural}")
         return tuple(value)
 
@@ -250,18 +264,23 @@ class ConfigTable:
         return type(self)(self.get(key, default), self.where, f"{self.prefix}{key}.")
 
     def tables(self, key: str, item: str) -> list[Self]:
-        """A list of at least one table; errors name each by `item` and its number from 0."""
+        """A list of at least one table; errors name each by `item` and its number from
+        0."""
         entries = self.get(key, [])
         if not isinstance(entries, list | tuple) or not entries:
             raise self.fail(key, "a list of tables", entries)
-        return [type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)]
+        return [
+            type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)
+        ]
 
     def done(self) -> None:
         """Refuse the keys that were never asked for."""
         for key in self.raw:
             if key not in self._taken:
                 allowed = ", ".join(dict.fromkeys(self._taken))
-                item, table = ("", self.prefix) if self.prefix[-1:] == "." else (self.prefix, "")
+                item, table = (
+                    ("", self.prefix) if self.prefix[-1:] == "." else (self.prefix, "")
+                )
                 raise InputError(
                     f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; allowed: {allowed}"
                 )

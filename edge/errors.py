@@ -1,14 +1,16 @@
-"""The base of all errors, the errors that a user can correct, and text that is safe to print."""
+"""The base of all errors, the errors that a user can correct, and text that is safe to
+print."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 
 def printable(text: str) -> str:
-    """Text that is safe on a terminal or in a log: unprintable characters become Python escapes.
+    """Text that is safe on a terminal or in a log: unprintable characters become Python
+    escapes.
 
-    These are line breaks, escape sequences, characters that reverse the direction of writing, and
-    lone surrogates, which no encoding has.
+    These are line breaks, escape sequences, characters that reverse the direction of
+    writing, and lone surrogates, which no encoding has.
 
     >>> printable("box\\x1b[2J")
     'box\\\\x1b[2J'
@@ -17,9 +19,11 @@ def printable(text: str) -> str:
 
 
 class EdgeError(Exception):
-    """The base of the errors that edge-classify raises; its text is one sentence for a person.
+    """The base of the errors that edge-classify raises; its text is one sentence for a
+    person.
 
-    The text stays on one line, whatever the file that it quotes contains (see `printable`).
+    The text stays on one line, whatever the file that it quotes contains (see
+    `printable`).
 
     >>> import edge
     >>> try:
@@ -34,7 +38,8 @@ class EdgeError(Exception):
 
 
 class InputError(EdgeError, ValueError):
-    """A file, option or value that cannot be used; the sentence names it and the remedy.
+    """A file, option or value that cannot be used; the sentence names it and the
+    remedy.
 
     >>> import edge
     >>> try:
@@ -46,12 +51,14 @@ class InputError(EdgeError, ValueError):
 
 
 class OutOfRange(InputError):
-    """Features that are too large to be scaled, or not finite: a decision on them has no label."""
+    """Features that are too large to be scaled, or not finite: a decision on them has
+    no label."""
 
 
 @contextmanager
 def about(name: str) -> Iterator[None]:
-    """Begin the sentences of the errors in the block with the name of what they are about.
+    """Begin the sentences of the errors in the block with the name of what they are
+    about.
 
     Raises:
         InputError: the block raised one.

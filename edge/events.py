@@ -41,27 +41,27 @@ class Decided:
 
     Attributes:
         task: the question.
-        label: its answer; "unknown" if no trained label fits, None if the features are too large
-            to be compared with the training rows.
-        confidence: the label's share of the votes, 0 to 1; with an error rate, the calibrated
-            probability that the label is right.
+        label: its answer; "unknown" if no trained label fits, None if the features are
+            too large to be compared with the training rows.
+        confidence: the label's share of the votes, 0 to 1; with an error rate, the
+            calibrated probability that the label is right.
         window_s: seconds from onset on which the decision is based.
         onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
         flags: reasons for doubt, see `Classifier`.
         error: the certified error rate, if one was asked for.
-        stopped_by: with an error rate, `confidence`, or `window` if the stopping rule's last
-            decision point came first.
+        stopped_by: with an error rate, `confidence`, or `window` if the stopping rule's
+            last decision point came first.
         contact: as in `Onset`.
-        position: (x, y, z) of the contact's last position, if several are followed and it is known
-            (see `edge.touch.contact.Contact.position`).
+        position: (x, y, z) of the contact's last position, if several are followed and
+            it is known (see `edge.touch.contact.Contact.position`).
         model: name and version of the model, if it has a name.
-        strongest: without a contact, the largest count of any taxel, as a part of the count at
-            which a contact begins; else None.
-        nearest: names of the nearest training trials, which voted, or their numbers in a model
-            without names.
-        decision: the model's own answer, with the votes and the nearest training trials; None
-            without a label.
+        strongest: without a contact, the largest count of any taxel, as a part of the
+            count at which a contact begins; else None.
+        nearest: names of the nearest training trials, which voted, or their numbers in
+            a model without names.
+        decision: the model's own answer, with the votes and the nearest training
+            trials; None without a label.
     """
 
     task: str
@@ -85,7 +85,10 @@ class Decided:
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
             line["place"] = None if self.position is None else list(self.position)
-        line |= {key: getattr(self, key) for key in ("task", "label", "confidence", "latency_ms")}
+        line |= {
+            key: getattr(self, key)
+            for key in ("task", "label", "confidence", "latency_ms")
+        }
         if self.strongest is not None:
             line["strongest"] = self.strongest
         if self.stopped_by is not None:
@@ -130,8 +133,9 @@ def _line(name: str, event: Event) -> dict[str, Any]:
 def json_line(event: Mapping[str, Any]) -> str:
     """An event as one line of JSON, without the line break.
 
-    It is ASCII, which every encoding of stdout has, so that no label can break the line or reach a
-    terminal as an escape sequence. JSON has no NaN or infinity, so they become null.
+    It is ASCII, which every encoding of stdout has, so that no label can break the line
+    or reach a terminal as an escape sequence. JSON has no NaN or infinity, so they
+    become null.
 
     >>> json_line({"label": "Bär", "confidence": float("nan")})
     '{"label": "B\\\\u00e4r", "confidence": null}'
@@ -144,4 +148,6 @@ def _finite(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
+    return (
+        [_finite(item) for item in value] if isinstance(value, list | tuple) else value
+    )

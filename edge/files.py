@@ -10,14 +10,17 @@ from typing import BinaryIO
 from edge.errors import EdgeError, InputError
 
 LARGEST_TEXT = 16 << 20
-"""Largest text file in bytes; the calibration of a skin of a million taxels takes 12 MB."""
+"""Largest text file in bytes; the calibration of a skin of a million taxels takes 12
+MB."""
 
 
 @contextmanager
 def parsing(name: str, kind: str, mend: str = "") -> Iterator[None]:
-    """Turn any exception of a parser into one sentence: `NAME: not KIND: REASON` and MEND.
+    """Turn any exception of a parser into one sentence: `NAME: not KIND: REASON` and
+    MEND.
 
-    On damaged or hostile input, parsers raise exceptions of many kinds; no list is complete.
+    On damaged or hostile input, parsers raise exceptions of many kinds; no list is
+    complete.
 
     Raises:
         InputError: the block raised an exception that is no EdgeError.
@@ -44,27 +47,35 @@ def refusing(action: str) -> Iterator[None]:
     """Turn an error of the system into one sentence: `ACTION: REASON`.
 
     Raises:
-        InputError: the block raised an OSError or, as a name with a NUL does, a ValueError.
+        InputError: the block raised an OSError or, as a name with a NUL does, a
+            ValueError.
     """
     try:
         yield
     except EdgeError:
         raise
     except (OSError, ValueError) as error:
-        raise InputError(f"{action}: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(
+            f"{action}: {getattr(error, 'strerror', None) or error}"
+        ) from None
 
 
 @contextmanager
 def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryIO]:
-    """Open a regular file for reading. Reading a FIFO could wait, and a device may never end.
+    """Open a regular file for reading. Reading a FIFO could wait, and a device may
+    never end.
 
     Raises:
-        InputError: it is missing, a folder, a FIFO or a device, or larger than `at_most` bytes.
+        InputError: it is missing, a folder, a FIFO or a device, or larger than
+            `at_most` bytes.
     """
     name = os.fspath(path)
     with refusing(f"{name}: cannot be read"):
-        # Without O_NONBLOCK, opening a FIFO waits until another process opens it for writing.
-        file = open(name, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK))  # noqa: SIM115
+        # Without O_NONBLOCK, opening a FIFO waits until another process opens it for
+        # writing.
+        file = open(
+            name, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)
+        )  # noqa: SIM115
     with file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
@@ -114,7 +125,8 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
 
 
 def _name_free(temporary: Path, target: Path) -> None:
-    """Rename a file, but never over another one, even if that appears at the same moment.
+    """Rename a file, but never over another one, even if that appears at the same
+    moment.
 
     Raises:
         FileExistsError: the name is taken.
@@ -143,25 +155,30 @@ def _sync_folder(folder: Path) -> None:
 def write_whole(
     path: str | os.PathLike[str], *, overwrite: bool = True, lasting: bool = True
 ) -> Iterator[BinaryIO]:
-    """Open a temporary file beside `path`, which is renamed to `path` at the end of the block.
+    """Open a temporary file beside `path`, which is renamed to `path` at the end of the
+    block.
 
     If the block raises, `path` stays as it was and the temporary file is removed.
 
     Args:
         overwrite: replace an existing file.
-        lasting: wait until the file would survive a loss of power. On a disk this takes several
-            times as long as the writing, so leave it out for files that can be made again.
+        lasting: wait until the file would survive a loss of power. On a disk this takes
+            several times as long as the writing, so leave it out for files that can be
+            made again.
 
     Raises:
         NameTaken: `path` exists and `overwrite` is False.
-        InputError: the name is impossible or that of a folder, a FIFO or a device, the folder
-            cannot be written, or the disk is full.
+        InputError: the name is impossible or that of a folder, a FIFO or a device, the
+            folder cannot be written, or the disk is full.
     """
     target = Path(path)
     folder = target.parent
     if "\0" in target.name:
-        raise InputError(f"{target}: a file's name cannot hold a null character; choose another")
-    # The target's own name may already have the greatest length that the file system allows.
+        raise InputError(
+            f"{target}: a file's name cannot hold a null character; choose another"
+        )
+    # The target's own name may already have the greatest length that the file system
+    # allows.
     temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
     try:
         # Renamed by root, a file would take the place of /dev/null.
@@ -181,10 +198,16 @@ def write_whole(
             _sync_folder(folder)
     except FileExistsError as error:
         if error.filename == os.fspath(folder):
-            raise InputError(f"{target}: cannot be written: {folder} is a file") from None
-        raise NameTaken(f"{target}: exists already; choose another name or remove it") from None
+            raise InputError(
+                f"{target}: cannot be written: {folder} is a file"
+            ) from None
+        raise NameTaken(
+            f"{target}: exists already; choose another name or remove it"
+        ) from None
     except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from None
+        raise InputError(
+            f"{target}: cannot be written: {error.strerror or error}"
+        ) from None
     finally:
         with suppress(OSError):  # it has been renamed, or was never made
             os.unlink(temporary)

@@ -11,11 +11,15 @@ from typing import Any
 def delayed() -> Iterator[None]:
     """Within the block, Ctrl-C waits for the block's end.
 
-    An import would lose Python's KeyboardInterrupt in a callback, or turn it into an ImportError,
-    as the extension modules of numpy and onnxruntime do. Only the main thread can delay it.
+    An import would lose Python's KeyboardInterrupt in a callback, or turn it into an
+    ImportError, as the extension modules of numpy and onnxruntime do. Only the main
+    thread can delay it.
     """
     handler: Any = signal.getsignal(signal.SIGINT)
-    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+    if (
+        not callable(handler)
+        or threading.current_thread() is not threading.main_thread()
+    ):
         yield
         return
     caught: list[tuple[Any, ...]] = []

@@ -1,4 +1,5 @@
-"""A recording: the frames, joint angles and metadata of one trial, in one `.npz` file."""
+"""A recording: the frames, joint angles and metadata of one trial, in one `.npz`
+file."""
 
 import json
 import logging
@@ -22,8 +23,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.thresholds import doubt
 
 LARGEST_BYTES = 1 << 27
-"""Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111 MB, two
-minutes of 64 x 62 taxels at 100 Hz take 95."""
+"""Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111
+MB, two minutes of 64 x 62 taxels at 100 Hz take 95."""
 MAX_COUNTS = 65535
 SLOWEST_HZ, FASTEST_HZ = 2.0, 5000.0
 """Frame rates outside these limits are probably times in another unit."""
@@ -41,13 +42,15 @@ class Recording:
     [0.0, 0.01]
 
     Attributes:
-        t: (n,) seconds that never decrease; of several frames at one time, the last counts.
+        t: (n,) seconds that never decrease; of several frames at one time, the last
+            counts.
         frames: (n, rows, cols) counts above baseline.
-        joints: (n, dof) radians, NaN in a frame whose pose was not known; None without an arm.
-        valid: (rows, cols) or (n, rows, cols), True where a taxel could be read; None if all
-            could.
-        meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of each
-            column of `joints`], `source`, `trial`, and any other facts.
+        joints: (n, dof) radians, NaN in a frame whose pose was not known; None without
+            an arm.
+        valid: (rows, cols) or (n, rows, cols), True where a taxel could be read; None
+            if all could.
+        meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of
+            each column of `joints`], `source`, `trial`, and any other facts.
     """
 
     t: NDArray[np.float64]
@@ -84,7 +87,8 @@ class Recording:
         A recording that does not name its joints is returned as it is.
 
         Raises:
-            InputError: the recording lacks one of the joints; the message begins with `where`.
+            InputError: the recording lacks one of the joints; the message begins with
+                `where`.
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
@@ -108,8 +112,9 @@ class Recording:
 def _checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
     """The recording in the types of the contract.
 
-    Whole numbers of any type become uint16 counts, flat frames get the skin's rows and columns,
-    times and angles become float64, and labels that are whole numbers become text.
+    Whole numbers of any type become uint16 counts, flat frames get the skin's rows and
+    columns, times and angles become float64, and labels that are whole numbers become
+    text.
 
     Args:
         path: names the recording in errors.
@@ -123,7 +128,9 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     def fail(problem: str) -> NoReturn:
         raise InputError(f"{path}: {problem}")
 
-    def expect(name: str, values: Any, dtype: type, *shapes: tuple[int, ...]) -> NDArray[Any]:
+    def expect(
+        name: str, values: Any, dtype: type, *shapes: tuple[int, ...]
+    ) -> NDArray[Any]:
         array: NDArray[Any] = np.asarray(values)
         if array.dtype.kind == "f":
             array = array.astype(np.float64)
@@ -141,24 +148,36 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         fail("meta.skin must be an object")
     if frames.ndim == 2:
         rows, cols = skin.get("rows"), skin.get("cols")
-        if not (type(rows) is type(cols) is int and rows > 0 and rows * cols == frames.shape[1]):
+        if not (
+            type(rows) is type(cols) is int
+            and rows > 0
+            and rows * cols == frames.shape[1]
+        ):
             fail('frames are flat; give their "rows" and "cols" in meta.skin')
         frames = frames.reshape(len(frames), rows, cols)
     if frames.dtype != np.uint16 or frames.ndim != 3:
-        fail(f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} {frames.shape}")
+        fail(
+            f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} {frames.shape}"
+        )
     n, rows, cols = frames.shape
     if 0 in frames.shape:
         fail(f"frames are empty {frames.shape}; record at least one frame")
     layout = SkinLayout.from_dict({"rows": rows, "cols": cols, **skin}, where=path)
     if layout.shape != (rows, cols):
-        fail(f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}")
+        fail(
+            f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}"
+        )
 
     t = expect("t", recording.t, np.float64, (n,))
     if not np.isfinite(t).all():
-        fail(f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock")
+        fail(
+            f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock"
+        )
     backwards = np.flatnonzero(t[1:] < t[:-1])
     if backwards.size:
-        fail(f"time goes back at frame {backwards[0] + 1}; sort the frames or split the recording")
+        fail(
+            f"time goes back at frame {backwards[0] + 1}; sort the frames or split the recording"
+        )
     joints, dof = recording.joints, 0
     if joints is not None:
         joints = np.asarray(joints)
@@ -175,11 +194,15 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         expect("valid", recording.valid, np.bool_, (rows, cols), (n, rows, cols))
 
     def are_names(texts: object) -> bool:
-        return isinstance(texts, list) and all(isinstance(x, str) and x != "" for x in texts)
+        return isinstance(texts, list) and all(
+            isinstance(x, str) and x != "" for x in texts
+        )
 
     if isinstance(labels, dict) and labels:
         meta["labels"] = labels = {
-            task: str(label) if type(label) is int or isinstance(label, np.integer) else label
+            task: str(label)
+            if type(label) is int or isinstance(label, np.integer)
+            else label
             for task, label in labels.items()
         }
     if not isinstance(labels, dict) or not are_names([*labels, *labels.values()]):
@@ -189,15 +212,20 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         if not are_names(names) or len(set(names)) < len(names):
             fail("meta.joint_names must be a list of different names")
         if len(names) != dof:
-            fail(f"the number of meta.joint_names is {len(names)}, of joint angles {dof}")
+            fail(
+                f"the number of meta.joint_names is {len(names)}, of joint angles {dof}"
+            )
     return Recording(t, frames, joints, recording.valid, meta)
 
 
 def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
-    """Frames of another type as uint16, multiplied by `scale` and rounded if it is given."""
+    """Frames of another type as uint16, multiplied by `scale` and rounded if it is
+    given."""
     if scale is not None:
         if not 0.0 < scale < np.inf:
-            raise InputError(f"{path}: the scale must be a number above 0, not {scale:g}")
+            raise InputError(
+                f"{path}: the scale must be a number above 0, not {scale:g}"
+            )
         frames = np.rint(frames.astype(np.float64) * scale)
     if not np.isfinite(frames).all():
         raise InputError(
@@ -230,8 +258,8 @@ def load_arrays(
 ) -> dict[str, NDArray[Any]]:
     """Arrays of an `.npz`, read without pickle.
 
-    An array is filled from the file piece by piece, so a header that claims more than the file
-    holds takes no memory.
+    An array is filled from the file piece by piece, so a header that claims more than
+    the file holds takes no memory.
 
     Args:
         path: of the file, for errors.
@@ -239,14 +267,16 @@ def load_arrays(
         keys: names of arrays; those that the file has are read. None reads all.
 
     Raises:
-        InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds something
-            other than plain arrays.
+        InputError: the file is missing, damaged, larger than `LARGEST_BYTES`, or holds
+            something other than plain arrays.
     """
     name = os.fspath(path)
     with ExitStack() as stack:
         if file is None:
             file = stack.enter_context(open_regular(name, LARGEST_BYTES))
-        stack.enter_context(parsing(name, "a readable .npz file", "; copy or record it again"))
+        stack.enter_context(
+            parsing(name, "a readable .npz file", "; copy or record it again")
+        )
         archive = stack.enter_context(zipfile.ZipFile(file))
         members = {
             info.filename.removesuffix(".npy"): info
@@ -255,11 +285,15 @@ def load_arrays(
         }
         wanted = [key for key in members if keys is None or key in keys]
         if sum(members[key].file_size for key in wanted) > LARGEST_BYTES:
-            raise InputError(f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it")
+            raise InputError(
+                f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
+            )
         arrays = {}
         for key in wanted:
             with archive.open(members[key]) as stream:
-                arrays[key] = np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+                arrays[key] = np.asarray(
+                    np.lib.format.read_array(stream, allow_pickle=False)
+                )
         return arrays
 
 
@@ -267,9 +301,13 @@ def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """The JSON object under `meta`."""
     raw = arrays.get("meta")
     if raw is None:
-        raise InputError(f"{name}: meta is missing; store a JSON object as text under it")
+        raise InputError(
+            f"{name}: meta is missing; store a JSON object as text under it"
+        )
     if raw.dtype.kind != "U" or raw.size != 1:
-        raise InputError(f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}")
+        raise InputError(
+            f"{name}: meta must be one JSON text, not {raw.dtype} {raw.shape}"
+        )
     meta = parse_json(raw.item(), f"{name}: meta")
     if not isinstance(meta, dict):
         raise InputError(f"{name}: meta must be a JSON object, not {shown(meta)}")
@@ -292,14 +330,16 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
         file: its contents, where they have been read already.
 
     Raises:
-        InputError: the file is missing, damaged, or not as the contract says; the sentence
-            names the file and the remedy.
+        InputError: the file is missing, damaged, or not as the contract says; the
+            sentence names the file and the remedy.
     """
     name = os.fspath(path)
     arrays = load_arrays(name, file, KEYS)
     for key in ("t", "frames"):
         if key not in arrays:
-            raise InputError(f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}")
+            raise InputError(
+                f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}"
+            )
     fields: dict[str, Any] = {**arrays, "meta": load_meta(name, arrays)}
     recording = _checked(name, Recording(**fields))
     _warn_of_another_unit(name, recording.t)
@@ -312,9 +352,15 @@ def _warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
     rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
     if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-        likely = [u for u, factor in units.items() if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ]
+        likely = [
+            u
+            for u, factor in units.items()
+            if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ
+        ]
         guess = f", and these may be in {likely[0]}" if likely else ""
-        LOG.warning(f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}")
+        LOG.warning(
+            f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}"
+        )
 
 
 def save(
@@ -340,16 +386,16 @@ def save(
         path: of the `.npz`.
         recording: frames of whole numbers of any type; flat ones (n, rows * cols) where
             `meta.skin` says the rows and columns.
-        scale: counts of a unit of `frames` that are no counts; it is kept in `meta.scale`. Give
-            all recordings of a data set the same.
+        scale: counts of a unit of `frames` that are no counts; it is kept in
+            `meta.scale`. Give all recordings of a data set the same.
         overwrite, lasting: see `write_whole`.
 
-    A warning names the likely unit of times that do not seem to be in seconds, and thresholds for
-    a recording that has none, or whose first frame is above its onset.
+    A warning names the likely unit of times that do not seem to be in seconds, and
+    thresholds for a recording that has none, or whose first frame is above its onset.
 
     Raises:
-        InputError: the recording breaks the contract, `path` cannot be written, or it exists and
-            `overwrite` is False.
+        InputError: the recording breaks the contract, `path` cannot be written, or it
+            exists and `overwrite` is False.
     """
     name = os.fspath(path)
     recording = _checked(name, recording, scale)
@@ -376,14 +422,17 @@ def save_arrays(
     try:
         text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"{os.fspath(path)}: meta cannot be written as JSON: {error}") from None
+        raise InputError(
+            f"{os.fspath(path)}: meta cannot be written as JSON: {error}"
+        ) from None
     write = np.savez_compressed if compress else np.savez
     with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
         write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
 
 
 def find(paths: list[str]) -> list[Path]:
-    """The `.npz` files named, and those in the folders named (sorted, folders within too).
+    """The `.npz` files named, and those in the folders named (sorted, folders within
+    too).
 
     Raises:
         InputError: a path does not exist, or a folder holds no recording.
@@ -392,7 +441,9 @@ def find(paths: list[str]) -> list[Path]:
     for path in map(Path, paths):
         inside = [path]
         if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-            inside = sorted(p for p in path.rglob("*.npz") if not p.name.startswith("."))
+            inside = sorted(
+                p for p in path.rglob("*.npz") if not p.name.startswith(".")
+            )
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
         files += inside

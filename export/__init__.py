@@ -1,4 +1,5 @@
-"""A fitted model to model.onnx and golden.npz; `export.save` is `make export`'s last step."""
+"""A fitted model to model.onnx and golden.npz; `export.save` is `make export`'s last
+step."""
 
 from __future__ import annotations
 

@@ -27,12 +27,13 @@ from train.stopping import SequentialClassifier
 CALLS = 60
 """Decisions of which each candidate's time is the median."""
 MOST_NAMES = 50_000
-"""Characters of the trials' names beyond which a model file leaves them out; the digest of the data
-then says which trials they were."""
+"""Characters of the trials' names beyond which a model file leaves them out; the digest
+of the data then says which trials they were."""
 
 
 def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) -> int:
-    """Write a model, and `golden.npz` with its outputs beside it; the model's size in bytes.
+    """Write a model, and `golden.npz` with its outputs beside it; the model's size in
+    bytes.
 
     Args:
         path: of the model, such as `build/model.onnx`.
@@ -55,7 +56,9 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
-    golden.write(target.with_name("golden.npz"), Model(target), fitted.dataset, fitted.X)
+    golden.write(
+        target.with_name("golden.npz"), Model(target), fitted.dataset, fitted.X
+    )
     return len(data)
 
 
@@ -116,9 +119,14 @@ def describe(
         versions={
             "edge-classify": __version__,
             "python": platform.python_version(),
-            **{name: version(name) for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")},
+            **{
+                name: version(name)
+                for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")
+            },
         },
-        decision_points_s=() if sequential is None else tuple(sequential.decision_points_s),
+        decision_points_s=()
+        if sequential is None
+        else tuple(sequential.decision_points_s),
         stopping={} if sequential is None else sequential.stopping_,
         novelty=None if sequential is None else sequential.novelty_,
         name=folder if name is None else name,
@@ -133,12 +141,22 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
-    dataset = fitted.measured.of([name for c in choices.values() for name in c.features])
-    tasks = {*choices, *(target for choice in choices.values() for target in choice.targets)}
+    dataset = fitted.measured.of(
+        [name for c in choices.values() for name in c.features]
+    )
+    tasks = {
+        *choices,
+        *(target for choice in choices.values() for target in choice.targets),
+    }
     y = {task: dataset.labels(task) for task in tasks}
-    X, widths = dataset.features(fitted.window_s, fitted.samples), dataset.widths(fitted.samples)
+    X, widths = (
+        dataset.features(fitted.window_s, fitted.samples),
+        dataset.widths(fitted.samples),
+    )
     classifier = ContactClassifier(choices, dataset.names, widths).fit(X, y)
-    data = to_onnx(classifier, describe(dataset, classifier, {}, fitted.window_s, fitted.samples))
+    data = to_onnx(
+        classifier, describe(dataset, classifier, {}, fitted.window_s, fitted.samples)
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"
         path.write_bytes(data)

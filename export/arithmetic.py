@@ -1,10 +1,12 @@
-"""Measure the time, size and labels of a model in other number formats, on the graph that ships.
+"""Measure the time, size and labels of a model in other number formats, on the graph
+that ships.
 
-The exported graph computes on whole numbers in float64. This program runs it beside three copies:
-one that rounds nothing to whole numbers, one with every number in float32 besides, and one whose
-matrices are in int8 besides (ONNX Runtime's dynamic quantisation). Each row says the time of a
-decision, the size, how many labels become others, and how many of the neighbours' distances have
-other bits where a vector is decided alone than where all are decided at once.
+The exported graph computes on whole numbers in float64. This program runs it beside
+three copies: one that rounds nothing to whole numbers, one with every number in float32
+besides, and one whose matrices are in int8 besides (ONNX Runtime's dynamic
+quantisation). Each row says the time of a decision, the size, how many labels become
+others, and how many of the neighbours' distances have other bits where a vector is
+decided alone than where all are decided at once.
 """
 
 import argparse
@@ -32,7 +34,8 @@ ROUNDS, CALLS = 7, 200
 
 
 def _round_to_float32(tensor: onnx.TensorProto) -> None:
-    """Turn a tensor of float64 into one of float32; a limit beyond its range becomes infinite."""
+    """Turn a tensor of float64 into one of float32; a limit beyond its range becomes
+    infinite."""
     if tensor.data_type == TensorProto.DOUBLE:
         with np.errstate(over="ignore"):
             values = numpy_helper.to_array(tensor).astype(np.float32)
@@ -40,7 +43,8 @@ def _round_to_float32(tensor: onnx.TensorProto) -> None:
 
 
 def _without(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> None:
-    """Remove nodes of one input and one output: their input takes the place of their output."""
+    """Remove nodes of one input and one output: their input takes the place of their
+    output."""
     given = {node.output[0]: node.input[0] for node in nodes}
     for node in nodes:
         graph.node.remove(node)
@@ -74,7 +78,11 @@ def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
             elif attribute.HasField("t"):
                 _round_to_float32(attribute.t)
     # Matrices are stored in float32 already; nothing is left to convert.
-    casts = [node for node in graph.node if node.op_type == "Cast" and node.input[0] in stored]
+    casts = [
+        node
+        for node in graph.node
+        if node.op_type == "Cast" and node.input[0] in stored
+    ]
     _without(graph, casts)
     return copy
 
@@ -83,7 +91,9 @@ def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
     """A copy of a float32 graph whose matrices are in int8."""
     from onnxruntime.quantization import quantize_dynamic
 
-    logging.getLogger().setLevel(logging.ERROR)  # it advises steps that change nothing here
+    logging.getLogger().setLevel(
+        logging.ERROR
+    )  # it advises steps that change nothing here
     before, after = folder / "float32.onnx", folder / "int8.onnx"
     onnx.save(model, before)
     quantize_dynamic(before, after)
@@ -95,21 +105,26 @@ def answers(
 ) -> tuple[NDArray[np.int64], float, float]:
     """The labels (tasks, n) of vectors, and the median microseconds of one decision.
 
-    Last comes the share of the distances with other bits where each vector is decided alone.
+    Last comes the share of the distances with other bits where each vector is decided
+    alone.
     """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.log_severity_level = 3
-    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+    options.graph_optimization_level = (
+        onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+    )
     session = onnxruntime.InferenceSession(
         model.SerializeToString(), options, providers=["CPUExecutionProvider"]
     )
     labels = session.run([f"{task}_label" for task in tasks], {"features": vectors})
 
     def distances(inputs: NDArray[Any]) -> NDArray[Any]:
-        return np.hstack(session.run([f"{t}_distances" for t in tasks], {"features": inputs}))
+        return np.hstack(
+            session.run([f"{t}_distances" for t in tasks], {"features": inputs})
+        )
 
     alone = np.vstack([distances(vector[None]) for vector in vectors])
     changed = float((alone != distances(vectors)).mean())
@@ -123,7 +138,8 @@ def answers(
 
 
 def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
-    """A row for each number format: time, size, labels and distances that become others.
+    """A row for each number format: time, size, labels and distances that become
+    others.
 
     Args:
         model: an exported model.
@@ -150,7 +166,10 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
             "float32": (in_single, np.float32),
             "int8 matrices": (in_int8(in_single, Path(folder)), np.float32),
         }
-    results = [answers(graph, vectors.astype(dtype), tasks) for graph, dtype in formats.values()]
+    results = [
+        answers(graph, vectors.astype(dtype), tasks)
+        for graph, dtype in formats.values()
+    ]
     shipped_labels, *_ = results[0]
     return [
         {

@@ -1,4 +1,5 @@
-"""Nodes and constants of an ONNX graph, and the projection of `train.projection` as its nodes."""
+"""Nodes and constants of an ONNX graph, and the projection of `train.projection` as its
+nodes."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,8 +17,8 @@ class Builder:
     """Nodes and constants of a graph under construction.
 
     Attributes:
-        decision_point: name of the scalar that says which decision point is asked for; unused
-            without decision points.
+        decision_point: name of the scalar that says which decision point is asked for;
+            unused without decision points.
     """
 
     def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
@@ -27,7 +28,8 @@ class Builder:
         self._made: dict[tuple[Any, ...], str] = {}
 
     def constant(self, value: Any, dtype: Any = np.float64, name: str = "") -> str:
-        """Name of a constant; equal ones are stored once, but for those that are given a name.
+        """Name of a constant; equal ones are stored once, but for those that are given
+        a name.
 
         `edge.tools.teaching` changes these.
         """
@@ -35,11 +37,16 @@ class Builder:
         key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self._constants:
             own = name or self._scope.get_unique_variable_name("constant")
-            tensor = numpy_helper.from_array(np.ascontiguousarray(array).reshape(array.shape), own)
-            if name:  # the container's method stores equal constants once, whatever their names
+            tensor = numpy_helper.from_array(
+                np.ascontiguousarray(array).reshape(array.shape), own
+            )
+            # the container's method stores equal constants once, whatever their names
+            if name:
                 self._container.initializers.append(tensor)
             else:
-                self._container.add_initializer(own, tensor.data_type, list(array.shape), tensor)
+                self._container.add_initializer(
+                    own, tensor.data_type, list(array.shape), tensor
+                )
             self._constants[key] = own
         return self._constants[key]
 
@@ -59,9 +66,11 @@ class Builder:
         return self.node("Gather", [stack, self.decision_point], axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
-        """As `by_decision_point`, stored in float32 where that holds all values exactly.
+        """As `by_decision_point`, stored in float32 where that holds all values
+        exactly.
 
-        A single value is converted when the model is loaded, and costs a decision nothing.
+        A single value is converted when the model is loaded, and costs a decision
+        nothing.
         """
         with np.errstate(over="ignore"):
             small = [np.asarray(value).astype(np.float32) for value in values]
@@ -76,8 +85,11 @@ class Builder:
             return x
         return self.node("Gather", [x, self.constant(columns, np.int64)], axis=1)
 
-    def node(self, operator: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
-        """Add an operator of one output and return its name; an equal one is not added again."""
+    def node(
+        self, operator: str, inputs: list[str], output: str = "", **attributes: Any
+    ) -> str:
+        """Add an operator of one output and return its name; an equal one is not added
+        again."""
         key = (operator, *inputs, *sorted(attributes.items()))
         if output or key not in self._made:
             self._made[key] = self.nodes(operator, inputs, [output], **attributes)[0]
@@ -87,7 +99,9 @@ class Builder:
         self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any
     ) -> list[str]:
         """Add an operator; an output named "" gets a name of its own."""
-        names = [o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs]
+        names = [
+            o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs
+        ]
         label = self._scope.get_unique_operator_name(operator)
         self._container.add_node(
             operator, inputs, names, op_version=OPSET, name=label, **attributes
@@ -95,20 +109,26 @@ class Builder:
         return names
 
     def clipped(self, x: str, limits: Sequence[float]) -> tuple[str, str]:
-        """Whole numbers (n, m) cut off at plus and minus a limit for each decision point.
+        """Whole numbers (n, m) cut off at plus and minus a limit for each decision
+        point.
 
         Returns:
-            Names of the numbers, and of their summed excess (n, 1), which is 0 within the limits
-            and not finite where a number is not.
+            Names of the numbers, and of their summed excess (n, 1), which is 0 within
+            the limits and not finite where a number is not.
         """
-        low, high = (self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0))
+        low, high = (
+            self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0)
+        )
         inside = self.node("Clip", [x, low, high])
         excess = self.node("Sub", [x, inside])
         return inside, self.node("ReduceL1", [excess, self.ints(1)], keepdims=1)
 
 
-def project(build: Builder, x: str, decision_points: Sequence[Projection]) -> tuple[str, str]:
-    """Nodes that take features (n, p) to whole coordinates; see `train.projection.Projection`.
+def project(
+    build: Builder, x: str, decision_points: Sequence[Projection]
+) -> tuple[str, str]:
+    """Nodes that take features (n, p) to whole coordinates; see
+    `train.projection.Projection`.
 
     Args:
         build: takes the nodes.
@@ -116,23 +136,34 @@ def project(build: Builder, x: str, decision_points: Sequence[Projection]) -> tu
         decision_points: a projection for each.
 
     Returns:
-        Names of the coordinates (n, c) in the grid's units, and of how much was cut off to get
-        them (n, 1): 0 within the training set's reach, not finite where a feature is not.
+        Names of the coordinates (n, c) in the grid's units, and of how much was cut off
+        to get
+        them (n, 1): 0 within the training set's reach, not finite where a feature is
+            not.
     """
     grids = [p.grid_ for p in decision_points]
-    d = build.node("Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])])
+    d = build.node(
+        "Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])]
+    )
     gains = [p.gain_ / p.grid_.step for p in decision_points]
-    steps = build.node("Round", [build.node("Mul", [d, build.by_decision_point(gains)])])
+    steps = build.node(
+        "Round", [build.node("Mul", [d, build.by_decision_point(gains)])]
+    )
     steps, far = build.clipped(steps, [MOST_STEPS] * len(grids))
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
-    product = build.node("MatMul", [steps, build.by_decision_point_small(widened(weights))])
-    z, farther = build.clipped(build.node("Round", [product]), [grid.limit for grid in grids])
+    product = build.node(
+        "MatMul", [steps, build.by_decision_point_small(widened(weights))]
+    )
+    z, farther = build.clipped(
+        build.node("Round", [product]), [grid.limit for grid in grids]
+    )
     return z, build.node("Add", [far, farther])
 
 
 def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Arrays with columns of zeros added up to the widest, for coordinates that are always 0."""
+    """Arrays with columns of zeros added up to the widest, for coordinates that are
+    always 0."""
     widest = max(array.shape[-1] for array in arrays)
     return [
         np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, widest - array.shape[-1])])

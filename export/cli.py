@@ -50,9 +50,19 @@ def parser() -> argparse.ArgumentParser:
         "cross-validation.",
     )
     option = top.add_argument
-    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
-    option("--out", type=Path, default=Path("build"), help="folder (default: %(default)s)")
-    option("--name", help="of the model (default: that of the folder of the recordings)")
+    option(
+        "--data",
+        nargs="+",
+        required=True,
+        metavar="REC",
+        help=".npz recordings or folders",
+    )
+    option(
+        "--out", type=Path, default=Path("build"), help="folder (default: %(default)s)"
+    )
+    option(
+        "--name", help="of the model (default: that of the folder of the recordings)"
+    )
     option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
     option(
         "--features",
@@ -76,7 +86,11 @@ def parser() -> argparse.ArgumentParser:
         help="choose and score a task with entire groups of this label left out, if each of its "
         f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out single trials",
     )
-    option("--quick", action="store_true", help="for a first look: few candidates, five folds")
+    option(
+        "--quick",
+        action="store_true",
+        help="for a first look: few candidates, five folds",
+    )
     option(
         "--window",
         type=within(float, 0.01, LONGEST_S),
@@ -109,7 +123,9 @@ def parser() -> argparse.ArgumentParser:
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     text = "also write OUT/report.html, as `make export` does"
     option("--report", action="store_true", help=text)
-    option("--jobs", type=count, default=cpu_count(), help="processes (default: all cores)")
+    option(
+        "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
+    )
     top.set_defaults(run=run)
     return top
 
@@ -123,7 +139,9 @@ def run(arguments: argparse.Namespace) -> int:
     points = arguments.decision_points
     if window_s is None and points not in (None, "none"):
         window_s = WINDOW_S
-    early = None if points is None else parse_decision_points(points, window_s or WINDOW_S)
+    early = (
+        None if points is None else parse_decision_points(points, window_s or WINDOW_S)
+    )
     fitted = fit(
         arguments.data,
         **{name: getattr(arguments, name) for name in FORWARDED},
@@ -149,7 +167,9 @@ def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
     """The operating point that was asked for."""
     given = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
     if given:
-        raise InputError(f"--front makes the model that was measured; leave out {', '.join(given)}")
+        raise InputError(
+            f"--front makes the model that was measured; leave out {', '.join(given)}"
+        )
     front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
     point = front.pick(arguments.front)
     print(
@@ -161,7 +181,8 @@ def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
 
 
 def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
-    """Decision points in seconds, from `a:b:step`, `a,b,c` or `none`; the full window comes last.
+    """Decision points in seconds, from `a:b:step`, `a,b,c` or `none`; the full window
+    comes last.
 
     Raises:
         InputError: the text has another form, or a decision point is not above 0.

@@ -22,11 +22,12 @@ BOUNDS = {
     "features": 1e-12,
     "time_s": 1e-9,
 }
-"""Scores are quotients of small integers, correctly rounded everywhere. A label's distance is the
-mean of whole numbers whose sum may exceed 2^53 where a vector lies outside the training set: its
-relative error is then below 2^-46. Features are interpolated in a few operations, and motion passes
-through sines and cosines that differ by an ulp between C libraries: below 100 ulp of metres. The
-bounds leave a factor of 40 and more."""
+"""Scores are quotients of small integers, correctly rounded everywhere. A label's
+distance is the mean of whole numbers whose sum may exceed 2^53 where a vector lies
+outside the training set: its relative error is then below 2^-46. Features are
+interpolated in a few operations, and motion passes through sines and cosines that
+differ by an ulp between C libraries: below 100 ulp of metres. The bounds leave a factor
+of 40 and more."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
@@ -39,7 +40,9 @@ def trials_of(dataset: DataSet, count: int) -> list[int]:
 
 def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     """A quarter second before onset to two frames past the window."""
-    first, last = np.searchsorted(recording.t, (onset_s - 0.25, onset_s + model.info.window_s))
+    first, last = np.searchsorted(
+        recording.t, (onset_s - 0.25, onset_s + model.info.window_s)
+    )
     kept = slice(first, last + 2)
     valid = np.array(True) if recording.valid is None else recording.valid
     return replace(
@@ -54,8 +57,8 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
 def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
     """Run the exported model on trials and vectors, and store its outputs.
 
-    Vectors are the trials' own, training vectors (distance exactly 0), others between and
-    beyond them, and two that are not finite (label -1).
+    Vectors are the trials' own, training vectors (distance exactly 0), others between
+    and beyond them, and two that are not finite (label -1).
     """
     info = model.info
     recordings: list[Recording] = []
@@ -88,15 +91,23 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "vectors": vectors,
     }
     if info.dof is not None:
-        arrays["joints"] = np.concatenate([r.joints for r in recordings if r.joints is not None])
+        arrays["joints"] = np.concatenate(
+            [r.joints for r in recordings if r.joints is not None]
+        )
     if info.decision_points_s:
         windows = info.decision_points_s
-        early = np.array([[info.vector(s, window) for _, s in contacts] for window in windows])
+        early = np.array(
+            [[info.vector(s, window) for _, s in contacts] for window in windows]
+        )
         # Besides the trials, which were trained with, points between them.
         between = 0.5 * (early + np.roll(early, 1, axis=1))
         arrays["decision_point_vectors"] = np.concatenate([early, between], axis=1)
     bounds = dict(BOUNDS)
     if not info.has_label_distances:
         del bounds["label_distances"]
-    meta = {"skin": recordings[0].meta.get("skin", {}), "bounds": bounds, "model": info.data_digest}
+    meta = {
+        "skin": recordings[0].meta.get("skin", {}),
+        "bounds": bounds,
+        "model": info.data_digest,
+    }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

@@ -1,8 +1,10 @@
-"""A fitted `ContactClassifier` as one ONNX graph, through skl2onnx with our own converter.
+"""A fitted `ContactClassifier` as one ONNX graph, through skl2onnx with our own
+converter.
 
-skl2onnx's own k-NN walks the training rows in a Scan, which is slow, breaks ties by the class
-number and answers NaN with the first row's label. This graph takes all distances in one product of
-whole numbers, obeys the tie rule, and answers a vector that is not finite with label -1.
+skl2onnx's own k-NN walks the training rows in a Scan, which is slow, breaks ties by the
+class number and answers NaN with the first row's label. This graph takes all distances
+in one product of whole numbers, obeys the tie rule, and answers a vector that is not
+finite with label -1.
 """
 
 from __future__ import annotations
@@ -36,18 +38,21 @@ def _squares(
     components: int,
     absent: NDArray[np.bool_],
 ) -> tuple[str, str]:
-    """Squared distances (n, rows) of points z (n, c) to rows (rows, c), less |z|^2, and |z|^2.
+    """Squared distances (n, rows) of points z (n, c) to rows (rows, c), less |z|^2, and
+    |z|^2.
 
     Those to `absent` trials (rows,), which have no label for the task, are infinite.
 
-    All are whole numbers below 2^53 (`train.projection.coordinate_bits`), so that |b|^2 - 2 b.z
-    cancels nothing. Of more coordinates than `components` the others count as 0: the tasks of a
-    space share its rows.
+    All are whole numbers below 2^53 (`train.projection.coordinate_bits`), so that |b|^2
+    - 2 b.z cancels nothing. Of more coordinates than `components` the others count as
+    0: the tasks of a space share its rows.
     """
     if components < rows[0].shape[1]:
         used = (np.arange(rows[0].shape[1]) < components).astype(np.float64)
         z = build.node("Mul", [z, build.constant(used)])
-    columns = build.by_decision_point_small([-2.0 * r.T for r in rows], f"columns of {task}")
+    columns = build.by_decision_point_small(
+        [-2.0 * r.T for r in rows], f"columns of {task}"
+    )
     lengths = build.by_decision_point(
         [np.where(absent, np.inf, (r[:, :components] ** 2).sum(axis=1)) for r in rows],
         name=f"lengths of {task}",
@@ -74,8 +79,8 @@ def _decide(
         labels: of the training trials; -1 where one has none.
         classes: how many labels there are.
         k: how many neighbours vote.
-        nearest: names of the neighbours' squared distances (n, k) less a length, of their rows
-            (n, k), and of that length (n, 1).
+        nearest: names of the neighbours' squared distances (n, k) less a length, of
+            their rows (n, k), and of that length (n, 1).
         units: of the distances, for each decision point.
         off: name of the excess over the limits (n, 1).
     """
@@ -84,7 +89,8 @@ def _decide(
     build.node("Mul", [roots, build.by_decision_point(units)], f"{task}_distances")
     known = build.constant(labels, np.int64, f"labels of {task}")
     voters = build.node("Gather", [known, rows])
-    # A vector that is not finite has no votes: class -1, whose row of the votes (the last) is 0.
+    # A vector that is not finite has no votes: class -1, whose row of the votes (the
+    # last) is 0.
     finite = build.node("LessOrEqual", [off, build.constant(LARGEST)])
     voters = build.node("Where", [finite, voters, build.constant(-1, np.int64)])
     ballots = build.constant(np.eye(classes + 1, classes), name=f"ballots of {task}")
@@ -96,7 +102,9 @@ def _decide(
         build.node("Gather", [ballots, label], f"{task}_scores")
         return
     cast = build.node("Gather", [ballots, voters])
-    votes = build.node("ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0)
+    votes = build.node(
+        "ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0
+    )
     if k == 2:
         return
     # The first neighbour whose class has the most votes is the nearest of the tied.
@@ -105,8 +113,12 @@ def _decide(
     build.node("GatherND", [voters, winner], f"{task}_label", batch_dims=1)
 
 
-def _decision_points(model: ContactClassifier | SequentialClassifier) -> list[ContactClassifier]:
-    return model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
+def _decision_points(
+    model: ContactClassifier | SequentialClassifier,
+) -> list[ContactClassifier]:
+    return (
+        model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
+    )
 
 
 def _convert(scope: Any, operator: Any, container: Any) -> None:
@@ -142,7 +154,8 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         labels = np.full(last.n_trials_, -1)
         labels[members] = last.labels_[task]
         output = names[f"{task}_label"].removesuffix("_label")
-        # Trials span fewer components at some decision points: there, the rest are always 0.
+        # Trials span fewer components at some decision points: there, the rest are
+        # always 0.
         components = max(point.components_[task] for point in points)
         squares, length = _squares(
             build, output, projected[space][0], widened(rows), components, labels < 0
@@ -152,11 +165,22 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
         classes = len(last.classes_[task])
         nearest = values, places, length
-        _decide(build, output, labels, classes, choice.k, nearest, units, projected[space][1])
+        _decide(
+            build,
+            output,
+            labels,
+            classes,
+            choice.k,
+            nearest,
+            units,
+            projected[space][1],
+        )
         if early or last.products_:
             all_squares = build.node("Add", [squares, length])
             slopes = [point.slopes_[task] for point in points]
-            scales = build.by_decision_point([u * s for u, s in zip(units, slopes, strict=True)])
+            scales = build.by_decision_point(
+                [u * s for u, s in zip(units, slopes, strict=True)]
+            )
             roots = _label_distances(build, output, all_squares, labels, classes)
             build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
 
@@ -164,10 +188,12 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
 def _label_distances(
     build: Builder, task: str, squares: str, labels: NDArray[np.int64], classes: int
 ) -> str:
-    """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n, rows)."""
+    """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
+    rows)."""
     tables = label_tables(labels, classes)
     rows, most, taken, counts = (
-        build.constant(table, table.dtype, f"{name} of {task}") for name, table in tables.items()
+        build.constant(table, table.dtype, f"{name} of {task}")
+        for name, table in tables.items()
     )
     wider = build.node("Pad", [squares, build.ints(0, 0, 0, 1), build.constant(np.inf)])
     own = build.node("Gather", [wider, rows], axis=1)
@@ -180,7 +206,8 @@ def _label_distances(
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
     """Name and type of each output.
 
-    ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching` enlarges.
+    ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching`
+    enlarges.
     """
     outputs: list[tuple[str, Any]] = []
     for task in model.choices:
@@ -211,16 +238,18 @@ def _parse(
 
 
 def _shapes(operator: Any) -> None:
-    for variable, (_, kind) in zip(operator.outputs, _outputs(operator.raw_operator), strict=True):
+    for variable, (_, kind) in zip(
+        operator.outputs, _outputs(operator.raw_operator), strict=True
+    ):
         variable.set_type(kind)
 
 
 def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
-    A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), whose default is
-    the last one, and for each task the output `<task>_label_distances` (n, labels); see
-    `edge.model.stopping`.
+    A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), whose
+    default is the last one, and for each task the output `<task>_label_distances` (n,
+    labels); see `edge.model.stopping`.
     """
     kind = type(model)
     update_registered_converter(
@@ -233,8 +262,8 @@ def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) ->
         model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
     )
     if isinstance(model, SequentialClassifier):
-        # An initializer of an input's name is its default: whoever gives `features` alone is
-        # answered at the full window.
+        # An initializer of an input's name is its default: whoever gives `features`
+        # alone is answered at the full window.
         full = np.array([len(model.decision_points_) - 1], dtype=np.int64)
         proto.graph.initializer.append(numpy_helper.from_array(full, "decision_point"))
     proto.ir_version = IR_VERSION

@@ -1,7 +1,7 @@
 """Check a report in a real browser: overflow, missing pictures, broken links.
 
-This needs Chromium with its driver (Debian: `apt install chromium chromium-driver`) and the
-dependency group `browser`; tests are skipped with a reason where they are missing.
+This needs Chromium with its driver (Debian: `apt install chromium chromium-driver`) and
+the dependency group `browser`; tests are skipped with a reason where they are missing.
 """
 
 import importlib.util
@@ -38,17 +38,29 @@ def available() -> bool:
 @contextmanager
 def chromium(width: int, address: str) -> Iterator[Any]:
     """A headless browser with a window of that width, which shows a page."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs the group `browser`")
+    webdriver = pytest.importorskip(
+        "selenium.webdriver", reason="needs the group `browser`"
+    )
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if program is None or driver is None:
         pytest.skip("needs Chromium and chromedriver")
     options = webdriver.ChromeOptions()
     options.binary_location = program
-    for argument in ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--disable-gpu"):
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--hide-scrollbars",
+        "--disable-gpu",
+    ):
         options.add_argument(argument)
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
     try:
-        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+        size = {
+            "width": width,
+            "height": 900,
+            "deviceScaleFactor": 1,
+            "mobile": width < 600,
+        }
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         browser.get(address)
         yield browser
@@ -66,7 +78,9 @@ def faults(report: Path) -> list[str]:
             )
             wide = browser.execute_script(WIDER_THAN_THE_PAGE)
             lines += [f"{width} px: wider than the page: {element}" for element in wide]
-            lines += [f"missing picture: {alt}" for alt in browser.execute_script(NOT_SHOWN)]
+            lines += [
+                f"missing picture: {alt}" for alt in browser.execute_script(NOT_SHOWN)
+            ]
             for link in browser.execute_script(LINKS):
                 if link.startswith("#"):
                     exists = bool(browser.find_elements("id", link[1:]))

@@ -1,4 +1,5 @@
-"""Recordings small enough to read, a model fitted on them, and the command as a user runs it."""
+"""Recordings small enough to read, a model fitted on them, and the command as a user
+runs it."""
 
 import csv
 import json
@@ -20,8 +21,8 @@ from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main
 
-# Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1` draws others.
-# There are no deadlines, because a busy machine must not turn a test red.
+# Each run draws the same examples, so only a change can turn a test red; `EXPLORE=1`
+# draws others. There are no deadlines, because a busy machine must not turn a test red.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
@@ -53,7 +54,8 @@ def touch(
     rate: float = 100.0,
     labels: dict[str, str] | None = None,
 ) -> Recording:
-    """A contact that grows: a hard one in force, a soft one in area. It imitates no physics."""
+    """A contact that grows: a hard one in force, a soft one in area. It imitates no
+    physics."""
     rng = np.random.default_rng([seed, len(kind)])
     n = round((lead_s + seconds) * rate)
     t = np.arange(n) / rate
@@ -66,7 +68,9 @@ def touch(
         reach = 1 if kind == "hard" else 1 + int(3 * age)
         for r in range(max(row - reach, 0), min(row + reach + 1, layout.rows)):
             for c in range(col - reach, col + reach + 1):
-                frames[i, r, c % layout.cols] = force / (1 + abs(r - row) + abs(c - col))
+                frames[i, r, c % layout.cols] = force / (
+                    1 + abs(r - row) + abs(c - col)
+                )
     joints = None
     if arm:
         chain = Chain.cody()
@@ -75,7 +79,12 @@ def touch(
         assert joints.shape[1] == chain.dof
     own = {"category": f"{'rigid' if kind == 'hard' else 'soft'}-fixed"}
     own["object"] = f"{kind} {seed % 2}"
-    meta = {"labels": labels or own, "skin": layout.to_dict(), "source": "test", "trial": seed}
+    meta = {
+        "labels": labels or own,
+        "skin": layout.to_dict(),
+        "source": "test",
+        "trial": seed,
+    }
     return Recording(t=t, frames=frames, joints=joints, meta=meta)
 
 
@@ -86,11 +95,15 @@ def make_touch():
 
 
 def save_touches(folder: Path, count: int, **more) -> Path:
-    """The folder, with so many hard and so many soft touches, in the order of their seeds."""
+    """The folder, with so many hard and so many soft touches, in the order of their
+    seeds."""
     digits = len(str(count - 1))
     for kind in ("hard", "soft"):
         for seed in range(count):
-            save(folder / f"{kind}_{seed:0{digits}}.npz", touch(kind=kind, seed=seed, **more))
+            save(
+                folder / f"{kind}_{seed:0{digits}}.npz",
+                touch(kind=kind, seed=seed, **more),
+            )
     return folder
 
 
@@ -102,22 +115,29 @@ def forearm() -> SkinLayout:
 
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory) -> Path:
-    """A folder of 16 labelled recordings, 4 objects in 2 categories, with joint angles."""
+    """A folder of 16 labelled recordings, 4 objects in 2 categories, with joint
+    angles."""
     return save_touches(tmp_path_factory.mktemp("recordings"), 8)
 
 
 def in_a_row(*touches: Recording, rest: int = 50) -> Recording:
-    """Touches one after another at 100 Hz, each with so many frames of rest after it."""
+    """Touches one after another at 100 Hz, each with so many frames of rest after
+    it."""
     still = np.zeros((rest, *touches[0].frames.shape[1:]), np.uint16)
     frames = np.concatenate([part for each in touches for part in (each.frames, still)])
     ends = [np.repeat(each.joints[-1:], rest, axis=0) for each in touches]
-    joints = [part for each, end in zip(touches, ends, strict=True) for part in (each.joints, end)]
+    joints = [
+        part
+        for each, end in zip(touches, ends, strict=True)
+        for part in (each.joints, end)
+    ]
     t = np.arange(len(frames)) / 100.0
     return replace(touches[0], t=t, frames=frames, joints=np.concatenate(joints))
 
 
 def full_pipe() -> tuple[int, int]:
-    """The ends of a pipe, to read and to write, that takes no further byte until it is read."""
+    """The ends of a pipe, to read and to write, that takes no further byte until it is
+    read."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     for size in (4096, 1):
@@ -151,13 +171,15 @@ def edge(capsys):
 
 
 def python(*arguments, **options) -> subprocess.CompletedProcess:
-    """A process of its own that ran Python in the project's folder, with its output as text."""
+    """A process of its own that ran Python in the project's folder, with its output as
+    text."""
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
     return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, **options)
 
 
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
-"""Options of `make export` that fix the paper's features, for tests that need no choice."""
+"""Options of `make export` that fix the paper's features, for tests that need no
+choice."""
 
 
 def export(out: Path, *options: object) -> Path:
@@ -174,7 +196,8 @@ def exported(recordings, tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def fitted(recordings):
-    """What training makes of those recordings with the paper's features, before its export."""
+    """What training makes of those recordings with the paper's features, before its
+    export."""
     return train.fit(str(recordings), features=["paper"], projection="pca", jobs=1)
 
 
@@ -182,5 +205,7 @@ def fitted(recordings):
 def real() -> Path:
     """The folder of real recordings; tests that need it are skipped without it."""
     if not REAL.is_dir():
-        pytest.skip("../shared/real is absent: the real recordings are not part of the project")
+        pytest.skip(
+            "../shared/real is absent: the real recordings are not part of the project"
+        )
     return REAL

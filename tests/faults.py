@@ -1,11 +1,13 @@
-"""How the skin takes the faults of its wires, judged by the counts that its chips really felt.
+"""How the skin takes the faults of its wires, judged by the counts that its chips
+really felt.
 
-`python -m tests.faults` prints tables; the same seed gives the same tables. Scripts of faults, and
-the loss of all settings between two frames, are played onto fake skins in virtual time, which
-advances with the bits on the wire and with the software's overhead for each transaction. Then one
-fault of each kind is played at every transaction of a frame and of the set-up; `--every 10` takes
-every tenth. The exit status is 1 if a valid value is wrong, or a taxel is not valid again within
-half a second of the fault's end. The tests of `edge.skin.bus_reader` play a part of this.
+`python -m tests.faults` prints tables; the same seed gives the same tables. Scripts of
+faults, and the loss of all settings between two frames, are played onto fake skins in
+virtual time, which advances with the bits on the wire and with the software's overhead
+for each transaction. Then one fault of each kind is played at every transaction of a
+frame and of the set-up; `--every 10` takes every tenth. The exit status is 1 if a valid
+value is wrong, or a taxel is not valid again within half a second of the fault's end.
+The tests of `edge.skin.bus_reader` play a part of this.
 """
 
 import argparse
@@ -53,24 +55,33 @@ KINDS = {
 
 
 def skins():
-    """The shipped skins, one bus for all of Cody's chips, and microcontrollers, calibrated.
+    """The shipped skins, one bus for all of Cody's chips, and microcontrollers,
+    calibrated.
 
     With 100 us of overhead for each transaction, 32 AD7147 on one bus carry 36 Hz.
     """
-    cody, pad = (calibrated(skinfile.load(skinfile.shipped(n))) for n in ("cody", "mpr121"))
+    cody, pad = (
+        calibrated(skinfile.load(skinfile.shipped(n))) for n in ("cody", "mpr121")
+    )
     single = one_bus(cody)
     single = replace(single, reading=replace(single.reading, rate_hz=36.0))
     taxels = [tuple(range(128 * i, 128 * i + 128)) for i in range(3)]
     chips = [ChipSpec(block.KIND, 0x28, t) for t in taxels]
     buses = tuple(BusSpec(f"/dev/i2c-{i + 1}", (chip,)) for i, chip in enumerate(chips))
-    return {"cody": cody, "mpr121": pad, "one bus": single, "block": replace(cody, buses=buses)}
+    return {
+        "cody": cody,
+        "mpr121": pad,
+        "one bus": single,
+        "block": replace(cody, buses=buses),
+    }
 
 
 SKINS = skins()
 
 
 class Pattern:
-    """A scene whose counts differ between all taxels, and from each 10 ms to the next few."""
+    """A scene whose counts differ between all taxels, and from each 10 ms to the next
+    few."""
 
     def __init__(self, file):
         shape = file.layout.shape
@@ -82,14 +93,17 @@ class Pattern:
         return (self.base + int(t / 0.01 + 1e-6) % self.step).astype(np.uint16)
 
     def wrong(self, frame):
-        """Number of valid taxels whose count their chip did not feel at its last conversion.
+        """Number of valid taxels whose count their chip did not feel at its last
+        conversion.
 
         That may be a conversion (9 ms) before the reading: two steps are right.
         """
         phase = frame.counts.astype(np.int64) - self.base
         right = ~frame.valid
         for age in (0.0, 0.005, 0.01):
-            felt = np.floor((frame.times - age) / 0.01 + 1e-6).astype(np.int64) % self.step
+            felt = (
+                np.floor((frame.times - age) / 0.01 + 1e-6).astype(np.int64) % self.step
+            )
             right |= phase == felt
         return int((~right).sum())
 
@@ -105,7 +119,8 @@ class Outcome:
         missing: most invalid taxels of one frame.
         others: readings lost on chips that the script does not touch.
         missed_ticks: ticks left out.
-        back_s: longest time from a fault's end until every taxel was valid; NaN if never.
+        back_s: longest time from a fault's end until every taxel was valid; NaN if
+            never.
     """
 
     name: str
@@ -118,12 +133,19 @@ class Outcome:
 
 
 class Watched:
-    """A fake skin that feels its pattern, was started while faults were played, and is judged."""
+    """A fake skin that feels its pattern, was started while faults were played, and is
+    judged."""
 
     def __init__(self, file, *, faults=(), overhead_s=0.0, seed=0):
         clock, self.feels = VirtualClock(), Pattern(file)
         self.buses = faulty_buses(
-            file, self.feels, clock, timed=True, overhead_s=overhead_s, faults=faults, seed=seed
+            file,
+            self.feels,
+            clock,
+            timed=True,
+            overhead_s=overhead_s,
+            faults=faults,
+            seed=seed,
         )
         self.skin = Skin(file, self.buses, clock=clock)
         self.skin.start()
@@ -149,7 +171,9 @@ class Watched:
     def outcome(self, name, met, end, missed_ticks=0):
         """The outcome of faults that ended at a time."""
         back = math.nan if self.back_at == math.inf else max(0.0, self.back_at - end)
-        return Outcome(name, met, self.wrong, self.missing, self.others, missed_ticks, back)
+        return Outcome(
+            name, met, self.wrong, self.missing, self.others, missed_ticks, back
+        )
 
 
 def touches(fault, bus, chip):
@@ -160,14 +184,17 @@ def touches(fault, bus, chip):
 
 
 def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, seed=0):
-    """Play a script for some seconds; reset every chip and mux before each of the numbered frames.
+    """Play a script for some seconds; reset every chip and mux before each of the
+    numbered frames.
 
     Frames count from 1. Without a script no reading counts as lost on another chip.
     """
     watched = Watched(file, overhead_s=overhead_s, seed=seed)
     for bus in file.buses:
         for chip in bus.chips:
-            spared = bool(faults) and not any(touches(fault, bus, chip) for fault in faults)
+            spared = bool(faults) and not any(
+                touches(fault, bus, chip) for fault in faults
+            )
             watched.spared.flat[list(chip.taxels)] = spared
     with watched.skin as skin:
         start = skin.clock.now()
@@ -189,7 +216,8 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, se
 
 
 def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
-    """Play one fault at each transaction of four frames, or of the set-up, on every bus.
+    """Play one fault at each transaction of four frames, or of the set-up, on every
+    bus.
 
     Four frames hold every kind of transaction, the check of a chip's settings too.
     """
@@ -198,10 +226,16 @@ def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
         before = [bus.transactions for bus in watched.buses]
         for _ in range(4):
             watched.read()
-        frame = [bus.transactions - n for bus, n in zip(watched.buses, before, strict=True)]
+        frame = [
+            bus.transactions - n for bus, n in zip(watched.buses, before, strict=True)
+        ]
     outcomes = [
-        _one_fault(file, replace(fault, at=[position], bus=bus.device), set_up, overhead_s)
-        for bus, transactions in zip(file.buses, before if set_up else frame, strict=True)
+        _one_fault(
+            file, replace(fault, at=[position], bus=bus.device), set_up, overhead_s
+        )
+        for bus, transactions in zip(
+            file.buses, before if set_up else frame, strict=True
+        )
         for position in range(first, transactions, every)
     ]
     return Outcome(
@@ -240,10 +274,11 @@ def models(buses):
 def scripts():
     """Name, skin and faults for `run`; `*` marks faults that the protocol cannot tell.
 
-    An AD7147's words carry no check, so that a flipped bit is a value unless it gives 0, 0xFFFF or
-    a count that no touch reaches; an MPR121's words have six spare bits of sixteen. A chip that
-    serves old bytes is found after 100 frames if its calibration saw noise. A wrong channel is
-    found by reading the mux back, which a skin file may switch off.
+    An AD7147's words carry no check, so that a flipped bit is a value unless it gives
+    0, 0xFFFF or a count that no touch reaches; an MPR121's words have six spare bits of
+    sixteen. A chip that serves old bytes is found after 100 frames if its calibration
+    saw noise. A wrong channel is found by reading the mux back, which a skin file may
+    switch off.
     """
     cody, pad = SKINS["cody"], SKINS["mpr121"]
     first = cody.buses[0].device
@@ -255,7 +290,11 @@ def scripts():
     for code in (errno.EIO, errno.EAGAIN, errno.ETIMEDOUT):
         yield f"{errno.errorcode[code]} on one chip", cody, [Fault(code=code, **chip)]
     for code in (errno.EIO, errno.ETIMEDOUT, errno.ENODEV):
-        yield f"{errno.errorcode[code]} on one bus", cody, [Fault(code=code, bus=first, **lasting)]
+        yield (
+            f"{errno.errorcode[code]} on one bus",
+            cody,
+            [Fault(code=code, bus=first, **lasting)],
+        )
     yield "ENODEV on all buses", cody, [Fault(code=errno.ENODEV, **lasting)]
     short = {"during": (BEGIN_S, BEGIN_S + 0.011)}
     yield "a chip resets", cody, [Fault("reset", **{**chip, **short})]
@@ -264,15 +303,24 @@ def scripts():
     yield "a wrong mux channel, 10 % of selections", cody, wrong
     blind = replace(cody, reading=replace(cody.reading, verify_mux=False))
     yield "the same without reading back *", blind, wrong
-    yield "another program selects a mux channel", cody, [Fault("foreign", rate=0.005, **lasting)]
+    yield (
+        "another program selects a mux channel",
+        cody,
+        [Fault("foreign", rate=0.005, **lasting)],
+    )
     flip = [Fault("flip", rate=0.02, **lasting)]
     yield "bit flips in 2 % of reads, AD7147 *", cody, flip
     yield "the same, MPR121 *", pad, flip
     yield "the same, block (CRC)", SKINS["block"], flip
     yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)]
     for rate in (0.001, 0.01, 0.1):
-        for name, codes in (("random errors", CODES[:4]), ("without timeouts", CODES[:2])):
-            faults = [Fault(code=code, rate=rate / len(codes), **lasting) for code in codes]
+        for name, codes in (
+            ("random errors", CODES[:4]),
+            ("without timeouts", CODES[:2]),
+        ):
+            faults = [
+                Fault(code=code, rate=rate / len(codes), **lasting) for code in codes
+            ]
             yield f"{name}, {rate:.1%} of transactions", cody, faults
 
 
@@ -281,7 +329,9 @@ def table(outcomes, met):
     heads = ["fault", met, "wrong values called valid", "taxels missing, worst frame"]
     heads += ["readings lost on other chips", "ticks left out", "all back after, ms"]
     rows = [[*astuple(o)[:-1], f"{1e3 * o.back_s:.0f}"] for o in outcomes]
-    return "\n".join(f"| {' | '.join(map(str, row))} |" for row in [heads, ["---"] * 7, *rows])
+    return "\n".join(
+        f"| {' | '.join(map(str, row))} |" for row in [heads, ["---"] * 7, *rows]
+    )
 
 
 def campaign(overhead_us, every, seed):
@@ -291,25 +341,39 @@ def campaign(overhead_us, every, seed):
         The names of the outcomes that break the promise.
     """
     cost = {"overhead_s": overhead_us * 1e-6}
-    jobs = [delayed(run)(name, file, faults, seed=seed, **cost) for name, file, faults in scripts()]
+    jobs = [
+        delayed(run)(name, file, faults, seed=seed, **cost)
+        for name, file, faults in scripts()
+    ]
     for name, file in SKINS.items():
-        jobs.append(delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost))
-        jobs.append(delayed(run)(f"all reset 4 times, {name}", file, resets=REPEATED, **cost))
+        jobs.append(
+            delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost)
+        )
+        jobs.append(
+            delayed(run)(f"all reset 4 times, {name}", file, resets=REPEATED, **cost)
+        )
     played = len(jobs)
     jobs += [
-        delayed(sweep)(f"{kind}, {name}", file, fault, set_up=set_up, every=every, **cost)
+        delayed(sweep)(
+            f"{kind}, {name}", file, fault, set_up=set_up, every=every, **cost
+        )
         for name, file in SKINS.items()
         for kind, fault in KINDS.items()
         for set_up in (False, True)
     ]
-    outcomes = Parallel(n_jobs=-1)(bar(jobs, desc=f"{overhead_us:g} us", unit=" scripts"))
+    outcomes = Parallel(n_jobs=-1)(
+        bar(jobs, desc=f"{overhead_us:g} us", unit=" scripts")
+    )
     print(f"\nOverhead of {overhead_us:g} us a transaction:\n")
     print(table(outcomes[:played], "met"))
     print("\n\\* The protocol cannot tell: see `scripts` in tests/faults.py.\n")
     print(table(outcomes[played:], "positions"))
     known = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
     longest = max(known, key=lambda outcome: outcome.back_s)
-    print(f"\nLongest time until all were back: {longest.back_s:.3f} s, {longest.name}", flush=True)
+    print(
+        f"\nLongest time until all were back: {longest.back_s:.3f} s, {longest.name}",
+        flush=True,
+    )
     broken = [o for o in known if o.wrong or not o.back_s <= BACK_S]
     return [f"{outcome.name} ({overhead_us:g} us)" for outcome in broken]
 

@@ -25,13 +25,14 @@ class Fault:
     A transaction meets it where all given conditions hold.
 
     Attributes:
-        kind: `error` fails it with `code`; `flip` turns one bit of the bytes read; `misroute`
-            makes a write to a mux select another channel; `foreign` is another program that
-            selects another channel first; `reset` resets the chip first; `hold` makes the chip
-            serve its former bytes; `break` lets go of the wire at a random byte of those read,
-            from which on all bits are 1; `none` does nothing.
-        code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also keeps the
-            bus from being opened again while the fault lasts.
+        kind: `error` fails it with `code`; `flip` turns one bit of the bytes read;
+            `misroute` makes a write to a mux select another channel; `foreign` is
+            another program that selects another channel first; `reset` resets the chip
+            first; `hold` makes the chip serve its former bytes; `break` lets go of the
+            wire at a random byte of those read, from which on all bits are 1; `none`
+            does nothing.
+        code: errno of an `error`. ETIMEDOUT costs the bus its timeout; ENODEV also
+            keeps the bus from being opened again while the fault lasts.
         at: numbers of transactions on the bus, counted from 0 when the script starts.
         rate: probability per transaction.
         during: seconds of the bus's clock, from and until.
@@ -60,7 +61,9 @@ class Route(NamedTuple):
 class FaultyBus(FakeBus):
     """A fake bus with a script of faults; `inject` starts one."""
 
-    def __init__(self, *arguments, faults: Sequence[Fault] = (), seed: int = 0, **options):
+    def __init__(
+        self, *arguments, faults: Sequence[Fault] = (), seed: int = 0, **options
+    ):
         super().__init__(*arguments, **options)
         self._held = {}
         self.inject(faults, seed)
@@ -71,12 +74,17 @@ class FaultyBus(FakeBus):
         self.met = 0
         """Number of transactions that met a fault."""
         self._first = self.transactions
-        # One stream for each bus, so that its faults do not depend on the other threads.
+        # One stream for each bus, so that its faults do not depend on the other
+        # threads.
         self.random = random.Random(f"faults/{seed}/{self.name}")
 
     def reopen(self) -> None:
         """Open it, unless a fault keeps the adapter away."""
-        gone = [f for f in self.faults if (f.kind, f.code, f.at) == ("error", errno.ENODEV, None)]
+        gone = [
+            f
+            for f in self.faults
+            if (f.kind, f.code, f.at) == ("error", errno.ENODEV, None)
+        ]
         if any(fault.during[0] <= self.now() < fault.during[1] for fault in gone):
             raise bus_error(errno.ENODEV, self.name)
         super().reopen()
@@ -124,7 +132,10 @@ class FaultyBus(FakeBus):
             if (
                 (fault.at is None or number in fault.at)
                 and fault.during[0] <= t < fault.during[1]
-                and all(getattr(fault, key) in (None, at) for key, at in route._asdict().items())
+                and all(
+                    getattr(fault, key) in (None, at)
+                    for key, at in route._asdict().items()
+                )
                 and (fault.rate >= 1.0 or self.random.random() < fault.rate)
             ):
                 self.met += 1
@@ -167,9 +178,12 @@ def faulty_skin(file, scene, faults=(), **options):
 
 
 def one_bus(file):
-    """The skin with the chips of all its buses on one, behind further channels of one mux."""
+    """The skin with the chips of all its buses on one, behind further channels of one
+    mux."""
     chips, channel = [], 0
     for bus in file.buses:
-        chips += [replace(chip, channel=channel + (chip.channel or 0)) for chip in bus.chips]
+        chips += [
+            replace(chip, channel=channel + (chip.channel or 0)) for chip in bus.chips
+        ]
         channel += 1 + max(chip.channel or 0 for chip in bus.chips)
     return replace(file, buses=(BusSpec("one bus", tuple(chips)),))

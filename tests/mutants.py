@@ -1,9 +1,11 @@
-"""`make mutants`: change the code a little, at random places, and see whether a test fails.
+"""`make mutants`: change the code a little, at random places, and see whether a test
+fails.
 
-mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that reach the
-changed function; `[tool.mutmut]` in pyproject.toml names the files and the tests. A run tries
-`--count` mutants drawn by `--seed` until `--minutes` are over, and prints the difference of each
-mutant that no test noticed. Results are kept in `mutants/`, and no mutant is tried twice.
+mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that
+reach the changed function; `[tool.mutmut]` in pyproject.toml names the files and the
+tests. A run tries `--count` mutants drawn by `--seed` until `--minutes` are over, and
+prints the difference of each mutant that no test noticed. Results are kept in
+`mutants/`, and no mutant is tried twice.
 """
 
 import argparse
@@ -20,7 +22,9 @@ UNNOTICED = ("survived", "no tests")
 
 def output(*arguments: str) -> str:
     """The output of a mutmut command; its errors pass through."""
-    done = subprocess.run([*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run(
+        [*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True
+    )
     return done.stdout
 
 
@@ -56,12 +60,23 @@ def run(names: list[str], minutes: float) -> None:
 
 
 def main() -> None:
-    """Try a sample of mutants; print those that no test notices, and a count of each status."""
-    parser = argparse.ArgumentParser(prog="mutants", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--count", type=int, default=200, help="mutants to draw (%(default)s)")
-    parser.add_argument("--seed", type=int, default=2012, help="of the draw (%(default)s)")
-    parser.add_argument("--minutes", type=float, default=15.0, help="at most (%(default)s)")
-    parser.add_argument("--only", default="", help="draw from mutants whose name contains this")
+    """Try a sample of mutants; print those that no test notices, and a count of each
+    status."""
+    parser = argparse.ArgumentParser(
+        prog="mutants", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument(
+        "--count", type=int, default=200, help="mutants to draw (%(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=2012, help="of the draw (%(default)s)"
+    )
+    parser.add_argument(
+        "--minutes", type=float, default=15.0, help="at most (%(default)s)"
+    )
+    parser.add_argument(
+        "--only", default="", help="draw from mutants whose name contains this"
+    )
     arguments = parser.parse_args()
     generate()
     names = [name for name in statuses() if arguments.only in name]

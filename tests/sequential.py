@@ -13,13 +13,15 @@ from train.stopping import SequentialClassifier
 def fitted_model(path, info, choices: dict[str, Choice], X, y):
     """The estimator, and its model, which is written to a path.
 
-    `info` is the metadata of a model of the same features; X has a set of vectors for each of its
-    decision points, and the first task of y gives the folds.
+    `info` is the metadata of a model of the same features; X has a set of vectors for
+    each of its decision points, and the first task of y gives the folds.
     """
     estimator = SequentialClassifier(choices, info.decision_points_s, info.features)
     estimator.fit(X, y, stratified_folds(next(iter(y.values()))), [choices] * 10)
     tasks = {
-        task: Task(labels_of(y[task]), c.k, c.components, c.scaling, 0.5, features=c.features)
+        task: Task(
+            labels_of(y[task]), c.k, c.components, c.scaling, 0.5, features=c.features
+        )
         for task, c in choices.items()
     }
     calibration = {"stopping": estimator.stopping_, "novelty": estimator.novelty_}

@@ -1,6 +1,7 @@
 """CONTRIBUTING.md: its table is true, and a toy of each kind is added as it says.
 
-`tests/edge/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an effect.
+`tests/edge/chips/test_kinds.py` adds a chip, `tests/train/simulate/test_effects.py` an
+effect.
 """
 
 import json
@@ -21,21 +22,35 @@ from train.feature_sets import SETS
 from train.report.section import Section, Table
 from train.study import run as study
 
-TABLE = re.findall(r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M)
+TABLE = re.findall(
+    r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M
+)
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.split(" | ")[0])
 def test_each_file_and_name_of_the_table_exists(row):
     for path in re.findall(r"`([\w/]+\.py)`", row):
         assert (ROOT / path.replace("NAME", "__init__")).exists(), path
-    files = [ROOT / path for path in re.findall(r"`([\w/]+\.py)`", row) if "NAME" not in path]
+    files = [
+        ROOT / path for path in re.findall(r"`([\w/]+\.py)`", row) if "NAME" not in path
+    ]
     for name in re.findall(r"`([A-Z]{4,}|[A-Z_]{6,}|Section)`", row):
         assert any(name in file.read_text() for file in files), name
 
 
 def test_the_table_has_each_kind():
-    kinds = ("chip", "feature set", "lab's data", "message", "effect", "subcommand", "section")
-    assert [kind for kind, row in zip(kinds, TABLE, strict=True) if kind in row] == list(kinds)
+    kinds = (
+        "chip",
+        "feature set",
+        "lab's data",
+        "message",
+        "effect",
+        "subcommand",
+        "section",
+    )
+    assert [
+        kind for kind, row in zip(kinds, TABLE, strict=True) if kind in row
+    ] == list(kinds)
 
 
 def test_a_feature_set_is_an_entry_of_the_list(recordings, monkeypatch):
@@ -72,10 +87,17 @@ def test_an_importer_is_a_module(monkeypatch, tmp_path, capsys):
     (tmp_path / "a.txt").write_text("first 1 2 3 4\nsecond 5 6\n")
     words = ["import", "toy", str(tmp_path / "a.txt"), "--out", str(tmp_path / "out")]
     assert main([*words, "--times", "10"]) == 0
-    assert load(tmp_path / "out" / "first.npz").frames.ravel().tolist() == [10, 20, 30, 40]
+    assert load(tmp_path / "out" / "first.npz").frames.ravel().tolist() == [
+        10,
+        20,
+        30,
+        40,
+    ]
     with pytest.raises(SystemExit):
         main(["import", "--help"])
-    assert re.search(r"toy +Pictures of a toy, one trial a line", capsys.readouterr().out)
+    assert re.search(
+        r"toy +Pictures of a toy, one trial a line", capsys.readouterr().out
+    )
 
 
 COMMAND = '''"""Say a word.
@@ -105,7 +127,9 @@ def test_a_subcommand_is_a_module_and_its_name(monkeypatch, tmp_path, capsys):
 
 def test_a_section_is_a_function_in_the_list(recordings, monkeypatch, tmp_path):
     def section(context):
-        rows = [{"task": task, "classes": len(set(y))} for task, y in context.labels.items()]
+        rows = [
+            {"task": task, "classes": len(set(y))} for task, y in context.labels.items()
+        ]
         return Section("A toy", ["As it stands."], [Table("toy", "Classes", rows)])
 
     monkeypatch.setattr(study, "ANALYSES", (section,))

@@ -20,7 +20,8 @@ PAGES = sorted(DOCS.glob("*.md"))
 
 
 def commands():
-    """The tutorial's shell commands, without the first block, which makes the environment."""
+    """The tutorial's shell commands, without the first block, which makes the
+    environment."""
     blocks = re.findall(r"```sh\n(.*?)```", (DOCS / "tutorial.md").read_text(), re.S)
     return [line for lines in blocks[1:] for line in lines.splitlines()]
 
@@ -34,20 +35,32 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
             shutil.copy(ROOT / words[1], words[2])
             continue
         run = cli.main if words[0] == "edge-classify" else export
-        given = words[1:] if words[0] == "edge-classify" else [*words[3:], "--jobs", "1"]
+        given = (
+            words[1:] if words[0] == "edge-classify" else [*words[3:], "--jobs", "1"]
+        )
         assert run(given) == 0, (line, capsys.readouterr().err)
         ran.append(words[1])
     first = ["check", "fake", "calibrate", "record", "-m", "info"]
     assert ran == [*first, "fake", "verify", "run", "replay"]
-    events = [json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")]
-    assert {e["label"] for e in events if e.get("task") == "object"} >= {"pillow", "foam block"}
+    events = [
+        json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")
+    ]
+    assert {e["label"] for e in events if e.get("task") == "object"} >= {
+        "pillow",
+        "foam block",
+    }
 
 
 def test_the_notebook_runs(tmp_path):
-    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    nbclient, nbformat = (
+        pytest.importorskip("nbclient"),
+        pytest.importorskip("nbformat"),
+    )
     notebook = nbformat.read(DOCS / "first-touch.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
-    nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": ROOT}}).execute()
+    nbclient.NotebookClient(
+        notebook, timeout=120, resources={"metadata": {"path": ROOT}}
+    ).execute()
     (printed,) = (o.text for cell in notebook.cells for o in cell.get("outputs", ())
                   if o.output_type == "stream")  # fmt: skip
     assert "label='soft-fixed'" in printed

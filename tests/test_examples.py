@@ -1,4 +1,5 @@
-"""The programs in examples/ run unchanged; the ROS node runs over a stand-in for rclpy."""
+"""The programs in examples/ run unchanged; the ROS node runs over a stand-in for
+rclpy."""
 
 import json
 import os
@@ -32,7 +33,9 @@ def run(monkeypatch, capsys, program, *arguments):
 
 
 def test_a_recording_is_classified(monkeypatch, capsys):
-    onset, *decided = run(monkeypatch, capsys, "classify_recording.py", demo.MODEL, PILLOW)
+    onset, *decided = run(
+        monkeypatch, capsys, "classify_recording.py", demo.MODEL, PILLOW
+    )
     assert onset.startswith("Onset(onset_s=")
     assert [line.split(",")[:2] for line in decided] == [
         ["Decided(task='category'", " label='soft-movable'"],
@@ -46,7 +49,9 @@ def test_a_model_is_fitted_and_exported(monkeypatch, capsys, make_touch, tmp_pat
     run(monkeypatch, capsys, "fit_and_export.py", trials, tmp_path / "model.onnx")
     model = edge.Model(tmp_path / "model.onnx")
     events = edge.Classifier(model).classify(make_touch(kind="hard", seed=9))
-    decided = {event.task: event.label for event in events if isinstance(event, edge.Decided)}
+    decided = {
+        event.task: event.label for event in events if isinstance(event, edge.Decided)
+    }
     assert decided["category"] == "rigid-fixed"
 
 
@@ -82,7 +87,8 @@ def test_a_skin_is_watched(monkeypatch, capsys):
 
 
 class Ros:
-    """The part of rclpy and its messages that the node uses: one node, spun until it has ended."""
+    """The part of rclpy and its messages that the node uses: one node, spun until it
+    has ended."""
 
     def __init__(self, **parameters):
         self.topics, self.heard = defaultdict(list), {}
@@ -114,10 +120,15 @@ class Ros:
 
         names = ("String", "JointState", "Classification", "ObjectHypothesis")
         messages = types.SimpleNamespace(**dict.fromkeys(names, Message))
-        spin = types.SimpleNamespace(init=lambda: None, spin=self.spin, try_shutdown=lambda: None)
+        spin = types.SimpleNamespace(
+            init=lambda: None, spin=self.spin, try_shutdown=lambda: None
+        )
         self.modules = {"rclpy": spin, "rclpy.node": types.SimpleNamespace(Node=Node)}
         for package in ("sensor_msgs", "std_msgs", "vision_msgs"):
-            self.modules |= {package: types.ModuleType(package), f"{package}.msg": messages}
+            self.modules |= {
+                package: types.ModuleType(package),
+                f"{package}.msg": messages,
+            }
 
     def spin(self, node):
         node._reading.join(timeout=30)
@@ -176,7 +187,9 @@ def test_a_task_becomes_a_valid_topic(monkeypatch):
     ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
     ros.run(monkeypatch)
     topic = sys.modules["edge_classify_ros.node"].topic
-    topics = [topic(task) for task in ("object", "Object-36", "36 things", "Größe/x", "--")]
+    topics = [
+        topic(task) for task in ("object", "Object-36", "36 things", "Größe/x", "--")
+    ]
     assert topics == ["object", "object_36", "task_36_things", "gr_e_x", "task"]
 
 

@@ -1,4 +1,5 @@
-"""docs/examples/firmware/: our own driver reads the protocol that a microcontroller runs."""
+"""docs/examples/firmware/: our own driver reads the protocol that a microcontroller
+runs."""
 
 import os
 import pty
@@ -20,20 +21,33 @@ from tests.conftest import ROOT
 MATRIX = ROOT / "docs" / "examples" / "firmware" / "matrix"
 TAXELS = 100
 
-pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler")
+pytestmark = pytest.mark.skipif(
+    shutil.which("g++") is None, reason="there is no C++ compiler"
+)
 
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory):
-    """Builds the firmware's protocol for this machine, with the given bits per taxel."""
+    """Builds the firmware's protocol for this machine, with the given bits per
+    taxel."""
     folder = tmp_path_factory.mktemp("firmware")
 
     def build(bits):
         program = folder / f"host{bits}"
         if not program.exists():
-            command = ["g++", "-std=c++11", "-O1", "-Wall", "-Wextra", "-Werror", f"-DWIDTH={bits}"]
+            command = [
+                "g++",
+                "-std=c++11",
+                "-O1",
+                "-Wall",
+                "-Wextra",
+                "-Werror",
+                f"-DWIDTH={bits}",
+            ]
             source = str(ROOT / "tests" / "firmware_host.cpp")
-            subprocess.run([*command, f"-I{MATRIX}", "-o", str(program), source], check=True)
+            subprocess.run(
+                [*command, f"-I{MATRIX}", "-o", str(program), source], check=True
+            )
         return program
 
     return build
@@ -62,7 +76,9 @@ class Registers:
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_the_driver_reads_its_registers_over_i2c(host, bits):
-    dump = subprocess.run([host(bits), "dump"], capture_output=True, text=True, check=True)
+    dump = subprocess.run(
+        [host(bits), "dump"], capture_output=True, text=True, check=True
+    )
     lines = [bytes.fromhex(line) for line in dump.stdout.split("\n")[:-1]]
     for n in range(3):
         identity, frame, unknown = lines[3 * n : 3 * n + 3]
@@ -73,7 +89,9 @@ def test_the_driver_reads_its_registers_over_i2c(host, bits):
         assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
         taxels, intact = parse(chip.frame.buffer[None], TAXELS, bits)
         assert intact.all()
-        assert taxels[0].tolist() == ([0] * TAXELS if n == 0 else values(bits, n - 1).tolist())
+        assert taxels[0].tolist() == (
+            [0] * TAXELS if n == 0 else values(bits, n - 1).tolist()
+        )
         assert unknown == b""
 
 
@@ -94,7 +112,13 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     """Bytes between two requests end with the next zero."""
     bus = SerialBus(plugged[0], timeout_s=5.0)
     chip = Block(bus, 0, taxels=TAXELS, bits=12)
-    for noise in (b"\x05", b"\0\0", b"\xff" * 300, b"\x04\x10\x01\x01\0", b"\x03\x10\0"):
+    for noise in (
+        b"\x05",
+        b"\0\0",
+        b"\xff" * 300,
+        b"\x04\x10\x01\x01\0",
+        b"\x03\x10\0",
+    ):
         bus._port.write(noise + b"\0")
         bus.transfer(chip.frame)
         assert parse(chip.frame.buffer[None], TAXELS, 12)[1].all()
@@ -111,7 +135,9 @@ def test_another_shape_than_the_skin_file_says_is_named(plugged):
 def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
     text = skinfile.shipped("matrix").read_text()
     path = tmp_path / "skin.toml"
-    slow = text.replace("/dev/ttyACM0", plugged[0]).replace("timeout_s = 0.02", "timeout_s = 5.0")
+    slow = text.replace("/dev/ttyACM0", plugged[0]).replace(
+        "timeout_s = 0.02", "timeout_s = 5.0"
+    )
     path.write_text(slow)
     with Skin.open(path, calibrated=False) as skin:
         frames = [skin.read() for _ in range(3)]

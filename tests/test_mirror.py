@@ -1,4 +1,5 @@
-"""Tests mirror the modules: each has a test file of its name, is imported by one, or is listed."""
+"""Tests mirror the modules: each has a test file of its name, is imported by one, or is
+listed."""
 
 import re
 from pathlib import Path
@@ -28,7 +29,8 @@ TESTS = {
 
 
 def specified(module):
-    """Whether a test file has its name, specifies it with others, imports it or runs it."""
+    """Whether a test file has its name, specifies it with others, imports it or runs
+    it."""
     if (module.parent / f"test_{module.name}").as_posix() in TESTS:
         return True
     if {THROUGH.get(part.as_posix()) for part in (module, module.parent)} & set(TESTS):

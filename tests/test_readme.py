@@ -1,4 +1,5 @@
-"""README.md and docs/: README's commands run as written, others are known; tables are true."""
+"""README.md and docs/: README's commands run as written, others are known; tables are
+true."""
 
 import errno
 import re
@@ -23,7 +24,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
 FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
 FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
-CODE = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", FENCE.sub("", TEXT))]
+CODE = [
+    " ".join(code.split()) for code in re.findall(r"`([^`]+)`", FENCE.sub("", TEXT))
+]
 BLOCKS = "\n".join(FENCE.findall(TEXT)).replace("\\\n", "")
 COMMAND = re.compile(r"(?m)(?:^|[ /])(edge-classify|-m train|-m export) ([^\n|>#&;]*)")
 COMMANDS = sorted(set(COMMAND.findall("\n".join([*CODE, BLOCKS]))))
@@ -44,7 +47,9 @@ def bench(exported, recordings, tmp_path_factory):
     touch = load(recordings / "hard_0.npz")
     text = skinfile.shipped().read_text()
     text = re.sub(r"(?m)^threshold_counts = \d+", "threshold_counts = 50", text)
-    text = re.sub(r"(?m)^onset_counts = \d+", f"onset_counts = {touch.layout.onset}", text)
+    text = re.sub(
+        r"(?m)^onset_counts = \d+", f"onset_counts = {touch.layout.onset}", text
+    )
     (folder / "skin.toml").write_text(text)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(exported / name, folder)
@@ -54,22 +59,37 @@ def bench(exported, recordings, tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", BOARD)
-def test_a_command_of_the_board_does_as_it_is_written(command, bench, monkeypatch, capsys):
+def test_a_command_of_the_board_does_as_it_is_written(
+    command, bench, monkeypatch, capsys
+):
     """In the order of the page; commands that read the skin use fake chips."""
     monkeypatch.chdir(bench)
-    written = command.replace("REC…", "REC.npz").replace("--model M ", "--model model.onnx ")
+    written = command.replace("REC…", "REC.npz").replace(
+        "--model M ", "--model model.onnx "
+    )
     words = shlex.split(written)[1:]
     if words == ["view"]:
         words += ["--skin", "skin.toml"]
     if words[0] in FAKED:
-        words += ["--fake", "still.npz" if words[0] in ("scan", "calibrate") else "REC.npz"]
-    words += {"calibrate": ["--frames", "20"], "view": ["--seconds", "0.3"]}.get(words[0], [])
+        words += [
+            "--fake",
+            "still.npz" if words[0] in ("scan", "calibrate") else "REC.npz",
+        ]
+    words += {"calibrate": ["--frames", "20"], "view": ["--seconds", "0.3"]}.get(
+        words[0], []
+    )
     assert cli.main(words) == 0, capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("program", "arguments"), COMMANDS)
-def test_a_command_of_any_page_has_arguments_that_its_program_knows(program, arguments, capsys):
-    makers = {"edge-classify": cli.parser, "-m train": train_parser, "-m export": export_parser}
+def test_a_command_of_any_page_has_arguments_that_its_program_knows(
+    program, arguments, capsys
+):
+    makers = {
+        "edge-classify": cli.parser,
+        "-m train": train_parser,
+        "-m export": export_parser,
+    }
     try:
         words = re.sub(r"[][]", "", arguments).replace("FORMAT", "csv")
         makers[program]().parse_args(shlex.split(words))
@@ -79,7 +99,9 @@ def test_a_command_of_any_page_has_arguments_that_its_program_knows(program, arg
 
 
 @pytest.mark.parametrize("command", WORKSTATION)
-def test_a_command_of_the_workstation_does_as_it_is_written(command, bench, monkeypatch):
+def test_a_command_of_the_workstation_does_as_it_is_written(
+    command, bench, monkeypatch
+):
     if "sdh2" in command and not GRASPS.exists():
         pytest.skip("the recordings are not beside the checkout")
     monkeypatch.chdir(bench)
@@ -90,21 +112,29 @@ def test_a_command_of_the_workstation_does_as_it_is_written(command, bench, monk
             (bench / "FOLDER" / file.parent.name).mkdir(parents=True, exist_ok=True)
             shutil.copy(file, bench / "FOLDER" / file.parent.name)
     names = {"DIR": "made", "SCENE": str(scene)}
-    words = [names.get(word.strip("[]"), word.strip("[]")) for word in command.split()[3:]]
+    words = [
+        names.get(word.strip("[]"), word.strip("[]")) for word in command.split()[3:]
+    ]
     assert train([*words, *(["--trials", "1"] if words[0] == "simulate" else [])]) == 0
 
 
 @pytest.mark.parametrize("command", MAKE)
 def test_a_make_command_says_what_it_would_do(command):
-    words = [w for w in shlex.split(command.replace("[", "").replace("]", "")) if w != "…"]
-    made = subprocess.run([*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True)
+    words = [
+        w for w in shlex.split(command.replace("[", "").replace("]", "")) if w != "…"
+    ]
+    made = subprocess.run(
+        [*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True
+    )
     assert made.returncode == 0, made.stderr
     assert "python" in made.stdout
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_make_target_exists(target):
-    rules = re.findall(r"^([\w./-]+(?: [\w./-]+)*):", (ROOT / "Makefile").read_text(), re.M)
+    rules = re.findall(
+        r"^([\w./-]+(?: [\w./-]+)*):", (ROOT / "Makefile").read_text(), re.M
+    )
     assert target in " ".join(rules).split()
 
 
@@ -121,6 +151,10 @@ def test_the_table_of_errnos_has_all_that_the_driver_answers():
 
 
 def test_each_command_of_python_is_there():
-    assert {command.split()[3] for command in WORKSTATION} == {"import", "simulate", "show"}
+    assert {command.split()[3] for command in WORKSTATION} == {
+        "import",
+        "simulate",
+        "show",
+    }
     options = export_parser().format_help()
     assert all(option in options for option in ("--scaling", "--k", "--front", "--arm"))

@@ -1,4 +1,5 @@
-"""requirements-board.txt pins the board's packages as constraints.txt does, with their hashes."""
+"""requirements-board.txt pins the board's packages as constraints.txt does, with their
+hashes."""
 
 import re
 
@@ -11,5 +12,7 @@ def test_the_versions_are_those_of_the_constraints():
     board = dict(re.findall(pin, text, re.M))
     assert {"numpy", "onnxruntime", "smbus2"} <= set(board)
     assert text.count("==") == len(board)
-    pins = dict(re.findall(r"^([\w.-]+)==(\S+)", (ROOT / "constraints.txt").read_text(), re.M))
+    pins = dict(
+        re.findall(r"^([\w.-]+)==(\S+)", (ROOT / "constraints.txt").read_text(), re.M)
+    )
     assert {name: pins.get(name) for name in board} == board

@@ -11,7 +11,8 @@ Labels = Mapping[str, NDArray[np.str_]]
 
 
 def products(y: Labels) -> dict[str, tuple[str, str]]:
-    """{task: two other tasks whose labels together determine its own, and follow from it}.
+    """{task: two other tasks whose labels together determine its own, and follow from
+    it}.
 
     Neither of the two determines the task alone.
     """
@@ -20,7 +21,9 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
         factors = [
             other
             for other in y
-            if other != task and _determines(labels, y[other]) and not _determines(y[other], labels)
+            if other != task
+            and _determines(labels, y[other])
+            and not _determines(y[other], labels)
         ]
         for a, b in combinations(factors, 2):
             joined = np.char.add(np.char.add(y[a], "\0"), y[b])
@@ -36,7 +39,8 @@ def _determines(a: NDArray[np.str_], b: NDArray[np.str_]) -> bool:
 
 
 def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
-    """{product: its `edge.model.agreement.Factors`}, where every pair of labels was met.
+    """{product: its `edge.model.agreement.Factors`}, where every pair of labels was
+    met.
 
     No task belongs to two products.
     """
@@ -46,7 +50,9 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
         met = set(zip(*(y[t].tolist() for t in (task, *factors)), strict=True))
         pairs = sorted(labels for labels in met if all(labels))
         names = {factor: sorted(set(y[factor].tolist()) - {""}) for factor in factors}
-        if taken & {task, *factors} or len(pairs) != np.prod(list(map(len, names.values()))):
+        if taken & {task, *factors} or len(pairs) != np.prod(
+            list(map(len, names.values()))
+        ):
             continue
         taken |= {task, *factors}
         indices = zip(factors, list(zip(*pairs, strict=True))[1:], strict=True)

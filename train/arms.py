@@ -8,8 +8,11 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 
 
-def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Chain | None:
-    """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has five angles.
+def arm_of(
+    recording: Recording, where: str, unnamed: Chain | None = None
+) -> Chain | None:
+    """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has
+    five angles.
 
     None without joint angles, and where `meta.arm` is None.
     """
@@ -25,7 +28,9 @@ def arm_of(recording: Recording, where: str, unnamed: Chain | None = None) -> Ch
     else:
         chain = Chain.cody()
         if dof != chain.dof or recording.joint_names not in (None, chain.names):
-            raise InputError(f"{where}: has {dof} joint angles and names no arm; give --arm")
+            raise InputError(
+                f"{where}: has {dof} joint angles and names no arm; give --arm"
+            )
     if recording.joint_names is not None:
         recording.for_joints(chain.names, where)
     elif dof != chain.dof:
@@ -38,7 +43,11 @@ def joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:
     counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in kept]
     for count, (_, path) in zip(counts, kept, strict=True):
         if count == 0:
-            raise InputError(f"{path}: has no joint angles; leave out the features made of them")
+            raise InputError(
+                f"{path}: has no joint angles; leave out the features made of them"
+            )
         if count != counts[0]:
-            raise InputError(f"{path}: has {count} joint angles, {kept[0][1]} has {counts[0]}")
+            raise InputError(
+                f"{path}: has {count} joint angles, {kept[0][1]} has {counts[0]}"
+            )
     return counts[0]

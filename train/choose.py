@@ -38,11 +38,13 @@ KIND = "kind"
 TRIAL = "trial"
 QUICK_FOLDS = 5
 GROUP_FOLDS, FEW, MANY = 20, 300, 2000
-"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds, and five
-with more than `MANY`: four fifths of so many trials teach nearly as much as all."""
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
+and five with more than `MANY`: four fifths of so many trials teach nearly as much as
+all."""
 UNSEEN_SHRINKAGE = 0.1
-"""Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on differences
-that are small beside the features' spread, which do not carry over to new objects."""
+"""Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
+differences that are small beside the features' spread, which do not carry over to new
+objects."""
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 WINDOW_MARGIN = 0.02
@@ -50,10 +52,11 @@ WINDOW_MARGIN = 0.02
 
 
 def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
-    """(n,) kind of thing in each, where all are simulated and some kind has several objects.
+    """(n,) kind of thing in each, where all are simulated and some kind has several
+    objects.
 
-    A `[[family]]` of a scene names its objects by the kind and a number. None for all other
-    recordings.
+    A `[[family]]` of a scene names its objects by the kind and a number. None for all
+    other recordings.
     """
     if any("simulation" not in recording.meta for recording in recordings):
         return None
@@ -81,16 +84,18 @@ class Chosen:
 
     Attributes:
         choice: the features, scaling, projection and numbers.
-        accuracy: nested accuracy of the entire choice, with entire groups left out where
-            `left_out` is not `trial`. Tasks that agree are decided together, as the model does. Its
-            interval is that of the exported model on other trials.
+        accuracy: nested accuracy of the entire choice, with entire groups left out
+            where `left_out` is not `trial`. Tasks that agree are decided together, as
+            the model does. Its interval is that of the exported model on other trials.
         by_trial: the same with single trials left out.
         left_out: `trial`, or the label whose groups were left out.
-        candidates: nested accuracy of each candidate's own choice of numbers, by the task alone.
+        candidates: nested accuracy of each candidate's own choice of numbers, by the
+            task alone.
         picks: the best settings of each candidate.
         folds: (n,) of `accuracy`.
-        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions `accuracy`
-            counts: those of the task and of the tasks that are decided together with it.
+        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
+            `accuracy` counts: those of the task and of the tasks that are decided
+            together with it.
     """
 
     choice: Choice
@@ -99,7 +104,9 @@ class Chosen:
     left_out: str
     candidates: tuple[Promise, ...] = ()
     picks: tuple[Choice, ...] = ()
-    folds: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
+    folds: NDArray[np.int64] = field(
+        default_factory=lambda: np.zeros(0, np.int64), repr=False
+    )
     by_fold: tuple[dict[str, Choice], ...] = ()
 
 
@@ -111,10 +118,10 @@ class Choosing:
         y: {task: (n,) labels}.
         tried: the candidates.
         samples: values of a feature.
-        leave_out: label whose groups are left out for a task, where each of its classes has
-            several of them; `TRIAL` for none. In place of an object its entire kind is left out
-            where `kinds_of` names the kinds: accuracy on other objects of the same kinds says
-            nothing of how a simulator's model does elsewhere.
+        leave_out: label whose groups are left out for a task, where each of its classes
+            has several of them; `TRIAL` for none. In place of an object its entire kind
+            is left out where `kinds_of` names the kinds: accuracy on other objects of
+            the same kinds says nothing of how a simulator's model does elsewhere.
         quick: fewer folds.
         jobs: processes.
         progress: show progress bars on stderr.
@@ -136,7 +143,11 @@ class Choosing:
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         finest = max(y, key=lambda task: len(set(y[task].tolist())))
         self._folds = stratified_folds(y[finest], fold_count(len(y[finest]), quick))
-        kinds = kinds_of([t.recording for t in dataset.trials]) if leave_out == LEAVE_OUT else None
+        kinds = (
+            kinds_of([t.recording for t in dataset.trials])
+            if leave_out == LEAVE_OUT
+            else None
+        )
         self._grouped: set[str] = set()
         for name, groups in ((KIND, kinds), (leave_out, dataset.groups(leave_out))):
             if groups is None or name == TRIAL or self._grouped:
@@ -154,7 +165,8 @@ class Choosing:
     def _tables(
         self, X: NDArray[np.float64], nested: bool, what: str
     ) -> tuple[AnswerTable, AnswerTable]:
-        """The candidates' answers to left-out trials, and to left-out groups where there are any.
+        """The candidates' answers to left-out trials, and to left-out groups where
+        there are any.
 
         Without groups, both are the answers to left-out trials.
         """
@@ -177,20 +189,29 @@ class Choosing:
             progress.close()
             return trials, trials
         unseen = [
-            replace(g, shrinkages=tuple(s for s in g.shrinkages if s >= UNSEEN_SHRINKAGE))
+            replace(
+                g, shrinkages=tuple(s for s in g.shrinkages if s >= UNSEEN_SHRINKAGE)
+            )
             for g in grids
-            if self._leave_out not in g.targets  # discriminants of the groups that are left out
+            if self._leave_out
+            not in g.targets  # discriminants of the groups that are left out
         ]
         y = self._y
         if not any(grid.targets for grid in grids):
-            needed = self._grouped.union(*(f for f in families(y) if self._grouped & {*f}))
+            needed = self._grouped.union(
+                *(f for f in families(y) if self._grouped & {*f})
+            )
             y = {task: y[task] for task in y if task in needed}
         with progress:
-            return trials, answers(y, self._group_folds, unseen, progress=progress.update)
+            return trials, answers(
+                y, self._group_folds, unseen, progress=progress.update
+            )
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: answers of the candidate that is best in plain cross-validation}."""
-        trials, groups = self._tables(self._features(window_s), False, f"{window_s:g} s")
+        trials, groups = self._tables(
+            self._features(window_s), False, f"{window_s:g} s"
+        )
         right: dict[str, NDArray[np.bool_]] = {}
         for task in self._y:
             table = groups if task in self._grouped else trials
@@ -199,15 +220,20 @@ class Choosing:
         return right
 
     def accuracy(self, window_s: float) -> float:
-        """Mean accuracy of the tasks in plain cross-validation; missed touches count as wrong."""
+        """Mean accuracy of the tasks in plain cross-validation; missed touches count as
+        wrong."""
         results = [
-            promised(Result(int(right.sum()), len(right)), self._dataset.untouched_labels(task))
+            promised(
+                Result(int(right.sum()), len(right)),
+                self._dataset.untouched_labels(task),
+            )
             for task, right in self._right(window_s).items()
         ]
         return sum(result.accuracy for result in results) / len(results)
 
     def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
-        """The shortest of some windows at which every task is about as accurate as at its best.
+        """The shortest of some windows at which every task is about as accurate as at
+        its best.
 
         A task may lose a standard error, or `WINDOW_MARGIN`.
 
@@ -219,11 +245,16 @@ class Choosing:
         by_window = [self._right(window_s) for window_s in windows]
         right = {task: [answers[task] for answers in by_window] for task in self._y}
         order = np.arange(len(windows))
-        needed = [choose(np.array(each), order, margin=WINDOW_MARGIN) for each in right.values()]
+        needed = [
+            choose(np.array(each), order, margin=WINDOW_MARGIN)
+            for each in right.values()
+        ]
         best = windows[max(needed)]
         shares = "; ".join(
             f"{task} "
-            + ", ".join(f"{a.mean():.0%} at {w:g} s" for a, w in zip(each, windows, strict=True))
+            + ", ".join(
+                f"{a.mean():.0%} at {w:g} s" for a, w in zip(each, windows, strict=True)
+            )
             for task, each in right.items()
         )
         return best, [
@@ -242,13 +273,20 @@ class Choosing:
         """
         X = self._features(window_s)
         trials, groups = self._tables(X, True, "choosing")
-        without: list[dict[str, Choice]] = [{} for _ in range(int(trials.folds.max()) + 1)]
-        without_groups: list[dict[str, Choice]] = [{} for _ in range(int(groups.folds.max()) + 1)]
+        without: list[dict[str, Choice]] = [
+            {} for _ in range(int(trials.folds.max()) + 1)
+        ]
+        without_groups: list[dict[str, Choice]] = [
+            {} for _ in range(int(groups.folds.max()) + 1)
+        ]
         chosen: dict[str, Chosen] = {}
         for task in self._y:
             grouped = task in self._grouped
             table, margin = (groups, UNSEEN_MARGIN) if grouped else (trials, 0.0)
-            choices, prices = table.choices[task], costs(table.choices[task], self._widths)
+            choices, prices = (
+                table.choices[task],
+                costs(table.choices[task], self._widths),
+            )
             own = [places_of(candidate, choices) for candidate in self.tried]
             chosen_without = without_folds(task, trials, table, prices, margin)
             for by_task, choice in zip(without, chosen_without, strict=True):
@@ -256,12 +294,16 @@ class Choosing:
             picked = [trials.choices[task].index(choice) for choice in chosen_without]
             if task in groups.right:
                 unseen = groups.choices[task]
-                places = groups.by_fold(task, costs(unseen, self._widths), margin=margin)
+                places = groups.by_fold(
+                    task, costs(unseen, self._widths), margin=margin
+                )
                 for by_task, place in zip(without_groups, places, strict=True):
                     by_task[task] = unseen[place]
             nested = table.by_fold(task, prices, margin=margin)
             untouched = self._dataset.untouched_labels(task)
-            count = len(set(self._groups[self._y[task] != ""].tolist())) if grouped else 0
+            count = (
+                len(set(self._groups[self._y[task] != ""].tolist())) if grouped else 0
+            )
             by_candidate = (table.nested(task, prices, places) for places in own)
             chosen[task] = Chosen(
                 choices[table.chosen(task, prices, margin=margin)],
@@ -272,9 +314,14 @@ class Choosing:
                 tuple(choices[table.chosen(task, prices, places)] for places in own),
                 table.folds,
             )
-        plans = {self._leave_out: (groups.folds, without_groups), TRIAL: (trials.folds, without)}
+        plans = {
+            self._leave_out: (groups.folds, without_groups),
+            TRIAL: (trials.folds, without),
+        }
         form = self._dataset.names, tuple(self._widths.values())
-        return decided_together(chosen, X, self._y, plans, *form, jobs=self._jobs), *plans[TRIAL]
+        return decided_together(
+            chosen, X, self._y, plans, *form, jobs=self._jobs
+        ), *plans[TRIAL]
 
 
 def decided_together(
@@ -287,14 +334,16 @@ def decided_together(
     own: NDArray[np.bool_] | None = None,
     jobs: int = 1,
 ) -> dict[str, Chosen]:
-    """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a model.
+    """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a
+    model.
 
     A model decides tasks that agree together (`edge.model.agreement`).
 
     Args:
         chosen: {task: its settings}, with the accuracies of the task by itself.
         X, y, features, widths: of the trials.
-        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its trials}}.
+        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its
+            trials}}.
         own: (n,) whether a trial is the owner's, see `ContactClassifier.fit`.
         jobs: processes.
     """
@@ -334,12 +383,17 @@ def decided_together(
 
 
 def without_folds(
-    task: str, trials: AnswerTable, table: AnswerTable, prices: NDArray[np.int64], margin: float
+    task: str,
+    trials: AnswerTable,
+    table: AnswerTable,
+    prices: NDArray[np.int64],
+    margin: float,
 ) -> list[Choice]:
-    """[fold] the settings chosen without a fold's trials, by the rule that chooses them with all.
+    """[fold] the settings chosen without a fold's trials, by the rule that chooses them
+    with all.
 
-    By answers to left-out groups, where the settings are chosen so; the fits behind these answers
-    may have seen the fold's trials, of other groups.
+    By answers to left-out groups, where the settings are chosen so; the fits behind
+    these answers may have seen the fold's trials, of other groups.
 
     Args:
         task: the task.
@@ -362,11 +416,14 @@ def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> 
 
     Args:
         result: on the trials with a contact.
-        untouched: labels of the recordings without one. Missed touches count as wrong, and
-            recordings of no touch as right.
+        untouched: labels of the recordings without one. Missed touches count as wrong,
+            and recordings of no touch as right.
         groups: number of the groups left out; 0 for single trials.
     """
-    right, total = result.right + untouched.count(NO_CONTACT), result.total + len(untouched)
+    right, total = (
+        result.right + untouched.count(NO_CONTACT),
+        result.total + len(untouched),
+    )
     variance = max(VARIANCE, total / groups if groups else 0.0)
     counted = {"right": right, "total": total, "variance": variance}
     return Promise(**{**vars(result), **counted})

@@ -1,4 +1,5 @@
-"""A Dask cluster as joblib's backend, so that the same work runs there as on local cores."""
+"""A Dask cluster as joblib's backend, so that the same work runs there as on local
+cores."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -10,7 +11,8 @@ from edge.errors import InputError
 
 @contextmanager
 def on_cluster(address: str | None) -> Iterator[None]:
-    """Within the block, `joblib.Parallel` runs on the cluster whose scheduler is at `address`.
+    """Within the block, `joblib.Parallel` runs on the cluster whose scheduler is at
+    `address`.
 
     Args:
         address: like `tcp://127.0.0.1:8786`.
@@ -27,6 +29,8 @@ def on_cluster(address: str | None) -> Iterator[None]:
     try:
         client = distributed.Client(address, timeout="10s")
     except (OSError, ValueError) as error:
-        raise InputError(f"--address {address}: no Dask scheduler answers there: {error}") from None
+        raise InputError(
+            f"--address {address}: no Dask scheduler answers there: {error}"
+        ) from None
     with closing(client), joblib.parallel_config("dask"):
         yield

@@ -1,8 +1,10 @@
-"""Exact leave-one-out accuracies for all numbers of components and of neighbours at once.
+"""Exact leave-one-out accuracies for all numbers of components and of neighbours at
+once.
 
-For each trial left out, scaling and components are fitted on the others. One decomposition serves
-all numbers of components, as squared distances are accumulated over components. One sort for each
-number of components serves all k, as votes are accumulated over k.
+For each trial left out, scaling and components are fitted on the others. One
+decomposition serves all numbers of components, as squared distances are accumulated
+over components. One sort for each number of components serves all k, as votes are
+accumulated over k.
 """
 
 from collections.abc import Sequence
@@ -31,11 +33,12 @@ def votes_right(
         truth: broadcasts against neighbours[..., 0].
 
     Returns:
-        (..., k), entry j for k = j + 1. A tie goes to the nearest neighbour among the tied.
+        (..., k), entry j for k = j + 1. A tie goes to the nearest neighbour among the
+        tied.
     """
     classes = labels[neighbours]
-    # votes[..., i, j]: how many of the first j + 1 neighbours are of neighbour i's class; 0 where
-    # neighbour i is not one of them.
+    # votes[..., i, j]: how many of the first j + 1 neighbours are of neighbour i's
+    # class; 0 where neighbour i is not one of them.
     same = classes[..., :, None] == classes[..., None, :]
     votes = np.triu(np.cumsum(same, axis=-1, dtype=np.int32))
     answers = np.take_along_axis(classes, votes.argmax(axis=-2), axis=-1)
@@ -53,10 +56,11 @@ def neighbours(
 ) -> NDArray[np.int64]:
     """Each trial's neighbours among the others: (n, components, k) rows, nearest first.
 
-    Coordinates and distances are those of a `Projection` and of the exported graph, to the bit
-    where eigenvalues are as far apart as `Spectrum.leading` says. Equal trials are equally far from
-    any other, and at distance 0 from each other; equal distances are in the order of the rows.
-    Components beyond the numerical rank add nothing, so the neighbours repeat.
+    Coordinates and distances are those of a `Projection` and of the exported graph, to
+    the bit where eigenvalues are as far apart as `Spectrum.leading` says. Equal trials
+    are equally far from any other, and at distance 0 from each other; equal distances
+    are in the order of the rows. Components beyond the numerical rank add nothing, so
+    the neighbours repeat.
 
     Args:
         X: (n, features * samples).
@@ -83,7 +87,8 @@ def neighbours(
             differences = grid.project(known, weights) - grid.project(
                 (query - mean) * gain, weights
             )
-            # Sums of squares by the first 1, 2, ... components: exact, as all are whole numbers.
+            # Sums of squares by the first 1, 2, ... components: exact, as all are whole
+            # numbers.
             squares = np.cumsum(differences.T**2, axis=0)
             order = np.argsort(squares, axis=1, kind="stable")[:, : rows.shape[2]]
             rows[i, :used] = others[order]

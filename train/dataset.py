@@ -20,7 +20,14 @@ from edge.recording import LARGEST_BYTES, Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, kernel_channels, widths
+from edge.touch.features import (
+    FEATURES,
+    SAMPLES,
+    WINDOW_S,
+    feature_vector,
+    kernel_channels,
+    widths,
+)
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable
 from edge.touch.layout import SkinLayout, for_device
@@ -49,7 +56,10 @@ class Recordings:
     @property
     def own(self) -> tuple[Recording, ...]:
         """Those that are not simulated; all where all are."""
-        return tuple(r for r in self.recordings if "simulation" not in r.meta) or self.recordings
+        return (
+            tuple(r for r in self.recordings if "simulation" not in r.meta)
+            or self.recordings
+        )
 
     @property
     def mixed(self) -> bool:
@@ -59,12 +69,15 @@ class Recordings:
     @property
     def joints(self) -> bool:
         """Whether most of the owner's have joint angles."""
-        return 2 * sum(recording.joints is not None for recording in self.own) > len(self.own)
+        return 2 * sum(recording.joints is not None for recording in self.own) > len(
+            self.own
+        )
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One contact of a recording: its first, or each of them where the recording says so."""
+    """One contact of a recording: its first, or each of them where the recording says
+    so."""
 
     path: Path
     recording: Recording
@@ -80,17 +93,19 @@ class DataSet:
     Attributes:
         trials: in the order of the files' names.
         layout: the skin, with the thresholds used for all trials.
-        chain: the arm, where the trials have joint angles and a feature needs them; motion is then
-            in the world's frame.
+        chain: the arm, where the trials have joint angles and a feature needs them;
+            motion is then in the world's frame.
         untouched: recordings in which no contact was found, with their labels.
         digest: SHA-256 over the recordings' bytes.
         names: the features that were measured, by default the paper's three.
         joints: number of joint angles, where a feature is made of them; else 0.
         tasks: keys of the labels, sorted.
-        left_out: {missing label or joint angles: recordings left out for lack of it}. Where each
-            task is fitted on the trials that have it, those that lack it are left out of it alone.
+        left_out: {missing label or joint angles: recordings left out for lack of it}.
+            Where each task is fitted on the trials that have it, those that lack it are
+            left out of it alone.
         unused: recordings with more contacts than were used.
-        kernels: {feature: its table} of the features that are made of kernels, see `with_kernels`.
+        kernels: {feature: its table} of the features that are made of kernels, see
+            `with_kernels`.
     """
 
     trials: tuple[Trial, ...]
@@ -107,13 +122,18 @@ class DataSet:
 
     @property
     def own(self) -> NDArray[np.bool_] | None:
-        """(n,) whether a trial is the owner's; None where all, or none, are simulated."""
-        own = np.array(["simulation" not in trial.recording.meta for trial in self.trials])
+        """(n,) whether a trial is the owner's; None where all, or none, are
+        simulated."""
+        own = np.array(
+            ["simulation" not in trial.recording.meta for trial in self.trials]
+        )
         return own if own.any() and not own.all() else None
 
     def part(self, trials: NDArray[np.bool_]) -> DataSet:
         """Some of the trials (n,)."""
-        kept = (trial for trial, taken in zip(self.trials, trials, strict=True) if taken)
+        kept = (
+            trial for trial, taken in zip(self.trials, trials, strict=True) if taken
+        )
         return replace(self, trials=tuple(kept))
 
     def untouched_labels(self, task: str) -> list[str]:
@@ -121,11 +141,15 @@ class DataSet:
         return [labels[task] for _, labels in self.untouched if task in labels]
 
     def groups(self, key: str) -> NDArray[np.str_] | None:
-        """(n,) each trial's value of a key in its labels or metadata; None where most lack it.
+        """(n,) each trial's value of a key in its labels or metadata; None where most
+        lack it.
 
         Those that lack it are one group, as nobody knows which of them belong together.
         """
-        values = [trial.labels.get(key, trial.recording.meta.get(key)) for trial in self.trials]
+        values = [
+            trial.labels.get(key, trial.recording.meta.get(key))
+            for trial in self.trials
+        ]
         if 2 * values.count(None) > len(values):
             return None
         return np.array(["" if value is None else str(value) for value in values])
@@ -144,7 +168,8 @@ class DataSet:
         samples: int = SAMPLES,
         names: Sequence[str] | None = None,
     ) -> NDArray[np.float64]:
-        """(n, features * samples) feature vectors (see `edge.touch.features.feature_vector`).
+        """(n, features * samples) feature vectors (see
+        `edge.touch.features.feature_vector`).
 
         Args:
             window_s: seconds from onset.
@@ -153,14 +178,18 @@ class DataSet:
         """
         names = self.names if names is None else tuple(names)
         return np.stack(
-            [feature_vector(t.series, window_s, samples, names, self.kernels) for t in self.trials]
+            [
+                feature_vector(t.series, window_s, samples, names, self.kernels)
+                for t in self.trials
+            ]
         )
 
     def with_kernels(self, window_s: float) -> DataSet:
         """The same trials with the tables that features of kernels need, for a window.
 
-        A model has one table, of its full window, for all its decision points: at half of the
-        window, tables of that window's own change the accuracy by less than its interval.
+        A model has one table, of its full window, for all its decision points: at half
+        of the window, tables of that window's own change the accuracy by less than its
+        interval.
         """
         every = -(-len(self.trials) // MOST_TOUCHES)
         felt = [trial.series.felt(window_s) for trial in self.trials[::every]]
@@ -176,7 +205,8 @@ class DataSet:
         return replace(self, kernels=tables)
 
     def of(self, names: Sequence[str]) -> DataSet:
-        """The same trials with some of the features measured, in the order of `self.names`."""
+        """The same trials with some of the features measured, in the order of
+        `self.names`."""
         taken = tuple(name for name in self.names if name in names)
         types = measures.features(taken)
         return replace(
@@ -184,7 +214,9 @@ class DataSet:
             names=taken,
             chain=self.chain if any(map(moves, types)) else None,
             joints=self.joints if any(feature.of_joints for feature in types) else 0,
-            kernels={name: table for name, table in self.kernels.items() if name in taken},
+            kernels={
+                name: table for name, table in self.kernels.items() if name in taken
+            },
         )
 
     @property
@@ -236,18 +268,20 @@ def load_trials(
 ) -> DataSet:
     """Follow the contacts of recordings.
 
-    A recording's first contact is a trial, with the recording's labels. Where `meta.contacts` is
-    "alike", each of its contacts is a trial with these labels. Where it is a list of labels, they
-    belong to the contacts in their order. Labels that follow from others are added
-    (`train.labels.completed`). Recordings that lack a label, or joint angles that a feature needs,
-    are left out and named in `left_out`, if most recordings have it.
+    A recording's first contact is a trial, with the recording's labels. Where
+    `meta.contacts` is "alike", each of its contacts is a trial with these labels. Where
+    it is a list of labels, they belong to the contacts in their order. Labels that
+    follow from others are added (`train.labels.completed`). Recordings that lack a
+    label, or joint angles that a feature needs, are left out and named in `left_out`,
+    if most recordings have it.
 
     Args:
         data: recordings, or `.npz` files and folders of them.
-        threshold: counts above which a taxel is in contact; those of the first recording that is
-            not simulated where None.
-            All share it, as the board does not know which object it touches.
-        onset: counts above which a contact begins; scaled with the threshold where None.
+        threshold: counts above which a taxel is in contact; those of the first
+            recording that is not simulated where None. All share it, as the board does
+            not know which object it touches.
+        onset: counts above which a contact begins; scaled with the threshold where
+            None.
         horizon_s: seconds from onset that are kept of each contact.
         features: names of the features measured (see `edge.touch.measures`).
         arm: for recordings with joint angles that name no arm.
@@ -256,7 +290,8 @@ def load_trials(
         jobs: processes.
 
     Raises:
-        InputError: a file cannot be used, the skins differ, or nothing is labelled or touched.
+        InputError: a file cannot be used, the skins differ, or nothing is labelled or
+            touched.
     """
     types = measures.features(tuple(features))
     raw = data if isinstance(data, Recordings) else read(data, progress=progress)
@@ -277,23 +312,33 @@ def load_trials(
     if chain is not None:
         for own, (_, path) in zip(arms, kept, strict=True):
             if own is not None and own.to_dict() != chain.to_dict():
-                raise InputError(f"{path}: its arm is not that of {kept[0][1]}; train on one arm")
+                raise InputError(
+                    f"{path}: its arm is not that of {kept[0][1]}; train on one arm"
+                )
     joints = joint_angles(kept) if needed else 0
     names = tuple(feature.name for feature in types)
     trials: list[Trial] = []
     untouched: list[tuple[Path, dict[str, str]]] = []
     unused: list[Path] = []
-    tracked = {"chain": chain, "horizon_s": horizon_s, "features": names, "joints": joints}
+    tracked = {
+        "chain": chain,
+        "horizon_s": horizon_s,
+        "features": names,
+        "joints": joints,
+    }
     work = (delayed(_followed)(*pair, reference, **tracked) for pair in kept)
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    shown = bar(results, total=len(kept), desc="following", unit=" trials", disable=not progress)
+    shown = bar(
+        results, total=len(kept), desc="following", unit=" trials", disable=not progress
+    )
     for (recording, path), (touches, labels) in zip(kept, shown, strict=True):
         if not touches:
             untouched.append((path, recording.labels))
         if len(touches) > len(labels):
             unused.append(path)
         trials += [
-            Trial(path, recording, own, *touch) for own, touch in zip(labels, touches, strict=False)
+            Trial(path, recording, own, *touch)
+            for own, touch in zip(labels, touches, strict=False)
         ]
     if not trials:
         raise InputError(
@@ -305,7 +350,9 @@ def load_trials(
     paths = [t.path for t in trials] + [path for path, _ in untouched]
     lacking = {
         f"a label for {task}": tuple(
-            dict.fromkeys(p for p, own in zip(paths, labels, strict=True) if task not in own)
+            dict.fromkeys(
+                p for p, own in zip(paths, labels, strict=True) if task not in own
+            )
         )
         for task in tasks
     }
@@ -325,7 +372,11 @@ def load_trials(
         names,
         joints,
         tasks,
-        {need: left for need, left in (*lacking.items(), ("joint angles", bare)) if left},
+        {
+            need: left
+            for need, left in (*lacking.items(), ("joint angles", bare))
+            if left
+        },
         tuple(unused),
     )
 
@@ -342,7 +393,9 @@ def _followed(
         raise InputError(f"{path}: {error}") from None
 
 
-def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[float, FeatureSeries]]:
+def contacts(
+    frames: Iterable[Frame], tracker: ContactTracker
+) -> list[tuple[float, FeatureSeries]]:
     """Onset in seconds and series of every contact of a recording, in their order."""
     followed: dict[int, Contact] = {}
     for frame in frames:
@@ -350,8 +403,11 @@ def contacts(frames: Iterable[Frame], tracker: ContactTracker) -> list[tuple[flo
     return [(contact.onset_s, contact.series()) for contact in followed.values()]
 
 
-def with_thresholds(layout: SkinLayout, threshold: int | None, onset: int | None) -> SkinLayout:
-    """The skin with these thresholds; one that is None stays, or scales with the other."""
+def with_thresholds(
+    layout: SkinLayout, threshold: int | None, onset: int | None
+) -> SkinLayout:
+    """The skin with these thresholds; one that is None stays, or scales with the
+    other."""
     if threshold is not None:
         ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
         begin = round(threshold * ratio) if onset is None else onset

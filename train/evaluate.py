@@ -1,13 +1,14 @@
 """Nested cross-validation: the accuracy of a choice, on trials that took no part in it.
 
-The trials are divided into folds. Every candidate is fitted without each fold and tested on it, and
-fitted without each two folds and tested on both. The tests of the fits without folds i and j, for
-one i and every j, are a cross-validation among the trials outside fold i. The candidate that is
-best there was chosen without fold i, and its fit without fold i answers fold i. Scaling,
-projection and neighbours are fitted on a fit's own trials. So no trial takes part in the fit that
-answers it, nor in the choice of features, projection, shrinkage, components and k: the share of
-right answers is the nested accuracy. A fit without folds i and j serves both i and j, so ten folds
-take 55 fits, not 110.
+The trials are divided into folds. Every candidate is fitted without each fold and
+tested on it, and fitted without each two folds and tested on both. The tests of the
+fits without folds i and j, for one i and every j, are a cross-validation among the
+trials outside fold i. The candidate that is best there was chosen without fold i, and
+its fit without fold i answers fold i. Scaling, projection and neighbours are fitted on
+a fit's own trials. So no trial takes part in the fit that answers it, nor in the choice
+of features, projection, shrinkage, components and k: the share of right answers is the
+nested accuracy. A fit without folds i and j serves both i and j, so ten folds take 55
+fits, not 110.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,9 +33,10 @@ SEED = 2012
 """Of the folds, so that they are the same for the same labels."""
 
 VARIANCE = 2.5
-"""Variance of the nested accuracy around the exported model's accuracy on other trials, in binomial
-variances. It is above 1 because the folds' models differ from the exported one, and because reports
-show the best of several windows. `make risk` counts how often the interval holds."""
+"""Variance of the nested accuracy around the exported model's accuracy on other trials,
+in binomial variances. It is above 1 because the folds' models differ from the exported
+one, and because reports show the best of several windows. `make risk` counts how often
+the interval holds."""
 
 Labels = Mapping[str, NDArray[np.str_]]
 """{task: (n,) labels}."""
@@ -47,12 +49,12 @@ class Result:
     Attributes:
         right: trials answered right.
         total: trials.
-        components: of the best settings, or of those most often chosen; 0 where there was no
-            choice.
+        components: of the best settings, or of those most often chosen; 0 where there
+            was no choice.
         k: likewise.
         said: (n,) the label answered for each trial, or None.
-        hits: (n,) whether each trial is answered right, or None; two results on the same trials
-            are compared by it.
+        hits: (n,) whether each trial is answered right, or None; two results on the
+            same trials are compared by it.
     """
 
     right: int
@@ -75,11 +77,13 @@ class Result:
 
 @dataclass(frozen=True)
 class Promise(Result):
-    """A nested accuracy with an interval for the exported model's accuracy on other trials.
+    """A nested accuracy with an interval for the exported model's accuracy on other
+    trials.
 
     Attributes:
-        variance: of the difference, in binomial variances. Where entire groups are left out it is
-            the number of trials in a group, as these are right or wrong together.
+        variance: of the difference, in binomial variances. Where entire groups are left
+            out it is the number of trials in a group, as these are right or wrong
+            together.
     """
 
     variance: float = VARIANCE
@@ -100,7 +104,8 @@ def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int6
 
 
 def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
-    """(n,) folds of entire groups: one group each, or several where there are over `count`."""
+    """(n,) folds of entire groups: one group each, or several where there are over
+    `count`."""
     names, members = np.unique(groups, return_inverse=True)
     order = np.random.default_rng(SEED).permutation(len(names))
     return np.asarray((order % count)[members], dtype=np.int64)
@@ -116,7 +121,8 @@ def _answers(
     widths: Sequence[int],
     own: NDArray[np.bool_] | None,
 ) -> dict[str, NDArray[np.bool_]]:
-    """{task: (candidates, test)} whether each candidate, fitted on `train`, is right."""
+    """{task: (candidates, test)} whether each candidate, fitted on `train`, is
+    right."""
     answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
     fitted_for = None
     with single_thread():
@@ -164,7 +170,9 @@ def _counted(
     return list(by_counts.values())
 
 
-def _directions(targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]) -> int:
+def _directions(
+    targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]
+) -> int:
     return max(sum(int(classes[target].max()) for target in targets), 1)
 
 
@@ -177,9 +185,11 @@ class AnswerTable:
     Attributes:
         folds: (n,) the fold of each trial.
         choices: {task: the candidates}.
-        right: {task: (folds, candidates, n)} whether the fit without a fold, and without the
-            trial's own fold, answers the trial rightly; True for trials that are not tested.
-        tested: {task: (n,) whether a trial has a label and a fold}; all where a task has no entry.
+        right: {task: (folds, candidates, n)} whether the fit without a fold, and
+            without the trial's own fold, answers the trial rightly; True for trials
+            that are not tested.
+        tested: {task: (n,) whether a trial has a label and a fold}; all where a task
+            has no entry.
     """
 
     folds: NDArray[np.int64]
@@ -204,11 +214,13 @@ class AnswerTable:
         ]
 
     def nested(self, task: str, *rule: Any) -> Result:
-        """The accuracy of the choice itself, with the numbers that it most often takes."""
+        """The accuracy of the choice itself, with the numbers that it most often
+        takes."""
         return self.answered(task, self.by_fold(task, *rule))
 
     def answered(self, task: str, picked: Sequence[int]) -> Result:
-        """The accuracy where the candidate `picked` for a fold answers the trials of that fold."""
+        """The accuracy where the candidate `picked` for a fold answers the trials of
+        that fold."""
         hits = np.zeros(len(self.folds), dtype=bool)
         for fold, candidate in enumerate(picked):
             own = self.folds == fold
@@ -226,22 +238,26 @@ def choose(
 ) -> int:
     """The cheapest candidate within one standard error of the best in cross-validation.
 
-    The error is that of the difference to the best one on the same trials, which is smaller than
-    the errors of the two accuracies, as candidates often err on the same trials.
+    The error is that of the difference to the best one on the same trials, which is
+    smaller than the errors of the two accuracies, as candidates often err on the same
+    trials.
 
     Args:
         right: (candidates, n) answers of each.
-        cost: (candidates,) of each. At equal cost the most accurate counts, then the first.
-            Without costs the most accurate of all is taken.
+        cost: (candidates,) of each. At equal cost the most accurate counts, then the
+            first. Without costs the most accurate of all is taken.
         allowed: the candidates to choose from; all where None.
-        margin: loss of accuracy that is accepted for less cost, whatever the standard error.
+        margin: loss of accuracy that is accepted for less cost, whatever the standard
+            error.
     """
     candidates = np.arange(len(right)) if allowed is None else allowed
     means = right[candidates].mean(axis=1)
     if cost is None:
         return int(candidates[means.argmax()])
     prices = cost[candidates]
-    best = np.array([np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)])
+    best = np.array(
+        [np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)]
+    )
     answers = right[candidates[best]].astype(np.int64)
     worse = answers[means[best].argmax()] - answers
     error = worse.std(axis=1) / np.sqrt(right.shape[1])
@@ -279,8 +295,8 @@ def evaluate(
         widths: columns of each; equal where None.
         jobs: processes.
         progress: called after each of the `fits`.
-        nested: False makes the fits without each fold only, a fifth of the work. Of the table,
-            `AnswerTable.held_out` alone is then valid.
+        nested: False makes the fits without each fold only, a fifth of the work. Of the
+            table, `AnswerTable.held_out` alone is then valid.
         own: (n,) whether a trial is the owner's, where simulated ones are among them.
 
     Raises:
@@ -288,10 +304,14 @@ def evaluate(
     """
     count = int(folds.max()) + 1
     if count < 3:
-        raise InputError(f"nested accuracy needs at least 3 folds, not {count}; record more")
+        raise InputError(
+            f"nested accuracy needs at least 3 folds, not {count}; record more"
+        )
     X = finite(X)
     classes = {
-        task: np.where(labels == "", -1, np.unique(labels[labels != ""]).searchsorted(labels))
+        task: np.where(
+            labels == "", -1, np.unique(labels[labels != ""]).searchsorted(labels)
+        )
         for task, labels in y.items()
     }
     tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
@@ -301,7 +321,14 @@ def evaluate(
     wide = widths_of(X.shape[1], features, widths)
     work = (
         delayed(_answers)(
-            X, classes, np.delete(everything, test), test, grids, tuple(features), wide, own
+            X,
+            classes,
+            np.delete(everything, test),
+            test,
+            grids,
+            tuple(features),
+            wide,
+            own,
         )
         for test in tests
     )
@@ -315,7 +342,10 @@ def evaluate(
         ]
         for task in classes
     }
-    right = {task: np.zeros((count, len(choices[task]), len(X)), dtype=bool) for task in classes}
+    right = {
+        task: np.zeros((count, len(choices[task]), len(X)), dtype=bool)
+        for task in classes
+    }
     for (i, j), test, result in zip(pairs, tests, results, strict=True):
         if progress is not None:
             progress()

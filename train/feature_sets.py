@@ -8,9 +8,10 @@
 | `contact_area` | taxel | its number of taxels |
 | `contact_motion` | metre (taxel) | its sums of rows and columns over its area; the pose |
 
-`contact`: how force grows, with area and with motion. It recognises objects that were not in the
-training data. Logarithms turn a product into a sum, so objects that differ by a factor differ by a
-shift. Five times are enough for such smooth courses; more of them fit the objects trained on.
+`contact`: how force grows, with area and with motion. It recognises objects that were
+not in the training data. Logarithms turn a product into a sum, so objects that differ
+by a factor differ by a shift. Five times are enough for such smooth courses; more of
+them fit the objects trained on.
 
 | feature | unit | from |
 |---|---|---|
@@ -22,8 +23,8 @@ shift. Five times are enough for such smooth courses; more of them fit the objec
 | `force_motion`, its `_rate` | metre, metre/s | its sums of counts times row, column; the pose |
 | `log_stiffness` | log(newton/metre) | the skin's sum of counts over force-weighted motion |
 
-`moments`: how force lies on the two halves of the skin and on all of it, as square roots. Forces
-spread over decades; their square roots lie evenly, as those of counts do.
+`moments`: how force lies on the two halves of the skin and on all of it, as square
+roots. Forces spread over decades; their square roots lie evenly, as those of counts do.
 
 | quantity, of `left`, `right` and `skin` | unit, under the root | from |
 |---|---|---|
@@ -43,18 +44,20 @@ spread over decades; their square roots lie evenly, as those of counts do.
 | `taxel_force_mean`, `taxel_force_deviation` | newton (count) | the same, over the window |
 | `taxel_force_roughness` | newton (count) | its mean change from sample to sample |
 
-`kernels`: the share of the window in which kernels of nine samples, applied to sums of the skin's
-cells, lie above values that training gave (`edge.touch.kernels`). `zone_kernels`: the same of the
-eight whole numbers of each zone (`edge.touch.measures.ZONE_WIDTH`), which goes with `moments`.
+`kernels`: the share of the window in which kernels of nine samples, applied to sums of
+the skin's cells, lie above values that training gave (`edge.touch.kernels`).
+`zone_kernels`: the same of the eight whole numbers of each zone
+(`edge.touch.measures.ZONE_WIDTH`), which goes with `moments`.
 
 | feature | unit | from |
 |---|---|---|
 | `taxel_kernels`, 1,008 of them | 1 | the sums of counts of at most 32 cells |
 | `zone_kernels`, 504 of them | 1 | the sums of `contact`, `skin`, `left` and `right` |
 
-`joints`: how far each joint yields, which depends on the object touched. `posture`: the angles
-themselves. They give a gripper the object's size, and an arm its place. Where each object stood in
-its own place, posture recognises it for a reason that holds in that room only.
+`joints`: how far each joint yields, which depends on the object touched. `posture`: the
+angles themselves. They give a gripper the object's size, and an arm its place. Where
+each object stood in its own place, posture recognises it for a reason that holds in
+that room only.
 
 | feature, of each joint | unit | from |
 |---|---|---|
@@ -68,7 +71,12 @@ from collections.abc import Sequence
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import KERNELS, PAPER, QUANTITIES, Feature
 
-_TAXELS = ("taxel_force@10", "taxel_force_mean", "taxel_force_deviation", "taxel_force_roughness")
+_TAXELS = (
+    "taxel_force@10",
+    "taxel_force_mean",
+    "taxel_force_deviation",
+    "taxel_force_roughness",
+)
 
 SETS: dict[str, tuple[str, ...]] = {
     "paper": PAPER,
@@ -107,7 +115,8 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def moves(feature: Feature) -> bool:
-    """Whether a feature is measured in the world's frame where joint angles are known."""
+    """Whether a feature is measured in the world's frame where joint angles are
+    known."""
     return feature.quantity in ("motion", "force_motion", "stiffness")
 
 

@@ -1,4 +1,5 @@
-"""Recordings to a fitted model: its settings are chosen, and their accuracy is measured."""
+"""Recordings to a fitted model: its settings are chosen, and their accuracy is
+measured."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -25,9 +26,9 @@ from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
-"""Steps between decision points. The first one that keeps the weights below `LARGEST_BYTES` is
-taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s, at the same error (cody18,
-household)."""
+"""Steps between decision points. The first one that keeps the weights below
+`LARGEST_BYTES` is taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s,
+at the same error (cody18, household)."""
 FIRST_S = 0.2
 """The first decision point."""
 MOST_TRIALS = 2000
@@ -35,8 +36,8 @@ MOST_TRIALS = 2000
 LARGEST_BYTES = 950_000
 """Bytes of weights with which a model stays below 1 MB."""
 LEAK = 0.5
-"""The data leak where the first frame recognises more than this share of the trials that do not
-have the most frequent label."""
+"""The data leak where the first frame recognises more than this share of the trials
+that do not have the most frequent label."""
 FEWEST_TRIALS = 3
 LONG_TOUCHES = 2.0
 """Longer windows are tried where half of the touches last so many windows."""
@@ -93,26 +94,30 @@ def fit(
 ) -> Fitted:
     """Choose and fit every task of some recordings.
 
-    Arguments you pass are held fixed. The others are chosen for each task among the candidates of
-    `train.choose`: the features and projection of the smallest model within one standard error of
-    the best in cross-validation, with the scaling, shrinkage, components and k that are best there.
+    Arguments you pass are held fixed. The others are chosen for each task among the
+    candidates of `train.choose`: the features and projection of the smallest model
+    within one standard error of the best in cross-validation, with the scaling,
+    shrinkage, components and k that are best there.
 
     Args:
-        data: recordings, folders of them, or a data set that was loaded for the features.
+        data: recordings, folders of them, or a data set that was loaded for the
+            features.
         features: names of sets and of single features.
         projection: `pca` or `lda`.
         scaling: one of `train.scaling.SCALINGS`.
         components: principal components.
         k: neighbours.
-        window_s: seconds from onset. Where None it is `WINDOW_S`, or two, four or eight times that
-            where touches last so long and accuracy rises enough (`Choosing.window`).
+        window_s: seconds from onset. Where None it is `WINDOW_S`, or two, four or eight
+            times that where touches last so long and accuracy rises enough
+            (`Choosing.window`).
         samples: values of a feature.
         tasks: keys of the labels; all that the recordings share where None.
-        leave_out: label whose groups are left out to choose the settings of a task and to measure
-            its accuracy, where each of its classes has several groups; `trial` for single trials.
-        decision_points_s: windows at which decisions are calibrated, rising, the last of them
-            `window_s`; empty for none. Where None there is one every 0.1 s, or less often, if the
-            number of trials and the size of the model allow it.
+        leave_out: label whose groups are left out to choose the settings of a task and
+            to measure its accuracy, where each of its classes has several groups;
+            `trial` for single trials.
+        decision_points_s: windows at which decisions are calibrated, rising, the last
+            of them `window_s`; empty for none. Where None there is one every 0.1 s, or
+            less often, if the number of trials and the size of the model allow it.
         threshold: counts above which a taxel is in contact.
         onset: counts above which a contact begins.
         arm: for recordings with joint angles that name no arm.
@@ -121,7 +126,8 @@ def fit(
         progress: show progress bars on stderr.
 
     Raises:
-        InputError: the recordings cannot be used, or an argument is not possible with them.
+        InputError: the recordings cannot be used, or an argument is not possible with
+            them.
 
     Example:
         >>> import train
@@ -135,7 +141,9 @@ def fit(
     windows: tuple[float, ...] = (window_s or WINDOW_S,)
     notes: list[str] = []
 
-    def choosing(of: DataSet, y: Labels, quick: bool, mixed: bool, shown: bool) -> Choosing:
+    def choosing(
+        of: DataSet, y: Labels, quick: bool, mixed: bool, shown: bool
+    ) -> Choosing:
         drawn = mixed or kinds_of([trial.recording for trial in of.trials]) is not None
         fixed = (features, projection, scaling, components, k)
         tried = candidates(y, *fixed, joints=of.joints > 0, drawn=drawn, quick=quick)
@@ -146,7 +154,9 @@ def fit(
     else:
         raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
         drawn = raw.mixed or kinds_of(raw.recordings) is not None
-        every = candidates({}, joints=raw.joints, drawn=drawn, features=features, quick=quick)
+        every = candidates(
+            {}, joints=raw.joints, drawn=drawn, features=features, quick=quick
+        )
         if window_s is None and not (quick or raw.mixed):
             windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
         load = partial(
@@ -189,7 +199,9 @@ def fit(
     if own is None:
         choice = choosing(dataset, y, quick, mixed=False, shown=progress)
         if len(windows) > 1:
-            windows = _windows([float(t.recording.t[-1]) - t.onset_s for t in dataset.trials])
+            windows = _windows(
+                [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
+            )
         window_s, why = choice.window(windows)
         chosen, folds, without = choice.choose(window_s)
         tried = choice.tried
@@ -198,7 +210,9 @@ def fit(
         X = dataset.with_kernels(window_s).features(window_s, samples)
 
         def settings(of: DataSet, y: Labels) -> dict[str, Chosen]:
-            return choosing(of, y, quick, mixed=True, shown=progress).choose(windows[0])[0]
+            return choosing(of, y, quick, mixed=True, shown=progress).choose(
+                windows[0]
+            )[0]
 
         chosen, folds, without, why = mix(
             dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs
@@ -209,15 +223,23 @@ def fit(
     dataset = dataset.with_kernels(window_s)
     choices = {task: settings.choice for task, settings in chosen.items()}
     measured = dataset
-    dataset = measured.of([name for choice in choices.values() for name in choice.features])
+    dataset = measured.of(
+        [name for choice in choices.values() for name in choice.features]
+    )
     X = dataset.features(window_s, samples)
     felt = np.ones(n, dtype=bool) if own is None else own
-    notes += _leaks(measured.part(felt), {task: labels[felt] for task, labels in y.items()})
+    notes += _leaks(
+        measured.part(felt), {task: labels[felt] for task, labels in y.items()}
+    )
     tested = int((folds >= 0).sum())
-    points = _decision_points(dataset, choices, decision_points_s, window_s, samples, notes, tested)
+    points = _decision_points(
+        dataset, choices, decision_points_s, window_s, samples, notes, tested
+    )
     sequential = None
     if points:
-        used = [choice for by_task in (choices, *without) for choice in by_task.values()]
+        used = [
+            choice for by_task in (choices, *without) for choice in by_task.values()
+        ]
         seen = measured.of([name for choice in used for name in choice.features])
         at_points = np.stack([seen.features(s, samples) for s in points])
         sequential = SequentialClassifier(
@@ -247,11 +269,14 @@ def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
     median = float(np.median(seconds))
     if median < LONG_TOUCHES * WINDOW_S:
         return (WINDOW_S,)
-    return tuple(WINDOW_S * times for times in (1, 2, 4, 8) if WINDOW_S * times <= median)
+    return tuple(
+        WINDOW_S * times for times in (1, 2, 4, 8) if WINDOW_S * times <= median
+    )
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
-    """Warnings where the first frame gives labels away, or most recordings begin in contact."""
+    """Warnings where the first frame gives labels away, or most recordings begin in
+    contact."""
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):
         mend = "record from before the touch"
@@ -259,7 +284,9 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
         low, high = thresholds.proposed(recordings)
         felt, _ = thresholds.count_contacts(recordings, low, high)
         if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
-            mend += f", or take --threshold {low} --onset {high}, by which it begins later"
+            mend += (
+                f", or take --threshold {low} --onset {high}, by which it begins later"
+            )
         return [
             f"warning: {(~untouched).mean():.0%} of the touches begin with their recording, so "
             f"their onset is not known; {mend}"
@@ -290,7 +317,8 @@ def _decision_points(
     notes: list[str],
     tested: int,
 ) -> tuple[float, ...]:
-    """The decision points asked for, or the default ones where they can be calibrated."""
+    """The decision points asked for, or the default ones where they can be
+    calibrated."""
     if wanted is not None:
         return tuple(wanted)
     if not FEWEST <= tested <= MOST_TRIALS:

@@ -5,21 +5,31 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.touch.kernels import BITS, KernelTable, convolution_of_bias, convolved, shifted
+from edge.touch.kernels import (
+    BITS,
+    KernelTable,
+    convolution_of_bias,
+    convolved,
+    shifted,
+)
 
 MOST_TOUCHES = 500
 """Touches that are enough for a table."""
 GOLDEN = (np.sqrt(5.0) + 1.0) / 2.0
 
 
-def kernel_table(touches: Sequence[NDArray[np.int64]], biases: int, alike: bool) -> KernelTable:
+def kernel_table(
+    touches: Sequence[NDArray[np.int64]], biases: int, alike: bool
+) -> KernelTable:
     """Shifts and biases for the kernels of one feature. No label takes part.
 
-    A bias is a quantile of its convolution's results on these touches. The quantiles of successive
-    biases are the multiples of the golden ratio less their whole parts, which spread evenly.
+    A bias is a quantile of its convolution's results on these touches. The quantiles of
+    successive biases are the multiples of the golden ratio less their whole parts,
+    which spread evenly.
 
     Args:
-        touches: (channels, samples) of each touch, see `edge.touch.features.kernel_channels`.
+        touches: (channels, samples) of each touch, see
+            `edge.touch.features.kernel_channels`.
         biases: how many there are.
         alike: the channels have one unit and share a shift.
     """
@@ -27,7 +37,9 @@ def kernel_table(touches: Sequence[NDArray[np.int64]], biases: int, alike: bool)
     if alike:
         largest[:] = largest.max()
     # One bit is kept for touches that are stronger than those of training.
-    shifts = tuple(BITS - 1 - int(value).bit_length() if value else 0 for value in largest)
+    shifts = tuple(
+        BITS - 1 - int(value).bit_length() if value else 0 for value in largest
+    )
     results = np.concatenate([convolved(shifted(t, shifts)) for t in touches], axis=1)
     results.sort(axis=1)
     shares = np.arange(1, biases + 1) * GOLDEN % 1.0

@@ -12,7 +12,8 @@ NO_CONTACT = "none"
 ALIKE = "alike"
 """`meta.contacts` of a recording whose contacts all have its labels."""
 ENOUGH = 10
-"""Trials with a label that make a task of what most trials lack, and that choose a weight."""
+"""Trials with a label that make a task of what most trials lack, and that choose a
+weight."""
 
 
 def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
@@ -22,36 +23,50 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
         return [recording.labels]
     if each == ALIKE:
         return [recording.labels] * count
-    if not isinstance(each, list) or not all(isinstance(labels, dict) for labels in each):
-        raise InputError(f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact')
+    if not isinstance(each, list) or not all(
+        isinstance(labels, dict) for labels in each
+    ):
+        raise InputError(
+            f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact'
+        )
     if len(each) != count:
         raise InputError(
             f"meta.contacts labels {len(each)} contacts, {count} are found; correct the labels or "
             "the threshold"
         )
-    return [{**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each]
+    return [
+        {**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each
+    ]
 
 
 def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     """Each trial's {task: label}, with the labels that follow from its others.
 
-    Where a task's labels are those of two others joined by a hyphen, `soft-fixed` follows from
-    `soft` and `fixed`, and the reverse. This is so for `JOINED`, and for tasks for which it holds
-    in every trial that has all three. No task is added that no trial has.
+    Where a task's labels are those of two others joined by a hyphen, `soft-fixed`
+    follows from `soft` and `fixed`, and the reverse. This is so for `JOINED`, and for
+    tasks for which it holds in every trial that has all three. No task is added that no
+    trial has.
     """
     tasks = set().union(*trials)
     out = [dict(labels) for labels in trials]
     for triple in permutations(sorted(tasks | set(JOINED)), 3):
         product, *factors = triple
         known = [own for own in trials if own.keys() >= set(triple)]
-        holds = all(own[product] == "-".join(own[factor] for factor in factors) for own in known)
+        holds = all(
+            own[product] == "-".join(own[factor] for factor in factors) for own in known
+        )
         if holds and (known or triple == JOINED):
             out = [joined(own, triple) for own in out]
-    return [{task: label for task, label in own.items() if task in tasks} for own in out]
+    return [
+        {task: label for task, label in own.items() if task in tasks} for own in out
+    ]
 
 
-def shared_tasks(trials: Sequence[Mapping[str, str]], *, partial: bool = False) -> tuple[str, ...]:
-    """The tasks that most trials have a label for; `partial`, also those that `ENOUGH` have.
+def shared_tasks(
+    trials: Sequence[Mapping[str, str]], *, partial: bool = False
+) -> tuple[str, ...]:
+    """The tasks that most trials have a label for; `partial`, also those that `ENOUGH`
+    have.
 
     Raises:
         InputError: there is none.

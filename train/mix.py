@@ -1,9 +1,11 @@
-"""Simulated trials beside the owner's: how much each counts, chosen on the owner's trials.
+"""Simulated trials beside the owner's: how much each counts, chosen on the owner's
+trials.
 
-The settings of a task are chosen on the simulated trials, of which there are many. On the owner's,
-of which there may be ten, only the weight is chosen: by trials, or objects, that are left out in
-turn, while the simulated ones are always there. A weight is how often a trial counts in scaling and
-projection, in whole numbers. As a neighbour, each votes once.
+The settings of a task are chosen on the simulated trials, of which there are many. On
+the owner's, of which there may be ten, only the weight is chosen: by trials, or
+objects, that are left out in turn, while the simulated ones are always there. A weight
+is how often a trial counts in scaling and projection, in whole numbers. As a neighbour,
+each votes once.
 """
 
 from collections.abc import Callable
@@ -13,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from train.choose import FEWEST_GROUPS, TRIAL, Chosen, decided_together, fold_count, promised
+from train.choose import (
+    FEWEST_GROUPS,
+    TRIAL,
+    Chosen,
+    decided_together,
+    fold_count,
+    promised,
+)
 from train.dataset import DataSet
 from train.evaluate import AnswerTable, Labels, evaluate, group_folds, stratified_folds
 from train.labels import ENOUGH
@@ -47,15 +56,16 @@ def mix(
         settings: chooses the settings of tasks on some of the trials.
         features: (n, p) of the data set's, at the full window.
         samples: values of a feature.
-        leave_out: label whose groups are left out where the owner's trials have several of them.
+        leave_out: label whose groups are left out where the owner's trials have several
+            of them.
         quick: fewer folds.
         jobs: processes.
 
     Returns:
-        {task: its settings, with the weights}, whose accuracies are those on the owner's trials;
-        (n,) the fold of each of the owner's trials, -1 for simulated ones;
-        [fold]{task: the choice made without the fold's trials}; and sentences that say how much the
-        simulated trials help.
+        {task: its settings, with the weights}, whose accuracies are those on the
+        owner's trials; (n,) the fold of each of the owner's trials, -1 for simulated
+        ones; [fold]{task: the choice made without the fold's trials}; and sentences
+        that say how much the simulated trials help.
 
     Raises:
         InputError: the owner's trials are too few, or have no label.
@@ -101,7 +111,10 @@ def mix(
     group_count = 0
     groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
     if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:
-        by_group, group_count = answers(group_folds(groups, count)), len(set(groups.tolist()))
+        by_group, group_count = (
+            answers(group_folds(groups, count)),
+            len(set(groups.tolist())),
+        )
     plans: dict[str, tuple[NDArray[np.int64], list[dict[str, Choice]]]] = {
         left_out: (table.folds, [{} for _ in range(int(table.folds.max()) + 1)])
         for left_out, table in ((leave_out, by_group), (TRIAL, by_trial))
@@ -116,19 +129,22 @@ def mix(
         )
     for task, settled in chosen.items():
         table = by_trial if task == leave_out else by_group
-        # The first within a standard error of the best, as ten trials hardly tell them apart; fewer
-        # than that choose nothing.
+        # The first within a standard error of the best, as ten trials hardly tell them
+        # apart; fewer than that choose nothing.
         rank = np.arange(len(table.choices[task]))
         rule = rank, (rank[:1] if labelled[task] < ENOUGH else None)
         best = table.choices[task][table.chosen(task, *rule)]
         for left_out, each in ((leave_out, by_group), (TRIAL, by_trial)):
-            for by_task, place in zip(plans[left_out][1], each.by_fold(task, *rule), strict=True):
+            for by_task, place in zip(
+                plans[left_out][1], each.by_fold(task, *rule), strict=True
+            ):
                 by_task[task] = each.choices[task][place]
         chosen[task] = replace(
             settled,
             choice=best,
             accuracy=promised(
-                table.nested(task, *rule), groups=0 if table is by_trial else group_count
+                table.nested(task, *rule),
+                groups=0 if table is by_trial else group_count,
             ),
             by_trial=promised(by_trial.nested(task, *rule)),
             left_out=TRIAL if table is by_trial else leave_out,
@@ -141,8 +157,12 @@ def mix(
             SIMULATED: "simulated alone",
         }
         answers_of = table.held_out(task)[:, table.tested[task]].mean(axis=1)
-        shares = {c.weights: s for c, s in zip(table.choices[task], answers_of, strict=True)}
-        by_weights = ", ".join(f"{names[each]} {share:.1%}" for each, share in shares.items())
+        shares = {
+            c.weights: s for c, s in zip(table.choices[task], answers_of, strict=True)
+        }
+        by_weights = ", ".join(
+            f"{names[each]} {share:.1%}" for each, share in shares.items()
+        )
         notes.append(f"{task}: {by_weights}; taken: {names[best.weights]}")
         if task in shared and shares[ALONE] == max(shares.values()):
             notes.append(
@@ -150,7 +170,11 @@ def mix(
                 "chooses the features by them"
             )
     form = dataset.names, dataset.widths(samples)
-    return decided_together(chosen, features, y, plans, *form, own, jobs), *plans[TRIAL], notes
+    return (
+        decided_together(chosen, features, y, plans, *form, own, jobs),
+        *plans[TRIAL],
+        notes,
+    )
 
 
 def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:

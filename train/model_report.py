@@ -1,4 +1,5 @@
-"""The report of a fitted model: its accuracy, wrong answers, features, and candidates."""
+"""The report of a fitted model: its accuracy, wrong answers, features, and
+candidates."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -40,10 +41,10 @@ class Answers:
     Attributes:
         classes: the task's labels, sorted.
         truth: (n,) labels; empty where a trial has none, or was never left out.
-        answers: (quarters, n) the answers of fits to growing parts of the other trials; the last
-            fit has all of them.
-        explained: {trial: explanation of the last fit's answer} for the wrong answers and some
-            others.
+        answers: (quarters, n) the answers of fits to growing parts of the other trials;
+            the last fit has all of them.
+        explained: {trial: explanation of the last fit's answer} for the wrong answers
+            and some others.
     """
 
     classes: list[str]
@@ -77,14 +78,16 @@ def _left_out(
     choices: Mapping[str, Choice],
     test: NDArray[np.int64],
 ) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
-    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has them.
+    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
+    them.
 
     Args:
         X: (n, p) feature vectors of all trials.
         y: {task: (n,) labels}.
         features: names of the feature types in X.
         widths: columns of each.
-        own: (n,) whether a trial is the owner's; None where all, or none, are simulated.
+        own: (n,) whether a trial is the owner's; None where all, or none, are
+            simulated.
         task: the task to answer.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
@@ -114,7 +117,9 @@ def _left_out(
         return near and near._replace(row=int(train[near.row]))
 
     explained = {}
-    for trial, voters, answer in zip(test.tolist(), rows.tolist(), answers[-1], strict=True):
+    for trial, voters, answer in zip(
+        test.tolist(), rows.tolist(), answers[-1], strict=True
+    ):
         if answer != y[task][trial] or trial % max(len(X) // EXPLAINED, 1) == 0:
             label, truth = int(np.searchsorted(classes, answer)), int(index[trial])
             why = explain(space, X[trial], voters, label, features, widths, truth)
@@ -124,11 +129,19 @@ def _left_out(
 
 
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
-    """{task: its answers to left-out trials}, the same that the nested accuracy counts."""
-    by_fold = [by_task for chosen in fitted.chosen.values() for by_task in chosen.by_fold]
+    """{task: its answers to left-out trials}, the same that the nested accuracy
+    counts."""
+    by_fold = [
+        by_task for chosen in fitted.chosen.values() for by_task in chosen.by_fold
+    ]
     choices = [choice for by_task in by_fold for choice in by_task.values()]
-    dataset = fitted.measured.of([name for choice in choices for name in choice.features])
-    tasks = {*fitted.chosen, *(target for choice in choices for target in choice.targets)}
+    dataset = fitted.measured.of(
+        [name for choice in choices for name in choice.features]
+    )
+    tasks = {
+        *fitted.chosen,
+        *(target for choice in choices for target in choice.targets),
+    }
     y = {task: dataset.labels(task) for task in tasks}
     answers, cases = {}, []
     for task, chosen in fitted.chosen.items():
@@ -140,7 +153,10 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
                 cases.append((task, by_task, test))
-    X, widths = dataset.features(fitted.window_s, fitted.samples), dataset.widths(fitted.samples)
+    X, widths = (
+        dataset.features(fitted.window_s, fitted.samples),
+        dataset.widths(fitted.samples),
+    )
     left_out = partial(_left_out, X, y, dataset.names, widths, dataset.own)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
     for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
@@ -149,7 +165,9 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     return answers
 
 
-def write(out: Path, fitted: Fitted, model: Model, prices: Prices, jobs: int = 1) -> Path:
+def write(
+    out: Path, fitted: Fitted, model: Model, prices: Prices, jobs: int = 1
+) -> Path:
     """Write report.html with its CSV and PNG files into a folder; the page's path.
 
     Args:
@@ -166,7 +184,10 @@ def write(out: Path, fitted: Fitted, model: Model, prices: Prices, jobs: int = 1
         f"The model was fitted on {counted(model.info.rows, 'trial')}, and decides "
         f"{model.info.window_s:g} s after the onset of a contact. Its version is {model.version}; "
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
-        *(line[0].upper() + line[1:] + "." for line in (*fitted.notes, *warnings(fitted))),
+        *(
+            line[0].upper() + line[1:] + "."
+            for line in (*fitted.notes, *warnings(fitted))
+        ),
     ]
     return page.write(out, f"Model {model.info.name}", lead, sections)
 
@@ -177,7 +198,9 @@ def _accuracy(exported: Exported, task: str) -> Section:
     untouched = exported.fitted.dataset.untouched_labels(task)
     tested = answer.truth != ""
     truth = np.array([*answer.truth[tested], *untouched], dtype=str)
-    untouched_answers = [label if label == NO_CONTACT else UNTOUCHED for label in untouched]
+    untouched_answers = [
+        label if label == NO_CONTACT else UNTOUCHED for label in untouched
+    ]
     answers = np.array([*answer.answers[-1][tested], *untouched_answers], dtype=str)
     text = f"{accuracy(chosen)}."
     if untouched:
@@ -188,12 +211,16 @@ def _accuracy(exported: Exported, task: str) -> Section:
         "left out they count groups, whose trials are right or wrong together."
     )
     labels = sorted(set(truth))
-    scores: Any = precision_recall_fscore_support(truth, answers, labels=labels, zero_division=0.0)
+    scores: Any = precision_recall_fscore_support(
+        truth, answers, labels=labels, zero_division=0.0
+    )
     rows: list[Row] = [
         {
             task: label,
             "recall %": percent(recall),
-            "95 % interval": interval(replace(chosen.accuracy, right=recall * total, total=total)),
+            "95 % interval": interval(
+                replace(chosen.accuracy, right=recall * total, total=total)
+            ),
             "precision %": percent(precision),
             "F1 %": percent(f1),
             "trials": int(total),
@@ -206,7 +233,10 @@ def _accuracy(exported: Exported, task: str) -> Section:
         [Table(f"recall_{_file(task)}", "Scores of each class", rows)],
         [
             confusion(
-                f"confusion_{_file(task)}", f"{task}: answers to left-out trials", truth, answers
+                f"confusion_{_file(task)}",
+                f"{task}: answers to left-out trials",
+                truth,
+                answers,
             )
         ],
     )
@@ -250,15 +280,20 @@ def _wrong(exported: Exported) -> Section:
     return Section("Wrong answers", text if rows else ["None."], [table], figures)
 
 
-def _picture(fitted: Fitted, trials: Sequence[str], task: str, answer: Answers) -> Figure:
-    """The first wrong answer: the touch's curves over those of the trials that voted for it."""
+def _picture(
+    fitted: Fitted, trials: Sequence[str], task: str, answer: Answers
+) -> Figure:
+    """The first wrong answer: the touch's curves over those of the trials that voted
+    for it."""
     trial, measured = answer.wrong[0], fitted.measured
     why, wrong = answer.explained[trial], str(answer.answers[-1][trial])
     near = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
     entries = []
     for n in near:
         label, series = answer.classes[n.label], measured.trials[n.row].series
-        entries.append((f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong))
+        entries.append(
+            (f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong)
+        )
     title = f"{trials[trial]}: classified as {wrong}, labelled {answer.truth[trial]}"
     rival = answer.classes[near[-1].label]
     case = Case(title, measured.trials[trial].series, entries, why.pulls, rival)
@@ -278,9 +313,14 @@ def _features(exported: Exported) -> Section:
         row: Row = {"feature": name}
         for task, answer in exported.answers.items():
             pulls = [why.pulls for why in answer.explained.values() if why.pulls]
-            shares = [abs(p.get(name, 0.0)) / (sum(map(abs, p.values())) or 1.0) for p in pulls]
+            shares = [
+                abs(p.get(name, 0.0)) / (sum(map(abs, p.values())) or 1.0)
+                for p in pulls
+            ]
             row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
-        rows.append({**row, "unit": "" if unit == "1" else unit, "values": widths[name]})
+        rows.append(
+            {**row, "unit": "" if unit == "1" else unit, "values": widths[name]}
+        )
     text = [
         "A feature's pull says how much nearer the feature brings a touch to the nearest trial "
         "with the model's answer than to the nearest trial with another label. The table gives "
@@ -297,10 +337,18 @@ def _learning(exported: Exported) -> Section:
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
     largest = n * (1.0 - 1.0 / folds)
     sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
-    hits = {t: (a.answers == a.truth)[:, a.truth != ""] for t, a in exported.answers.items()}
-    results = {t: [Result(int(q.sum()), q.size) for q in quarters] for t, quarters in hits.items()}
+    hits = {
+        t: (a.answers == a.truth)[:, a.truth != ""] for t, a in exported.answers.items()
+    }
+    results = {
+        t: [Result(int(q.sum()), q.size) for q in quarters]
+        for t, quarters in hits.items()
+    }
     rows: list[Row] = [
-        {"trials": size, **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()}}
+        {
+            "trials": size,
+            **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()},
+        }
         for i, size in enumerate(sizes)
     ]
     half = QUARTERS // 2 - 1
@@ -317,7 +365,9 @@ def _learning(exported: Exported) -> Section:
     )
     title = "Accuracy by the number of training trials"
     drawn = lines("learning", title, sizes, results, label="training trials")
-    return Section("The value of more recordings", text, [Table("learning", title, rows)], [drawn])
+    return Section(
+        "The value of more recordings", text, [Table("learning", title, rows)], [drawn]
+    )
 
 
 def _sizes(exported: Exported) -> Section:
@@ -331,9 +381,16 @@ def _sizes(exported: Exported) -> Section:
         "error of the best."
     ]
     return Section(
-        "Candidates, sizes and times", text, [candidates(exported.fitted, exported.prices)]
+        "Candidates, sizes and times",
+        text,
+        [candidates(exported.fitted, exported.prices)],
     )
 
 
-SECTIONS: tuple[Callable[[Exported], Section], ...] = (_wrong, _features, _learning, _sizes)
+SECTIONS: tuple[Callable[[Exported], Section], ...] = (
+    _wrong,
+    _features,
+    _learning,
+    _sizes,
+)
 """The sections after those of each task's accuracy."""

@@ -1,7 +1,8 @@
 """Nearest neighbours, and all tasks of a model together.
 
-A fitted `ContactClassifier` finds the neighbours that its ONNX graph finds: coordinates are whole
-numbers, and their squared distances are exact. `export/graph.py` writes the graph down.
+A fitted `ContactClassifier` finds the neighbours that its ONNX graph finds: coordinates
+are whole numbers, and their squared distances are exact. `export/graph.py` writes the
+graph down.
 """
 
 from __future__ import annotations
@@ -35,10 +36,15 @@ def vote(labels: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.take_along_axis(labels, votes.argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
-def squared_distances(X: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, n) squared distances of points X (m, c) to rows (n, c); exact for those of a `Grid`."""
+def squared_distances(
+    X: NDArray[np.float64], rows: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(m, n) squared distances of points X (m, c) to rows (n, c); exact for those of a
+    `Grid`."""
     return (
-        np.asarray(cdist(X, rows, "sqeuclidean")) if X.shape[1] else np.zeros((len(X), len(rows)))
+        np.asarray(cdist(X, rows, "sqeuclidean"))
+        if X.shape[1]
+        else np.zeros((len(X), len(rows)))
     )
 
 
@@ -47,8 +53,8 @@ def label_distances(
 ) -> NDArray[np.float64]:
     """(m, classes) distance of each label, from squared distances (m, n) to the trials.
 
-    It is the root of the mean square to the label's nearest trials; `nearest_of_label` says to how
-    many.
+    It is the root of the mean square to the label's nearest trials; `nearest_of_label`
+    says to how many.
     """
     counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
@@ -59,13 +65,15 @@ def label_distances(
 
 
 def slope(gaps: NDArray[np.float64]) -> float:
-    """By how much the log odds of being right change with the gap, without an intercept.
+    """By how much the log odds of being right change with the gap, without an
+    intercept.
 
-    The likelihood has one trial more at the mean size of a gap, half right and half wrong, so that
-    it has a maximum.
+    The likelihood has one trial more at the mean size of a gap, half right and half
+    wrong, so that it has a maximum.
 
     Args:
-        gaps: (n,) how much nearer the right label is than any other; below 0 where it is not.
+        gaps: (n,) how much nearer the right label is than any other; below 0 where it
+            is not.
 
     Returns:
         Above 0; 1 without a gap.
@@ -78,7 +86,12 @@ def slope(gaps: NDArray[np.float64]) -> float:
     def rise(change: float) -> float:
         return float((x * expit(-change * x)).sum() - 0.5 * np.tanh(0.5 * change))
 
-    return float(brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE) / size
+    return (
+        float(
+            brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE
+        )
+        / size
+    )
 
 
 SLOPE_FOLDS = 3
@@ -102,9 +115,10 @@ class Choice:
         projection: one of `train.projection.KINDS`.
         shrinkage: of `lda`.
         features: names of those it takes; all where empty.
-        targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
-        weights: how often a simulated trial and one of the owner's count in scaling and projection,
-            where there are both; 0 for trials that are not used at all.
+        targets: tasks whose discriminants `lda` sets side by side; the task itself
+            where empty.
+        weights: how often a simulated trial and one of the owner's count in scaling and
+            projection, where there are both; 0 for trials that are not used at all.
     """
 
     scaling: str
@@ -117,14 +131,22 @@ class Choice:
     weights: tuple[int, int] = (1, 1)
 
     def space(self, task: str) -> Space:
-        """Tasks whose spaces are equal share a projection, with the components of the larger.
+        """Tasks whose spaces are equal share a projection, with the components of the
+        larger.
 
         So they do if they also lack the labels of the same trials.
         """
         if self.projection == "pca":
             return self.projection, self.scaling, self.features, self.weights
         targets = self.targets or (task,)
-        return self.projection, self.scaling, self.features, self.weights, self.shrinkage, targets
+        return (
+            self.projection,
+            self.scaling,
+            self.features,
+            self.weights,
+            self.shrinkage,
+            targets,
+        )
 
     def counts(
         self, labels: NDArray[np.str_], own: NDArray[np.bool_] | None = None
@@ -144,13 +166,18 @@ class Choice:
 def fittable(
     choices: Mapping[str, Choice], y: Labels, own: NDArray[np.bool_] | None
 ) -> dict[str, Choice]:
-    """The choices of the tasks that y has labels for, with k at most the number of their trials.
+    """The choices of the tasks that y has labels for, with k at most the number of
+    their trials.
 
     Args:
         choices, y, own: see `ContactClassifier.fit`.
     """
-    counts = {task: int((c.counts(y[task], own) > 0).sum()) for task, c in choices.items()}
-    return {t: replace(c, k=min(c.k, counts[t])) for t, c in choices.items() if counts[t]}
+    counts = {
+        task: int((c.counts(y[task], own) > 0).sum()) for task, c in choices.items()
+    }
+    return {
+        t: replace(c, k=min(c.k, counts[t])) for t, c in choices.items() if counts[t]
+    }
 
 
 class Decided(NamedTuple):
@@ -158,8 +185,8 @@ class Decided(NamedTuple):
 
     Attributes:
         labels: (m,) indices.
-        distances: (m, classes) of the nearest answer with each label, see `label_distances`,
-            `ContactClassifier.slopes_` and `edge.model.agreement`.
+        distances: (m, classes) of the nearest answer with each label, see
+            `label_distances`, `ContactClassifier.slopes_` and `edge.model.agreement`.
         nearest: (m,) distance of the nearest trial.
     """
 
@@ -179,14 +206,17 @@ class ContactClassifier:
     Attributes:
         spaces_: {task: Space}.
         columns_: {space: the columns of the vectors that it takes, rising}.
-        projections_: {space: Projection}, with the components of the task that has most.
+        projections_: {space: Projection}, with the components of the task that has
+            most.
         n_trials_: how many there are.
         members_: {space: (m,) the trials that it was fitted on, rising}.
         rows_: {space: (m, c)} these trials, projected.
         classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
         components_: {task: components kept}, at most as many as there are.
-        slopes_: {task: by how much the log odds of a label change with its `label_distances`}.
-        products_: {task: its factors} of the tasks decided together; see `edge.model.agreement`.
+        slopes_: {task: by how much the log odds of a label change with its
+            `label_distances`}.
+        products_: {task: its factors} of the tasks decided together; see
+            `edge.model.agreement`.
     """
 
     def __init__(
@@ -206,7 +236,8 @@ class ContactClassifier:
         own: NDArray[np.bool_] | None = None,
         complete: bool = True,
     ) -> ContactClassifier:
-        """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for it.
+        """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
+        it.
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
@@ -225,28 +256,39 @@ class ContactClassifier:
             if not 1 <= choice.k <= n:
                 raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
             if choice.components < 1:
-                raise InputError(f"components must be at least 1, not {choice.components}")
+                raise InputError(
+                    f"components must be at least 1, not {choice.components}"
+                )
         widths = widths_of(X.shape[1], self.features, self.widths)
         self.columns_ = {
             self.spaces_[task]: columns_of(choice.features, self.features, widths)
             for task, choice in self.choices.items()
         }
         self.projections_ = {
-            space: self._projection(space, widths, X, y, np.repeat(np.arange(len(X)), each))
+            space: self._projection(
+                space, widths, X, y, np.repeat(np.arange(len(X)), each)
+            )
             for space, each in counts.items()
         }
         self.members_ = {space: np.flatnonzero(each) for space, each in counts.items()}
-        self.rows_ = {s: self.project(s, X[members]) for s, members in self.members_.items()}
+        self.rows_ = {
+            s: self.project(s, X[members]) for s, members in self.members_.items()
+        }
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
         for task, choice in self.choices.items():
             labels = y[task][self.members_[self.spaces_[task]]]
-            self.classes_[task], self.labels_[task] = np.unique(labels, return_inverse=True)
+            self.classes_[task], self.labels_[task] = np.unique(
+                labels, return_inverse=True
+            )
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
         if complete:
-            used = {t: np.where(counts[space] > 0, y[t], "") for t, space in self.spaces_.items()}
+            used = {
+                t: np.where(counts[space] > 0, y[t], "")
+                for t, space in self.spaces_.items()
+            }
             self.products_ = factors_of(used)
             self.slopes_ = self._slopes(X, y, own)
         return self
@@ -256,10 +298,13 @@ class ContactClassifier:
     ) -> dict[str, float]:
         """`slopes_`, from the distances of trials by fits without their fold.
 
-        Distances between training trials would not do. Discriminants of many features with little
-        shrinkage draw the trials of a label up to a hundred times closer together than new ones.
+        Distances between training trials would not do. Discriminants of many features
+        with little shrinkage draw the trials of a label up to a hundred times closer
+        together than new ones.
         """
-        measured = np.lexsort([y[task] for task in sorted(y)])[:: -(-len(X) // MOST_MEASURED)]
+        measured = np.lexsort([y[task] for task in sorted(y)])[
+            :: -(-len(X) // MOST_MEASURED)
+        ]
         X, y = X[measured], {task: labels[measured] for task, labels in y.items()}
         own = None if own is None else own[measured]
         folds = np.arange(len(X)) % SLOPE_FOLDS
@@ -276,7 +321,9 @@ class ContactClassifier:
                 met = new & used & np.isin(y[task], classes)
                 if len(classes) > 1:
                     squares = model.squares(task, X[met])
-                    distances = label_distances(squares, model.labels_[task], len(classes))
+                    distances = label_distances(
+                        squares, model.labels_[task], len(classes)
+                    )
                     labels = classes.searchsorted(y[task][met])[:, None]
                     right = np.take_along_axis(distances, labels, axis=1)[:, 0]
                     np.put_along_axis(distances, labels, np.inf, axis=1)
@@ -291,7 +338,8 @@ class ContactClassifier:
         y: Labels,
         trials: NDArray[np.int64],
     ) -> Projection:
-        """The projection of a space, fitted on some trials, of which one may be there often."""
+        """The projection of a space, fitted on some trials, of which one may be there
+        often."""
         tasks = [task for task, own in self.spaces_.items() if own == space]
         choice = self.choices[tasks[0]]
         names, own_widths = types_of(choice.features, self.features, widths)
@@ -304,7 +352,9 @@ class ContactClassifier:
             own_widths,
         ).fit(
             X[trials][:, self.columns_[space]],
-            np.column_stack([y[target][trials] for target in choice.targets or tasks[:1]]),
+            np.column_stack(
+                [y[target][trials] for target in choice.targets or tasks[:1]]
+            ),
         )
 
     def project(self, space: Space, X: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -312,9 +362,12 @@ class ContactClassifier:
         return self.projections_[space].transform(X[:, self.columns_[space]])
 
     def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, members) squared distances of vectors (m, p) to the trials of the task's space."""
+        """(m, members) squared distances of vectors (m, p) to the trials of the task's
+        space."""
         space, c = self.spaces_[task], self.components_[task]
-        return squared_distances(self.project(space, X)[:, :c], self.rows_[space][:, :c])
+        return squared_distances(
+            self.project(space, X)[:, :c], self.rows_[space][:, :c]
+        )
 
     def neighbours(
         self, task: str, X: NDArray[np.float64]
@@ -326,11 +379,13 @@ class ContactClassifier:
         return distances, self.members_[self.spaces_[task]][near]
 
     def nearest(self, task: str, squares: NDArray[np.float64]) -> NDArray[np.int64]:
-        """(m, k) places of the smallest squares (m, members); of equal ones the first."""
+        """(m, k) places of the smallest squares (m, members); of equal ones the
+        first."""
         return np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
 
     def decide(self, X: NDArray[np.float64]) -> dict[str, Decided]:
-        """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the graph's votes."""
+        """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
+        graph's votes."""
         labels, distances, nearest = {}, {}, {}
         for task, known in self.labels_.items():
             squares = self.squares(task, X)
@@ -342,13 +397,17 @@ class ContactClassifier:
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
             distances |= nearest_answers
-        return {task: Decided(labels[task], distances[task], nearest[task]) for task in labels}
+        return {
+            task: Decided(labels[task], distances[task], nearest[task])
+            for task in labels
+        }
 
 
 def columns_of(
     wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
 ) -> NDArray[np.int64]:
-    """The columns of vectors of `features` that hold the `wanted` ones, rising; all if empty."""
+    """The columns of vectors of `features` that hold the `wanted` ones, rising; all if
+    empty."""
     taken = [not wanted or name in wanted for name in features]
     return np.flatnonzero(np.repeat(taken, widths))
 
@@ -356,6 +415,11 @@ def columns_of(
 def types_of(
     wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
 ) -> tuple[list[str], list[int]]:
-    """Names and widths of the `wanted` among the features, in their order; all if empty."""
-    taken = [(f, w) for f, w in zip(features, widths, strict=True) if not wanted or f in wanted]
+    """Names and widths of the `wanted` among the features, in their order; all if
+    empty."""
+    taken = [
+        (f, w)
+        for f, w in zip(features, widths, strict=True)
+        if not wanted or f in wanted
+    ]
     return [name for name, _ in taken], [width for _, width in taken]

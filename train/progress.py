@@ -18,5 +18,10 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
         options: of tqdm.
     """
     if not sys.stderr.isatty():
-        options = {"delay": LOG_S, "mininterval": LOG_S, "maxinterval": LOG_S, **options}
+        options = {
+            "delay": LOG_S,
+            "mininterval": LOG_S,
+            "maxinterval": LOG_S,
+            **options,
+        }
     return tqdm(iterable, **options)

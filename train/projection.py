@@ -1,8 +1,8 @@
 """Projection of scaled feature vectors to a few whole-number coordinates.
 
-After the scaling, all arithmetic is in whole numbers that float64 holds exactly. So every machine
-and every engine gives the same bits, whatever the order of summation. `export/build.py` turns a
-fitted `Projection` into ONNX operators.
+After the scaling, all arithmetic is in whole numbers that float64 holds exactly. So
+every machine and every engine gives the same bits, whatever the order of summation.
+`export/build.py` turns a fitted `Projection` into ONNX operators.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from train.scaling import centred_and_scaled, column_means
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""
 RANGE = 4
-"""A query's differences are clipped at `RANGE` times 2^`FEATURE_BITS` steps. This is 4 to 8 times
-the largest difference in training."""
+"""A query's differences are clipped at `RANGE` times 2^`FEATURE_BITS` steps. This is 4
+to 8 times the largest difference in training."""
 MOST_STEPS = RANGE * 2.0**FEATURE_BITS
 WEIGHT_BITS = 24
 """Most bits of the largest weight; float32 holds such weights exactly."""
@@ -33,18 +33,21 @@ COORDINATE_BITS = 22
 EXACT_BITS = 53
 """Whole numbers up to 2^`EXACT_BITS` are exact in float64."""
 FEWEST_UNITS = 256
-"""Smallest median distance from a training row to its nearest other, in units of the coordinates'
-grid. Below it, one row far outside leaves too few steps to separate the others."""
+"""Smallest median distance from a training row to its nearest other, in units of the
+coordinates' grid. Below it, one row far outside leaves too few steps to separate the
+others."""
 CLOSE_EIGENVALUES = 1e-6
 """Relative gap below which two eigenvalues count as equal."""
 WELL_CONDITIONED = 1e-8
-"""Smallest share of the largest variance for which an eigenvector of a covariance is trusted."""
+"""Smallest share of the largest variance for which an eigenvector of a covariance is
+trusted."""
 SAME_SIZE = 1e-6
 """Relative difference below which two entries of an axis count as equally large."""
 KINDS = ("pca", "lda")
 """Principal components, and discriminants."""
 NO_DISTANCE = 1e-6
-"""Separation of the classes along a direction, as a share of the spread, that may be rounding."""
+"""Separation of the classes along a direction, as a share of the spread, that may be
+rounding."""
 
 
 def _centred(
@@ -54,7 +57,9 @@ def _centred(
     mean = column_means(X)
     centred = X - mean
     # In a constant column only the rounding of its mean is left.
-    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(axis=0)
+    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(
+        axis=0
+    )
     # The mean of a large offset is rounded, which would leave a constant in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
@@ -62,9 +67,12 @@ def _centred(
 
 
 def _signs(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(c,) the sign of each axis' largest entry; the first of nearly equal entries counts."""
+    """(c,) the sign of each axis' largest entry; the first of nearly equal entries
+    counts."""
     sizes = np.abs(axes)
-    top = np.argmax(sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True), axis=1)
+    top = np.argmax(
+        sizes >= (1.0 - SAME_SIZE) * sizes.max(axis=1, keepdims=True), axis=1
+    )
     return np.asarray(np.sign(axes[np.arange(len(axes)), top]))
 
 
@@ -73,9 +81,10 @@ def principal_axes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Mean, components and singular values of X (n, p), as many as its numerical rank.
 
-    They come from a full singular value decomposition in float64, which keeps small singular
-    values that a covariance loses. Each component's largest entry is made positive, so that files
-    are the same everywhere. Of entries that differ only by rounding, the first counts.
+    They come from a full singular value decomposition in float64, which keeps small
+    singular values that a covariance loses. Each component's largest entry is made
+    positive, so that files are the same everywhere. Of entries that differ only by
+    rounding, the first counts.
 
     Returns:
         (p,), (rank, p) and (rank,), the largest singular value first.
@@ -91,10 +100,11 @@ def principal_axes(
 
 
 class Spectrum:
-    """Principal axes and discriminants of rows, for any number of axes, shrinkage and labels.
+    """Principal axes and discriminants of rows, for any number of axes, shrinkage and
+    labels.
 
-    They are derived from the eigenvectors of the scatter (p, p) or of its dual (n, n), whichever
-    is smaller. These are accurate to 1e-16 of the largest eigenvalue.
+    They are derived from the eigenvectors of the scatter (p, p) or of its dual (n, n),
+    whichever is smaller. These are accurate to 1e-16 of the largest eigenvalue.
 
     Args:
         X: (n, p) rows.
@@ -126,7 +136,8 @@ class Spectrum:
         return np.asarray(self.rows.T @ (self._vectors @ over))
 
     def scores_of(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, r) coordinates along the eigenvectors of rows (m, p), which are centred already."""
+        """(m, r) coordinates along the eigenvectors of rows (m, p), which are centred
+        already."""
         if not self._dual:
             return np.asarray(rows @ self._vectors)
         return np.asarray((rows @ self.rows.T) @ (self._vectors / np.sqrt(self.values)))
@@ -134,11 +145,12 @@ class Spectrum:
     def leading(self, count: int) -> NDArray[np.float64]:
         """(c, p) the first principal axes up to sign, faster than by `principal_axes`.
 
-        The fast way is taken if the last axis has more than `WELL_CONDITIONED` of the first one's
-        variance, and no two eigenvalues are closer than `CLOSE_EIGENVALUES`. Let g be an axis'
-        share of the largest variance times the relative gap of its eigenvalue. The axis is accurate
-        to about 1e-16 / g. With g of 1e-4 or more, coordinates along these axes have the bits of a
-        `Projection`; with less, few of them differ, by one unit of the grid. Otherwise
+        The fast way is taken if the last axis has more than `WELL_CONDITIONED` of the
+        first one's variance, and no two eigenvalues are closer than
+        `CLOSE_EIGENVALUES`. Let g be an axis' share of the largest variance times the
+        relative gap of its eigenvalue. The axis is accurate to about 1e-16 / g. With g
+        of 1e-4 or more, coordinates along these axes have the bits of a `Projection`;
+        with less, few of them differ, by one unit of the grid. Otherwise
         `principal_axes` gives the very axes of a `Projection`.
         """
         top = self.values[: count + 1]
@@ -151,16 +163,19 @@ class Spectrum:
             return np.ascontiguousarray(self._lift(np.eye(len(self.values), count)).T)
         return principal_axes(self._given)[1][:count]
 
-    def discriminants(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
+    def discriminants(
+        self, labels: NDArray[np.int64], shrinkage: float
+    ) -> NDArray[np.float64]:
         """(p, c) the directions that separate the classes, at most classes - 1.
 
-        They are the eigenvectors of (W + s I)^-1 B, where W and B are the within-class and
-        between-class scatter and s is `shrinkage` times the mean squared length of the centred
-        rows. Each is scaled to a shrunk variance of 1 within the classes (Fisher's discriminant
-        with a ridge; Friedman, Regularized discriminant analysis, 1989). The matrix
-        (W + B + s I)^-1 B has the same eigenvectors, and its inverse is a division along the
-        eigenvectors of the scatter. As W is never inverted, the classes may have one trial each,
-        trials may be equal, and there may be more columns than trials.
+        They are the eigenvectors of (W + s I)^-1 B, where W and B are the within-class
+        and between-class scatter and s is `shrinkage` times the mean squared length of
+        the centred rows. Each is scaled to a shrunk variance of 1 within the classes
+        (Fisher's discriminant with a ridge; Friedman, Regularized discriminant
+        analysis, 1989). The matrix (W + B + s I)^-1 B has the same eigenvectors, and
+        its inverse is a division along the eigenvectors of the scatter. As W is never
+        inverted, the classes may have one trial each, trials may be equal, and there
+        may be more columns than trials.
 
         Args:
             labels: (n,) class indices.
@@ -172,8 +187,11 @@ class Spectrum:
         weights = self._lift(self.directions(labels, shrinkage))
         return np.asarray(weights * _signs(weights.T))
 
-    def directions(self, labels: NDArray[np.int64], shrinkage: float) -> NDArray[np.float64]:
-        """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by `scores`."""
+    def directions(
+        self, labels: NDArray[np.int64], shrinkage: float
+    ) -> NDArray[np.float64]:
+        """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by
+        `scores`."""
         if not shrinkage > 0.0:
             raise InputError(f"the shrinkage of lda must be above 0, not {shrinkage:g}")
         n = len(labels)
@@ -197,10 +215,10 @@ class Spectrum:
 def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights (p, c) rounded to whole multiples of one power of two.
 
-    The absolute multiples of a column add up to less than 2^29, since by Cauchy and Schwarz their
-    sum is at most sqrt(p) times the column's length. So their products with features of up to
-    `MOST_STEPS` = 2^24 add up to less than 2^53, which is exact. Principal components have length
-    1, so their grid does not depend on their number.
+    The absolute multiples of a column add up to less than 2^29, since by Cauchy and
+    Schwarz their sum is at most sqrt(p) times the column's length. So their products
+    with features of up to `MOST_STEPS` = 2^24 add up to less than 2^53, which is exact.
+    Principal components have length 1, so their grid does not depend on their number.
     """
     p = max(len(weights), 1)
     most = 2.0**EXACT_BITS / MOST_STEPS
@@ -217,9 +235,9 @@ def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
 def coordinate_bits(components: int) -> int:
     """Bits of coordinates whose squared distances stay below 2^`EXACT_BITS`.
 
-    A training row b is at most 2^bits long, and each of a query's c coordinates q is clipped at
-    2^(bits + 1). So (|b| + |q|)^2 <= (1 + 2 sqrt(c))^2 2^(2 bits). One percent is added for the
-    rounding of b.
+    A training row b is at most 2^bits long, and each of a query's c coordinates q is
+    clipped at 2^(bits + 1). So (|b| + |q|)^2 <= (1 + 2 sqrt(c))^2 2^(2 bits). One
+    percent is added for the rounding of b.
     """
     spread = 1.01 * (1.0 + 2.0 * np.sqrt(components)) ** 2
     return min(COORDINATE_BITS, int((EXACT_BITS - np.log2(spread)) / 2.0))
@@ -246,21 +264,26 @@ class Grid:
 
     @classmethod
     def of(
-        cls, d: NDArray[np.float64], components: int, projected: NDArray[np.float64] | None = None
+        cls,
+        d: NDArray[np.float64],
+        components: int,
+        projected: NDArray[np.float64] | None = None,
     ) -> Grid:
         """The grid for training rows.
 
         Args:
             d: (n, p) their scaled differences from the mean.
             components: number of coordinates.
-            projected: (n, c) their coordinates; None for principal components, along which
-                rows are at most as long as d, whatever the number of components.
+            projected: (n, c) their coordinates; None for principal components, along
+                which rows are at most as long as d, whatever the number of components.
         """
         largest, bits = float(np.abs(d).max(initial=0.0)), coordinate_bits(components)
         rows = d if projected is None else projected
         longest = float(np.sqrt((rows**2).sum(axis=1)).max(initial=0.0))
         return cls(
-            _power_of_two(largest) * 2.0**-FEATURE_BITS, _power_of_two(longest) * 2.0**-bits, bits
+            _power_of_two(largest) * 2.0**-FEATURE_BITS,
+            _power_of_two(longest) * 2.0**-bits,
+            bits,
         )
 
     @property
@@ -268,8 +291,11 @@ class Grid:
         """The limit, in units, at which a query's coordinates are clipped."""
         return float(2.0 ** (self.bits + 1))
 
-    def project(self, d: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates (n, c), multiples of `unit`, of differences (n, p) by weights of `on_grid`.
+    def project(
+        self, d: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Coordinates (n, c), multiples of `unit`, of differences (n, p) by weights of
+        `on_grid`.
 
         Differences and coordinates outside the training set's reach are clipped.
         """
@@ -279,20 +305,21 @@ class Grid:
 
 
 class Projection(TransformerMixin, BaseEstimator):
-    """A few whole-number coordinates of feature vectors, the same bits on every machine.
+    """A few whole-number coordinates of feature vectors, the same bits on every
+    machine.
 
-    Each column's mean is subtracted, and the difference is multiplied by its feature type's gain,
-    rounded to 22 bits and multiplied by weights of at most 24 bits. The sums are exact, and are
-    rounded to 22 bits (`Grid`, `on_grid`). The directions are principal components, or the
-    discriminants of the labels (`Spectrum.discriminants`).
+    Each column's mean is subtracted, and the difference is multiplied by its feature
+    type's gain, rounded to 22 bits and multiplied by weights of at most 24 bits. The
+    sums are exact, and are rounded to 22 bits (`Grid`, `on_grid`). The directions are
+    principal components, or the discriminants of the labels (`Spectrum.discriminants`).
 
-    Two vectors that differ by less than a step, about 1e-6 of a deviation, may get the same
-    coordinates. A vector far outside the training set's reach is clipped.
+    Two vectors that differ by less than a step, about 1e-6 of a deviation, may get the
+    same coordinates. A vector far outside the training set's reach is clipped.
 
     Args:
         scaling: one of `train.scaling.SCALINGS`.
-        components: most coordinates to keep. There are no more of them than the numerical rank,
-            nor, with `lda`, than one less than the classes.
+        components: most coordinates to keep. There are no more of them than the
+            numerical rank, nor, with `lda`, than one less than the classes.
         features: names of the feature types, in the order of X.
         kind: one of `KINDS`.
         shrinkage: of the within-class scatter, above 0; only `lda` uses it.
@@ -304,8 +331,8 @@ class Projection(TransformerMixin, BaseEstimator):
         grid_: the steps of features and coordinates.
         weights_: (p, c), from `on_grid`.
         rank_: the largest possible number of coordinates.
-        gap_: the smallest relative gap between successive squared singular values, up to c; 1 for
-            `lda`.
+        gap_: the smallest relative gap between successive squared singular values, up
+            to c; 1 for `lda`.
     """
 
     def __init__(
@@ -330,12 +357,14 @@ class Projection(TransformerMixin, BaseEstimator):
         The discriminants of several tasks are put side by side.
 
         Raises:
-            InputError: the features are too large or too small for distances, the kind is
-                unknown, or `lda` has no labels or a shrinkage that is not above 0.
+            InputError: the features are too large or too small for distances, the kind
+                is unknown, or `lda` has no labels or a shrinkage that is not above 0.
         """
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]
-        self.mean_, self.gain_, d = centred_and_scaled(X, self.scaling, self.features, self.widths)
+        self.mean_, self.gain_, d = centred_and_scaled(
+            X, self.scaling, self.features, self.widths
+        )
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]
         self.weights_ = on_grid(axes[:, : self.components])
@@ -353,13 +382,17 @@ class Projection(TransformerMixin, BaseEstimator):
             gaps = 1.0 - squares[1:] / squares[:-1]
             return axes.T, float(gaps[: self.components].min(initial=1.0))
         if self.kind != "lda":
-            raise InputError(f"the projection must be one of {', '.join(KINDS)}, not {self.kind!r}")
+            raise InputError(
+                f"the projection must be one of {', '.join(KINDS)}, not {self.kind!r}"
+            )
         if y is None:
             raise InputError("the projection lda needs labels; use pca without them")
         spectrum = Spectrum(d)
         targets = np.asarray(y).reshape(len(d), -1).T
         labels = [np.unique(target, return_inverse=True)[1] for target in targets]
-        weights = [spectrum.discriminants(classes, self.shrinkage) for classes in labels]
+        weights = [
+            spectrum.discriminants(classes, self.shrinkage) for classes in labels
+        ]
         return np.hstack(weights), 1.0
 
     def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:

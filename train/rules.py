@@ -1,26 +1,28 @@
 """Stopping rules, certified by learn-then-test.
 
-A rule decides at the first decision point whose confidence reaches a threshold, or always at one
-window. Its error rate is bounded by learn-then-test (Angelopoulos, Bates, Candès,
-Jordan and Lei, 2021). The hypothesis that a rule errs more often than `error` is rejected by the
-exact binomial test on the calibration trials, at a level of `TEST_SHARE` times `RISK`. The first
-hypothesis is that of the full window. If it is rejected, its level passes in equal parts to the two
-families of rules. Each family is walked from the most careful rule to the boldest until a test
-fails (fixed-sequence testing within a graph: Bretz, Maurer, Brannath and Posch, 2009). The tests
-are monotone in `error`. So a rule's certified error is the largest upper confidence limit met on
-the way to it, and one table of rules serves every `error`. The confidences for the tests of a
-fold's trials come from a logistic regression on the other folds.
+A rule decides at the first decision point whose confidence reaches a threshold, or
+always at one window. Its error rate is bounded by learn-then-test (Angelopoulos, Bates,
+Candès, Jordan and Lei, 2021). The hypothesis that a rule errs more often than `error`
+is rejected by the exact binomial test on the calibration trials, at a level of
+`TEST_SHARE` times `RISK`. The first hypothesis is that of the full window. If it is
+rejected, its level passes in equal parts to the two families of rules. Each family is
+walked from the most careful rule to the boldest until a test fails (fixed-sequence
+testing within a graph: Bretz, Maurer, Brannath and Posch, 2009). The tests are monotone
+in `error`. So a rule's certified error is the largest upper confidence limit met on the
+way to it, and one table of rules serves every `error`. The confidences for the tests of
+a fold's trials come from a logistic regression on the other folds.
 
-Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when each is sure,
-their product when both are, and the tests count the product's errors. Below the smallest error that
-is certified for the product, each factor has rules of its own.
+Tasks that agree (`edge.model.agreement`) have one rule: the factors are decided when
+each is sure, their product when both are, and the tests count the product's errors.
+Below the smallest error that is certified for the product, each factor has rules of its
+own.
 
-The tests are exact for the average of the folds' models. The exported model is fitted on all
-trials, a tenth (or a fifth) more, with its own choice of settings. On average it errs a little less
-often, in a single case more or less often. On 200 data sets of 140 trials the two differ by a
-quarter to a third more than the binomial distribution explains. With the full risk for the tests,
-the smallest certified error was exceeded in 14 to 22 of 100 sets instead of ten, so they take half
-of it. `make risk` counts it.
+The tests are exact for the average of the folds' models. The exported model is fitted
+on all trials, a tenth (or a fifth) more, with its own choice of settings. On average it
+errs a little less often, in a single case more or less often. On 200 data sets of 140
+trials the two differ by a quarter to a third more than the binomial distribution
+explains. With the full risk for the tests, the smallest certified error was exceeded in
+14 to 22 of 100 sets instead of ten, so they take half of it. `make risk` counts it.
 """
 
 from collections.abc import Sequence
@@ -42,8 +44,13 @@ NEVER = 2.0
 
 
 def upper_limit(wrong: int, trials: int, level: float) -> float:
-    """The largest error rate that `wrong` of `trials` does not reject at a level (exact)."""
-    return 1.0 if wrong >= trials else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
+    """The largest error rate that `wrong` of `trials` does not reject at a level
+    (exact)."""
+    return (
+        1.0
+        if wrong >= trials
+        else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
+    )
 
 
 def stops(
@@ -54,7 +61,8 @@ def stops(
     Args:
         confidence: (points, n) that the labels are right, by the curve of all points.
         rule: the rule.
-        unknown: (points, n) whether the contact is unlike all trained ones, and so waits.
+        unknown: (points, n) whether the contact is unlike all trained ones, and so
+            waits.
     """
     decides = (confidence >= rule.confidence) & ~unknown
     decides[rule.last :] = ~unknown[rule.last :]
@@ -67,9 +75,9 @@ class Course:
     """The answers of a task at each decision point, and how sure they are.
 
     Attributes:
-        confidences: (decision points, n) of each part, by its curve of all points. The parts of a
-            product are its two factors, and it is decided when both are; any other task is its only
-            part.
+        confidences: (decision points, n) of each part, by its curve of all points. The
+            parts of a product are its two factors, and it is decided when both are; any
+            other task is its only part.
         wrong: (decision points, n) of each part.
         unknown: (decision points, n) whether the contact is unlike all trained ones.
         withheld: whether the task names nothing for an unknown contact.
@@ -81,16 +89,20 @@ class Course:
     withheld: bool = False
 
     def under(self, rule: StoppingRule) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """(n,) the decision point at which a rule decides, and whether the answer is wrong."""
+        """(n,) the decision point at which a rule decides, and whether the answer is
+        wrong."""
         every = np.arange(self.unknown.shape[1])
         at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
         last = np.max(at, axis=0)
         by_part = [wrong[own, every] for wrong, own in zip(self.wrong, at, strict=True)]
-        return last, np.any([*by_part, self.unknown[last, every] & self.withheld], axis=0)
+        return last, np.any(
+            [*by_part, self.unknown[last, every] & self.withheld], axis=0
+        )
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
-    """The full window's rule, and two families, each from the most careful to the boldest."""
+    """The full window's rule, and two families, each from the most careful to the
+    boldest."""
     full = StoppingRule(1.0, 0.0, NEVER, points - 1)
     sure = [StoppingRule(1.0, 0.0, float(c), points - 1) for c in THRESHOLDS]
     fixed = [StoppingRule(1.0, 0.0, NEVER, last) for last in range(points - 2, -1, -1)]
@@ -100,7 +112,8 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
 def certify(
     course: Course, seconds: NDArray[np.float64], level: float = TEST_SHARE * RISK
 ) -> list[StoppingRule]:
-    """The rules that no other rule beats in both certified error and mean time, the safest first.
+    """The rules that no other rule beats in both certified error and mean time, the
+    safest first.
 
     Args:
         course: of the task, on the calibration trials.
@@ -137,12 +150,14 @@ def following(
     course: Course,
     seconds: NDArray[np.float64],
 ) -> list[StoppingRule]:
-    """The rules of a factor: those of its product, and before them its own that err less often.
+    """The rules of a factor: those of its product, and before them its own that err
+    less often.
 
     A factor is wrong only where its product is, so it may follow the product's rules.
     """
     stricter = [rule for rule in own if rule.error < product[0].error]
     followed = [
-        replace(rule, mean_s=float(seconds[course.under(rule)[0]].mean())) for rule in product
+        replace(rule, mean_s=float(seconds[course.under(rule)[0]].mean()))
+        for rule in product
     ]
     return [*stricter, *followed]

@@ -12,7 +12,8 @@ from edge.touch.measures import feature
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
-"""Sizes of scaled features whose grid steps and squares are ordinary float64 numbers."""
+"""Sizes of scaled features whose grid steps and squares are ordinary float64
+numbers."""
 
 
 def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -63,16 +64,18 @@ def scale_of(
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
-    """Gain of each feature type. The methods' offsets are left out, as centring takes them away.
+    """Gain of each feature type. The methods' offsets are left out, as centring takes
+    them away.
 
-    The statistics are over all samples of a feature type in all trials (paper, section IV-D),
-    not over columns. Where a maximum or a standard deviation is 0 the type is dropped (gain 0):
-    it was constant in training and must not dominate when it moves.
+    The statistics are over all samples of a feature type in all trials (paper, section
+    IV-D), not over columns. Where a maximum or a standard deviation is 0 the type is
+    dropped (gain 0): it was constant in training and must not dominate when it moves.
 
     Args:
         X: (n, p).
-        method: one of `SCALINGS`. Method V brings contact_motion to the range of max_force and
-            contact_area and leaves all else alone; without them it is no scaling.
+        method: one of `SCALINGS`. Method V brings contact_motion to the range of
+            max_force and contact_area and leaves all else alone; without them it is no
+            scaling.
         features: names of the types, in the order of X.
         widths: columns of each; equal where None.
 
@@ -86,7 +89,9 @@ def scale_of(
     if method in ("none", "III"):
         return np.ones(types)
     starts = np.cumsum(sizes) - sizes
-    powers = np.frexp(np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts))[1]
+    powers = np.frexp(np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts))[
+        1
+    ]
     small = np.ldexp(X, -np.repeat(powers, sizes))
     means = small.mean(axis=0)
     largest = np.maximum.reduceat(np.abs(small).max(axis=0, initial=0.0), starts)
@@ -99,11 +104,13 @@ def scale_of(
     if method in ("I", "II"):
         return inverse(largest)
     if method == "IV":
-        # Each cell or joint has a level of its own, which says nothing about a trial: a wide
-        # feature deviates from each column's mean.
+        # Each cell or joint has a level of its own, which says nothing about a trial: a
+        # wide feature deviates from each column's mean.
         wide = np.repeat([feature(name).wide for name in features], sizes)
         of_type = np.add.reduceat(means, starts) / sizes
-        squares = ((small - np.where(wide, means, np.repeat(of_type, sizes))) ** 2).mean(axis=0)
+        squares = (
+            (small - np.where(wide, means, np.repeat(of_type, sizes))) ** 2
+        ).mean(axis=0)
         deviation = np.sqrt(np.add.reduceat(squares, starts) / sizes)
         # A spread below the rounding of its own mean is no spread.
         deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
@@ -111,7 +118,9 @@ def scale_of(
     if method == "V":
         gain = np.ones(types)
         magnitudes = np.ldexp(largest, powers)
-        ranges = [magnitudes[i] for i, name in enumerate(features) if name in FEATURES[:2]]
+        ranges = [
+            magnitudes[i] for i, name in enumerate(features) if name in FEATURES[:2]
+        ]
         if ranges and FEATURES[2] in features:
             motion = list(features).index(FEATURES[2])
             gain[motion] = max(ranges) * inverse(largest)[motion]
@@ -127,13 +136,14 @@ def centred_and_scaled(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Mean (p,) and gain (p,) of each column of X (n, p), and (X - mean) * gain (n, p).
 
-    A scaling shifts each type by a constant, which centring takes away again: the mean is
-    subtracted from the features themselves, where it loses nothing. See `scale_of`.
+    A scaling shifts each type by a constant, which centring takes away again: the mean
+    is subtracted from the features themselves, where it loses nothing. See `scale_of`.
 
     Raises:
         InputError: the scale is beyond what distances hold.
     """
-    # The order in memory decides the order of sums, and so which of equal axes is taken.
+    # The order in memory decides the order of sums, and so which of equal axes is
+    # taken.
     X = np.ascontiguousarray(X, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         mean = column_means(X)

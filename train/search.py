@@ -1,4 +1,5 @@
-"""Settings that share a decomposition of features, and the neighbours that each of them finds."""
+"""Settings that share a decomposition of features, and the neighbours that each of them
+finds."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +30,8 @@ class SearchGrid:
         most_directions: of `lda`, those that separate best first; all where None.
         shrinkages: of `lda`, the largest first.
         neighbours: values of k, rising.
-        targets: tasks whose discriminants `lda` sets side by side; the task itself where empty.
+        targets: tasks whose discriminants `lda` sets side by side; the task itself
+            where empty.
         tasks: the tasks it is a candidate for; all where empty.
         weights: of simulated trials and the owner's, see `train.pipeline.Choice`.
     """
@@ -58,24 +60,36 @@ class SearchGrid:
             cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
         return [
             Choice(
-                self.scaling, c, k, self.projection, s, self.features, self.targets, self.weights
+                self.scaling,
+                c,
+                k,
+                self.projection,
+                s,
+                self.features,
+                self.targets,
+                self.weights,
             )
             for c, s in cells
             for k in self.neighbours
         ]
 
 
-def _nearest(known: NDArray[np.float64], tested: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in their order.
+def _nearest(
+    known: NDArray[np.float64], tested: NDArray[np.float64], k: int
+) -> NDArray[np.int64]:
+    """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in
+    their order.
 
-    Which of several equal ones is the last of the k is left open. The coordinates are whole
-    numbers, whose squared distances are exact. scikit-learn never holds all (m, n) of them and is
-    fast for many, but it checks its input for longer than a few take.
+    Which of several equal ones is the last of the k is left open. The coordinates are
+    whole numbers, whose squared distances are exact. scikit-learn never holds all (m,
+    n) of them and is fast for many, but it checks its input for longer than a few take.
     """
     if not known.shape[1]:
         return np.tile(np.arange(k), (len(tested), 1))
     if len(known) * len(tested) > MANY:
-        search = NearestNeighbors(n_neighbors=k, algorithm="brute", metric="sqeuclidean").fit(known)
+        search = NearestNeighbors(
+            n_neighbors=k, algorithm="brute", metric="sqeuclidean"
+        ).fit(known)
         squares, rows = search.kneighbors(tested)
     else:
         squares = np.einsum("ij,ij->i", known, known) - 2.0 * (tested @ known.T)
@@ -88,10 +102,12 @@ def _nearest(known: NDArray[np.float64], tested: NDArray[np.float64], k: int) ->
 def _rounded(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coordinates (n, c) and (m, c) in whole steps, so coarse that squared distances are exact.
+    """Coordinates (n, c) and (m, c) in whole steps, so coarse that squared distances
+    are exact.
 
-    A step is 2^-22 of the largest coordinate, or a little more where c is above 128. Equal trials
-    stay equal, though a matrix product may round their coordinates differently.
+    A step is 2^-22 of the largest coordinate, or a little more where c is above 128.
+    Equal trials stay equal, though a matrix product may round their coordinates
+    differently.
     """
     columns = max(a.shape[1], 1)
     bits = (51 - (columns - 1).bit_length()) // 2
@@ -100,12 +116,15 @@ def _rounded(
 
 
 class Decomposition:
-    """Training rows and new ones along principal axes or discriminants, each computed once.
+    """Training rows and new ones along principal axes or discriminants, each computed
+    once.
 
-    The coordinates are those of `train.projection.Projection` but for its rounding of weights.
+    The coordinates are those of `train.projection.Projection` but for its rounding of
+    weights.
 
     Args:
-        rows: (n, p) of training, scaled and centred; a trial that counts twice is there twice.
+        rows: (n, p) of training, scaled and centred; a trial that counts twice is there
+            twice.
         new: (m, p) others, scaled and centred alike.
         labels: {task: (n,) class indices} of the training rows.
         first: (trials,) a row of each trial.
@@ -118,22 +137,38 @@ class Decomposition:
         labels: Mapping[str, NDArray[np.int64]],
         first: NDArray[np.int64],
     ) -> None:
-        self._spectrum, self._new, self._labels, self._first = Spectrum(rows), new, labels, first
+        self._spectrum, self._new, self._labels, self._first = (
+            Spectrum(rows),
+            new,
+            labels,
+            first,
+        )
         self._new_scores: NDArray[np.float64] | None = None
-        self._along: dict[tuple[str, float], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        self._along: dict[
+            tuple[str, float], tuple[NDArray[np.float64], NDArray[np.float64]]
+        ] = {}
 
     def neighbours(self, grid: SearchGrid, task: str) -> NDArray[np.int64]:
-        """(projections, m, k) places among the trials, for each projection of a grid."""
+        """(projections, m, k) places among the trials, for each projection of a
+        grid."""
         k = min(grid.neighbours[-1], len(self._first))
         if grid.projection == "pca":
             axes = self._spectrum.leading(grid.components[-1]).T
-            known, tested = _rounded(self._spectrum.rows[self._first] @ axes, self._new @ axes)
-            return np.stack([_nearest(known[:, :c], tested[:, :c], k) for c in grid.components])
+            known, tested = _rounded(
+                self._spectrum.rows[self._first] @ axes, self._new @ axes
+            )
+            return np.stack(
+                [_nearest(known[:, :c], tested[:, :c], k) for c in grid.components]
+            )
         places = []
         for shrinkage in grid.shrinkages:
-            each = [self._discriminants(target, shrinkage) for target in grid.targets or (task,)]
+            each = [
+                self._discriminants(target, shrinkage)
+                for target in grid.targets or (task,)
+            ]
             coordinates = (
-                np.hstack(some)[:, : grid.most_directions] for some in zip(*each, strict=True)
+                np.hstack(some)[:, : grid.most_directions]
+                for some in zip(*each, strict=True)
             )
             places.append(_nearest(*_rounded(*coordinates), k))
         return np.stack(places)
@@ -141,7 +176,8 @@ class Decomposition:
     def _discriminants(
         self, task: str, shrinkage: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Coordinates (trials, c) and (m, c) along the discriminants of a task's labels."""
+        """Coordinates (trials, c) and (m, c) along the discriminants of a task's
+        labels."""
         if self._new_scores is None:
             self._new_scores = self._spectrum.scores_of(self._new)
         if (task, shrinkage) not in self._along:

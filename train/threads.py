@@ -1,4 +1,5 @@
-"""One thread for linear algebra: on matrices as small as ours several threads are slower."""
+"""One thread for linear algebra: on matrices as small as ours several threads are
+slower."""
 
 from functools import cache
 from typing import Any

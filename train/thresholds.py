@@ -1,4 +1,5 @@
-"""Thresholds: those that a skin's own noise suggests, and lower ones where touches are missed."""
+"""Thresholds: those that a skin's own noise suggests, and lower ones where touches are
+missed."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,7 +13,8 @@ from train.dataset import DataSet, contacts, with_thresholds
 from train.labels import NO_CONTACT
 
 MARGINS = (MARGIN, 1.0)
-"""Ratios of the threshold to the noise: the lower one where touches are missed at the other."""
+"""Ratios of the threshold to the noise: the lower one where touches are missed at the
+other."""
 MISSED_SHARE = 0.02
 """Of the touches, which a proposal may miss."""
 LOWER = (0.5, 0.25, 0.0)
@@ -24,20 +26,25 @@ FEWEST_GAINED = 1.5
 def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
     """Threshold and onset in counts, from the noise before contact.
 
-    The noise is the 90th percentile over the recordings of `edge.touch.thresholds.noise`, so that a
-    few recordings that begin in contact do not raise it. The threshold is twice the noise, or as
-    high as the noise where that misses more of the recordings labelled with a touch.
+    The noise is the 90th percentile over the recordings of
+    `edge.touch.thresholds.noise`, so that a few recordings that begin in contact do not
+    raise it. The threshold is twice the noise, or as high as the noise where that
+    misses more of the recordings labelled with a touch.
     """
     largest = [noise(recording.t, recording.frames) for recording in recordings]
     pairs = [above(float(np.quantile(largest, 0.9)), margin) for margin in MARGINS]
-    labelled = [r for r in recordings if r.labels and NO_CONTACT not in r.labels.values()]
+    labelled = [
+        r for r in recordings if r.labels and NO_CONTACT not in r.labels.values()
+    ]
     if not labelled:
         return pairs[0]
     high, low = (count_contacts(labelled, *pair)[0] for pair in pairs)
     return pairs[high < (1.0 - MISSED_SHARE) * low]
 
 
-def count_contacts(recordings: Sequence[Recording], threshold: int, onset: int) -> tuple[int, int]:
+def count_contacts(
+    recordings: Sequence[Recording], threshold: int, onset: int
+) -> tuple[int, int]:
     """The number of recordings with a contact, and the number of contacts."""
     layout = with_thresholds(recordings[0].layout, threshold, onset)
     counts = []
@@ -48,13 +55,16 @@ def count_contacts(recordings: Sequence[Recording], threshold: int, onset: int) 
 
 
 def chosen(
-    dataset: DataSet, load: Callable[[int, int], DataSet], accuracy: Callable[[DataSet], float]
+    dataset: DataSet,
+    load: Callable[[int, int], DataSet],
+    accuracy: Callable[[DataSet], float],
 ) -> tuple[DataSet, list[str]]:
-    """The data set at the thresholds whose decisions are most accurate, and sentences that say so.
+    """The data set at the thresholds whose decisions are most accurate, and sentences
+    that say so.
 
-    Lower ones are tried where a recording that is labelled with a touch shows none. They are taken
-    where they gain more than a standard error and a single recording, as they find a contact in any
-    noise. Of equally accurate ones the highest are taken.
+    Lower ones are tried where a recording that is labelled with a touch shows none.
+    They are taken where they gain more than a standard error and a single recording, as
+    they find a contact in any noise. Of equally accurate ones the highest are taken.
 
     Args:
         dataset: at the recorded thresholds.
@@ -63,7 +73,9 @@ def chosen(
     """
     unfelt = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
     own = dataset.layout.threshold_counts, dataset.layout.onset
-    levels = dict.fromkeys((round(part * own[0]), round(part * own[1])) for part in LOWER)
+    levels = dict.fromkeys(
+        (round(part * own[0]), round(part * own[1])) for part in LOWER
+    )
     if not unfelt or own[1] == 0:
         return dataset, []
     tried = [dataset, *(load(*level) for level in levels if level != own)]

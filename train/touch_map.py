@@ -42,18 +42,24 @@ class Touch:
 def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
     """A line: the head of a run, or a contact with the one task that was decided."""
     if entry["event"] == "map":
-        return Head(str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"])))
+        return Head(
+            str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"]))
+        )
     x, y, z = map(float, entry["place"])
     onset_s, confidence = float(entry["onset_s"]), float(entry["confidence"])
     if not all(map(math.isfinite, (x, y, z, onset_s, confidence))):
         raise ValueError("not finite")
-    task, label = str(entry["task"]), None if entry["label"] is None else str(entry["label"])
+    task, label = (
+        str(entry["task"]),
+        None if entry["label"] is None else str(entry["label"]),
+    )
     contact = int(entry["contact"])
     return Touch(contact, onset_s, (x, y, z), {task: label}, {task: confidence})
 
 
 class TouchMap:
-    """The contacts of one or more runs in one frame; iterating reads the file line by line."""
+    """The contacts of one or more runs in one frame; iterating reads the file line by
+    line."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Open a map.
@@ -70,7 +76,9 @@ class TouchMap:
     def _lines(self) -> Iterator[tuple[int, Head | Touch]]:
         """Number and content of each complete line."""
         with open_regular(self.path, LARGEST_BYTES) as file:
-            for number, line in enumerate(iter(lambda: file.readline(LONGEST_LINE), b""), 1):
+            for number, line in enumerate(
+                iter(lambda: file.readline(LONGEST_LINE), b""), 1
+            ):
                 try:
                     entry = parse_json(line, self.path)
                 except InputError:

@@ -17,5 +17,6 @@ class Doctests(griffe.Extension):
         """Rewrite an object's docstring as it is collected."""
         if obj.docstring is not None:
             obj.docstring.value = EXAMPLE.sub(
-                lambda example: f"```pycon\n{example[0].rstrip()}\n```\n", obj.docstring.value
+                lambda example: f"```pycon\n{example[0].rstrip()}\n```\n",
+                obj.docstring.value,
             )

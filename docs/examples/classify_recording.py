@@ -1,4 +1,5 @@
-"""Decide on a recording: `python docs/examples/classify_recording.py MODEL RECORDING`."""
+"""Decide on a recording: `python docs/examples/classify_recording.py MODEL
+RECORDING`."""
 
 import sys
 

@@ -1,8 +1,8 @@
 """An I2C bus: its messages, its errors, and Linux's adapter.
 
 The drivers use only the transactions that every adapter carries: `[write]`, `[read]` or
-`[write pointer][read n]` to one chip in one call. Raspberry Pis up to 4 refuse a read anywhere but
-last, the Pi 5 a second address in one call.
+`[write pointer][read n]` to one chip in one call. Raspberry Pis up to 4 refuse a read
+anywhere but last, the Pi 5 a second address in one call.
 """
 
 import ctypes
@@ -25,10 +25,12 @@ from edge.errors import EdgeError
 I2C_TIMEOUT = 0x0702
 """ioctl of linux/i2c-dev.h; its unit is 10 ms, and it applies to the whole adapter."""
 I2C_SLAVE = 0x0703
-"""ioctl that gives EBUSY where a driver of the kernel owns the address; `I2C_RDWR` never does."""
+"""ioctl that gives EBUSY where a driver of the kernel owns the address; `I2C_RDWR`
+never does."""
 I2C_RDWR = 0x0707
 ADAPTERS = Path("/sys/class/i2c-dev")
-"""A folder for each adapter, named as its device and with the adapter's name in the file `name`."""
+"""A folder for each adapter, named as its device and with the adapter's name in the
+file `name`."""
 
 
 class BusError(EdgeError):
@@ -53,7 +55,8 @@ class BusNack(BusError, ConnectionError):
 
 
 class BusFault(BusError, OSError):
-    """The transfer broke off: clock stretched too long, short transfer, wrong channel (EIO)."""
+    """The transfer broke off: clock stretched too long, short transfer, wrong channel
+    (EIO)."""
 
     retries = 2
     remedy = "the transfer broke off; check cable length and pull-ups"
@@ -129,12 +132,15 @@ def bus_error(
     `remedy` replaces the words that end the message.
 
     >>> bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
-    BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout (ETIMEDOUT)')
+    BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout
+    (ETIMEDOUT)')
     """
     code = code or errno.EIO
     kind = ERRORS.get(code, BusFault)
     where = bus if address is None else f"{bus}, address {address:#04x}"
-    error = kind(f"{where}: {remedy or kind.remedy} ({errno.errorcode.get(code, code)})")
+    error = kind(
+        f"{where}: {remedy or kind.remedy} ({errno.errorcode.get(code, code)})"
+    )
     error.errno = code
     return error
 
@@ -156,7 +162,11 @@ def write(address: int, data: bytes | Sequence[int]) -> Message:
 def read(address: int, into: NDArray[np.uint8] | int) -> Message:
     """A message of bytes from a chip, into the given array or a new one."""
     buffer = np.zeros(into, dtype=np.uint8) if isinstance(into, int) else into
-    if buffer.dtype != np.uint8 or not buffer.flags.c_contiguous or not buffer.flags.writeable:
+    if (
+        buffer.dtype != np.uint8
+        or not buffer.flags.c_contiguous
+        or not buffer.flags.writeable
+    ):
         raise ValueError("a read needs a writable, contiguous uint8 array")
     return Message(address, buffer, read=True)
 
@@ -245,7 +255,8 @@ def lock_holder(fd: int) -> str:
 
 
 def find_device(name: str, adapters: Path = ADAPTERS) -> str:
-    """The path of an I2C device: `name` itself if it is a path, else that of the adapter.
+    """The path of an I2C device: `name` itself if it is a path, else that of the
+    adapter.
 
     Args:
         name: a path, or the beginning of an adapter's name.
@@ -256,7 +267,9 @@ def find_device(name: str, adapters: Path = ADAPTERS) -> str:
     """
     if name.startswith("/"):
         return name
-    files = [file for file in adapters.glob("*/name") if file.read_text().startswith(name)]
+    files = [
+        file for file in adapters.glob("*/name") if file.read_text().startswith(name)
+    ]
     if not files:
         raise bus_error(errno.ENOENT, name)
     if len(files) > 1:
@@ -277,19 +290,22 @@ class LinuxBus:
         """Open the bus and set its timeout.
 
         Args:
-            device: `/dev/i2c-1`, or the beginning of the adapter's name, which is looked up
-                whenever the bus is opened: an adapter on USB may come back with another number.
-            timeout_s: how long a hung transfer may last, rounded up to the adapter's 10 ms;
-                the kernel's own default is a second.
+            device: `/dev/i2c-1`, or the beginning of the adapter's name, which is
+                looked up whenever the bus is opened: an adapter on USB may come back
+                with another number.
+            timeout_s: how long a hung transfer may last, rounded up to the adapter's 10
+                ms; the kernel's own default is a second.
 
         Raises:
-            BusError: it does not exist, may not be opened, is in use, or carries no plain I2C.
+            BusError: it does not exist, may not be opened, is in use, or carries no
+                plain I2C.
         """
         self.name, self.timeout_s = device, timeout_s
         self._smbus: Any = None
         self._fd = -1
         self._asked: set[int] = set()
-        """Addresses that no driver of the kernel owned when a transfer was first prepared."""
+        """Addresses that no driver of the kernel owned when a transfer was first
+        prepared."""
         self.reopen()
 
     now = staticmethod(time.monotonic)
@@ -301,7 +317,8 @@ class LinuxBus:
         Two programs that select channels of one mux would read each other's chips.
 
         Raises:
-            BusError: it does not exist, may not be opened, is in use, or carries no plain I2C.
+            BusError: it does not exist, may not be opened, is in use, or carries no
+                plain I2C.
         """
         import smbus2
 
@@ -313,7 +330,9 @@ class LinuxBus:
             if not smbus.funcs & smbus2.I2cFunc.I2C:
                 raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
             flock(smbus.fd, LOCK_EX | LOCK_NB)
-            ioctl(smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)))
+            ioctl(
+                smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9))
+            )
         except BlockingIOError:
             remedy = f"{lock_holder(smbus.fd)} is using the bus; end it first"
             smbus.close()
@@ -342,7 +361,12 @@ class LinuxBus:
             self._asked.add(address)
         char = ctypes.POINTER(ctypes.c_char)
         structures: list[Any] = [
-            i2c_msg(m.address, int(m.read), len(m.buffer), ctypes.cast(m.buffer.ctypes.data, char))
+            i2c_msg(
+                m.address,
+                int(m.read),
+                len(m.buffer),
+                ctypes.cast(m.buffer.ctypes.data, char),
+            )
             for m in messages
         ]
         return Transfer(messages, i2c_rdwr_ioctl_data.create(*structures))
@@ -351,16 +375,19 @@ class LinuxBus:
         """Send it; the interpreter lock is free while it is on the wire.
 
         Raises:
-            BusError: it failed, or the kernel completed fewer messages than it was given.
+            BusError: it failed, or the kernel completed fewer messages than it was
+                given.
         """
         try:
             done = ioctl(self._fd, I2C_RDWR, prepared.handle)
         except (OSError, ValueError) as error:
-            # A closed bus has the file descriptor -1, which ioctl answers with ValueError.
+            # A closed bus has the file descriptor -1, which ioctl answers with
+            # ValueError.
             code = error.errno if isinstance(error, OSError) else errno.ENODEV
             raise bus_error(code, self.name, prepared.messages[0].address) from None
         if done != len(prepared.messages):
-            # The kernel stopped half way without an error, and the buffer holds an older reading.
+            # The kernel stopped half way without an error, and the buffer holds an
+            # older reading.
             raise bus_error(errno.EIO, self.name, prepared.messages[0].address)
 
     def close(self) -> None:

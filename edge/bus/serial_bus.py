@@ -1,9 +1,10 @@
 """A microcontroller on a serial port, with the face of an I2C bus.
 
-Packets carry the registers of `edge.chips.block`, so that its driver runs unchanged. A request is the
-pointer, a tag and their CRC-16; the answer is the tag and the register at the pointer, which ends
-in a CRC-16 of its own. Packets are encoded with COBS (consistent overhead byte stuffing), so that
-a zero byte always ends a packet, wherever reading begins.
+Packets carry the registers of `edge.chips.block`, so that its driver runs unchanged. A
+request is the pointer, a tag and their CRC-16; the answer is the tag and the register
+at the pointer, which ends in a CRC-16 of its own. Packets are encoded with COBS
+(consistent overhead byte stuffing), so that a zero byte always ends a packet, wherever
+reading begins.
 """
 
 import errno
@@ -14,13 +15,24 @@ from typing import Any
 
 import numpy as np
 
-from edge.bus.i2c import BusError, BusFault, BusTimeout, Message, Transfer, bus_error, read, write
-from edge.chips.block import IDENTITY, sealed
+from edge.bus.i2c import (
+    BusError,
+    BusFault,
+    BusTimeout,
+    Message,
+    Transfer,
+    bus_error,
+    read,
+    write,
+)
+from edge.bus.crc import sealed
 from edge.errors import InputError
 
 BOOT_S = 3.0
 """Many boards restart when their port is opened; an Arduino's bootloader takes 2 s."""
 PING_S = 0.1
+IDENTITY = b"\x00"
+"""Pointer of the register that every microcontroller serves, see `edge.chips.block`."""
 LONGEST_PACKET = 16384
 """More bytes than this without a zero are noise."""
 OTHERS = "another program has the port open; close it"
@@ -44,7 +56,9 @@ def encode(data: bytes) -> bytes:
     """
     out = bytearray()
     for run in data.split(b"\0"):
-        while len(run) >= 254:  # as many as one code can announce, without a zero after them
+        while (
+            len(run) >= 254
+        ):  # as many as one code can announce, without a zero after them
             out += b"\xff" + run[:254]
             run = run[254:]
         out += bytes([len(run) + 1]) + run
@@ -71,7 +85,8 @@ def decode(packet: bytes) -> bytes | None:
 
 
 def serial_bits(messages: Sequence[Message]) -> int:
-    """Bits on the line for a request and its answer: 10 per byte, start and stop bit included.
+    """Bits on the line for a request and its answer: 10 per byte, start and stop bit
+    included.
 
     >>> from edge.chips.block import data_bytes
     >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(100, 12))])
@@ -95,7 +110,12 @@ class SerialBus:
     """
 
     def __init__(
-        self, port: str, *, baud: int = 115_200, timeout_s: float = 0.02, boot_s: float = BOOT_S
+        self,
+        port: str,
+        *,
+        baud: int = 115_200,
+        timeout_s: float = 0.02,
+        boot_s: float = BOOT_S,
     ) -> None:
         """Open the port, and wait until the microcontroller answers.
 
@@ -103,7 +123,8 @@ class SerialBus:
             port: such as `/dev/ttyACM0`, `/dev/serial/by-id/...` or `COM3`.
             baud: bits per second; a port over USB ignores it.
             timeout_s: how long an answer may take.
-            boot_s: how long to wait for the first answer; if none comes, that is no error.
+            boot_s: how long to wait for the first answer; if none comes, that is no
+                error.
 
         Raises:
             InputError: pyserial is not installed.
@@ -138,17 +159,25 @@ class SerialBus:
         try:
             import serial
         except ImportError:
-            raise InputError(f"{self.name}: needs pyserial; run `pip install pyserial`") from None
+            raise InputError(
+                f"{self.name}: needs pyserial; run `pip install pyserial`"
+            ) from None
         self._received.clear()
         try:
             if self._port is None:
                 self._port = serial.Serial(
-                    self.name, self.baud, timeout=0, write_timeout=self.timeout_s, exclusive=True
+                    self.name,
+                    self.baud,
+                    timeout=0,
+                    write_timeout=self.timeout_s,
+                    exclusive=True,
                 )
             self._port.reset_input_buffer()
         except (OSError, ValueError) as error:
             self.close()
-            raise serial_error(getattr(error, "errno", None) or errno.ENODEV, self.name) from None
+            raise serial_error(
+                getattr(error, "errno", None) or errno.ENODEV, self.name
+            ) from None
 
     def prepare(self, *messages: Message) -> Transfer:
         """Keep the messages."""
@@ -166,18 +195,22 @@ class SerialBus:
         try:
             answer = self._ask(int(prepared.messages[0].buffer[0]), ends)
         except OSError as error:
-            # Neither a write's timeout nor pyserial's error of a lost port has an errno.
+            # Neither a write's timeout nor pyserial's error of a lost port has an
+            # errno.
             hung = type(error).__name__ == "SerialTimeoutException"
             if not hung:
                 self.close()
-            raise serial_error(errno.ETIMEDOUT if hung else errno.ENODEV, self.name) from None
+            raise serial_error(
+                errno.ETIMEDOUT if hung else errno.ENODEV, self.name
+            ) from None
         if len(answer) != len(prepared.buffer):
             # Noise is a fault, and is read again at once; silence is a timeout.
             raise serial_error(errno.EIO if self._heard else errno.ETIMEDOUT, self.name)
         prepared.buffer[:] = np.frombuffer(answer, dtype=np.uint8)
 
     def _ask(self, pointer: int, ends: float) -> bytes:
-        """The register at a pointer, or nothing if no intact answer comes by the time `ends`."""
+        """The register at a pointer, or nothing if no intact answer comes by the time
+        `ends`."""
         self._tag = (self._tag + 1) % 256
         self._heard = False
         self._port.write(encode(sealed(bytes([pointer, self._tag]))))
@@ -189,7 +222,8 @@ class SerialBus:
         return b""
 
     def _packet(self, ends: float) -> bytes | None:
-        """The data of the next packet; None if it is damaged, or none comes by the time `ends`."""
+        """The data of the next packet; None if it is damaged, or none comes by the time
+        `ends`."""
         while True:
             packet, zero, following = self._received.partition(b"\0")
             if zero:

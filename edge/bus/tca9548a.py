@@ -1,7 +1,8 @@
-"""TCA9548A: a mux with eight channels and one control byte. Each channel is itself a bus.
+"""TCA9548A: a mux with eight channels and one control byte. Each channel is itself a
+bus.
 
-A channel connects only after STOP, so that selecting it takes a call of its own (TCA9548A data
-sheet, section 8.5).
+A channel connects only after STOP, so that selecting it takes a call of its own
+(TCA9548A data sheet, section 8.5).
 """
 
 from __future__ import annotations
@@ -10,7 +11,16 @@ import errno
 from collections.abc import Collection
 from contextlib import suppress
 
-from edge.bus.i2c import Bus, BusError, BusNack, Transfer, bus_error, read, wire_bits, write
+from edge.bus.i2c import (
+    Bus,
+    BusError,
+    BusNack,
+    Transfer,
+    bus_error,
+    read,
+    wire_bits,
+    write,
+)
 from edge.chips.chip import FakeChip
 
 ADDRESSES = range(0x70, 0x78)
@@ -42,18 +52,19 @@ class TCA9548A:
         Args:
             bus: the bus that it is on.
             address: 0x70 to 0x77.
-            verify: read the control byte back whenever a channel is selected. It catches a wrong
-                channel, whose data would look plausible. A caller that asks `kept` after its
-                transactions may switch it off meanwhile.
-            beside: all muxes on the same bus, of which at most one may have a channel open; it may
-                grow later.
+            verify: read the control byte back whenever a channel is selected. It
+                catches a wrong channel, whose data would look plausible. A caller that
+                asks `kept` after its transactions may switch it off meanwhile.
+            beside: all muxes on the same bus, of which at most one may have a channel
+                open; it may grow later.
 
         Raises:
             BusError: it does not answer, or does not keep its control byte.
         """
         self.bus, self.address, self.verify = bus, address, verify
         self.control: int | None = None
-        """The control byte, a bit for each connected channel; None where it is unknown."""
+        """The control byte, a bit for each connected channel; None where it is
+        unknown."""
         self._write = bus.prepare(write(address, [0]))
         self._read = bus.prepare(read(address, 1))
         self._beside = beside
@@ -99,7 +110,8 @@ class TCA9548A:
         self.control = None
 
     def leave(self) -> None:
-        """Disconnect, so that a mux beside may connect; a mux that never answers is passed over."""
+        """Disconnect, so that a mux beside may connect; a mux that never answers is
+        passed over."""
         for _ in range(LEAVE_ATTEMPTS):
             with suppress(BusNack):
                 return self.select(None)

@@ -1,7 +1,8 @@
 """AD7147-1: 12 capacitive taxels of 16 bits.
 
-Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-increment (AD7147 data
-sheet). The start sequence is that of robotology/icub-firmware and of Linux's driver ad714x.
+Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-increment
+(AD7147 data sheet). The start sequence is that of robotology/icub-firmware and of
+Linux's driver ad714x.
 """
 
 import random
@@ -20,8 +21,8 @@ REFRESH_S = 0.009216
 WRITTEN_AT_ONCE = 3 * STAGE_REGISTERS
 """Some adapters carry at most 61 bytes a transfer (CP2112)."""
 DETECTION = (0x2626, 1600, 1600, 1600, 1600)
-"""Sensitivity and offsets of the chip's own touch detection, as in Linux's board files. No result
-depends on them, but power-up leaves them undefined."""
+"""Sensitivity and offsets of the chip's own touch detection, as in Linux's board files.
+No result depends on them, but power-up leaves them undefined."""
 
 Row = tuple[int, tuple[int, ...]]
 """First register and the values from there on."""
@@ -45,12 +46,13 @@ BANKS = sum((stage_bank(stage) for stage in range(STAGES)), ())
 CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
 """(12, 3) registers that connect inputs to each stage."""
 SYSTEM_ROW: Row = (SYSTEM, (0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400))
-"""PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and ambient
-compensation and interrupts, all off."""
+"""PWR_CONTROL (full power, 12 stages, decimation of 64), calibration of all stages, and
+ambient compensation and interrupts, all off."""
 
 
 def rows(step: int, length: int) -> list[Row]:
-    """Rows of `length` registers, one every `step` registers of all stages, and the system row."""
+    """Rows of `length` registers, one every `step` registers of all stages, and the
+    system row."""
     starts = range(0, len(BANKS), step)
     return [*((STAGE_BANK + i, BANKS[i : i + length]) for i in starts), SYSTEM_ROW]
 
@@ -58,8 +60,9 @@ def rows(step: int, length: int) -> list[Row]:
 START_ROWS = rows(WRITTEN_AT_ONCE, WRITTEN_AT_ONCE)
 """The rows to write, in order."""
 CHECK_ROWS = rows(STAGE_REGISTERS, CONNECTIONS.shape[1])
-"""The rows to read back: the connections of each stage, and last the system registers. A reset
-changes each of them, so that any one row tells a chip that has lost its settings."""
+"""The rows to read back: the connections of each stage, and last the system registers.
+A reset changes each of them, so that any one row tells a chip that has lost its
+settings."""
 
 
 def words(values: tuple[int, ...]) -> bytes:
@@ -70,9 +73,9 @@ def words(values: tuple[int, ...]) -> bytes:
 def parse(data: NDArray[np.uint8]) -> Parsed:
     """12 big-endian words a chip.
 
-    No converting stage reads 0: a chip without settings serves it, or converts stage 0 alone.
-    Words of 0xFFFF up to the end of a frame come from a bus that nothing drives any more; the
-    word before them is damaged too where it ends in 0xFF.
+    No converting stage reads 0: a chip without settings serves it, or converts stage 0
+    alone. Words of 0xFFFF up to the end of a frame come from a bus that nothing drives
+    any more; the word before them is damaged too where it ends in 0xFF.
 
     Args:
         data: (n, 24) bytes.
@@ -114,15 +117,21 @@ class AD7147(Chip):
         super().__init__(bus, address, words((RESULTS,)), into)
         self._checks = []
         for register, values in CHECK_ROWS:
-            pointer, row = write(address, words((register,))), read(address, 2 * len(values))
+            pointer, row = (
+                write(address, words((register,))),
+                read(address, 2 * len(values)),
+            )
             self._checks.append((register, words(values), bus.prepare(pointer, row)))
         self._turn = -1
         identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
         if identity & 0xFFF0 != 0x1470:
-            raise self.wrong(f"not an AD7147: its identity reads {identity:#06x}, not 0x147x")
+            raise self.wrong(
+                f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
+            )
 
     def settings(self) -> Iterator[None]:
-        """Write all rows, read the status registers, which clears them, and read the rows back.
+        """Write all rows, read the status registers, which clears them, and read the
+        rows back.
 
         Raises:
             WrongChip: a register does not hold what was written.
@@ -140,7 +149,8 @@ class AD7147(Chip):
             yield
 
     def healthy(self) -> bool:
-        """Whether the next row of `CHECK_ROWS`, each in turn, holds what was written."""
+        """Whether the next row of `CHECK_ROWS`, each in turn, holds what was
+        written."""
         self._turn = (self._turn + 1) % len(self._checks)
         _, expected, prepared = self._checks[self._turn]
         self.bus.transfer(prepared)
@@ -149,11 +159,11 @@ class AD7147(Chip):
     def read(self) -> None:
         """Read all taxels, and once more where the last byte is 0xFF.
 
-        Such a byte may be a value, or a transfer that broke off before it; the words carry no
-        check that could tell. A burst during which a conversion ends mixes words of two
-        conversions, each of them a value of its own. Reading the status first would not prevent
-        that, since a conversion may end after it. That a single word is never mixed is assumed;
-        the data sheet does not say.
+        Such a byte may be a value, or a transfer that broke off before it; the words
+        carry no check that could tell. A burst during which a conversion ends mixes
+        words of two conversions, each of them a value of its own. Reading the status
+        first would not prevent that, since a conversion may end after it. That a single
+        word is never mixed is assumed; the data sheet does not say.
         """
         self.bus.transfer(self.frame)
         if self.frame.buffer[-1] == 0xFF:
@@ -163,19 +173,23 @@ class AD7147(Chip):
 class FakeAD7147(FakeChip):
     """A model of the AD7147-1: the registers that the driver uses, and the results.
 
-    A running stage serves its taxel where its own input is connected, else something else. A
-    stage that does not run serves 0.
+    A running stage serves its taxel where its own input is connected, else something
+    else. A stage that does not run serves 0.
     """
 
     def __init__(
-        self, sense: Sense, *, refresh_s: float = 0.0, power_up: random.Random | None = None
+        self,
+        sense: Sense,
+        *,
+        refresh_s: float = 0.0,
+        power_up: random.Random | None = None,
     ) -> None:
         """Model a chip.
 
         Args:
             sense: raw values of the 12 taxels at a time.
-            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the last
-                one; 0 for results that are always fresh.
+            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the
+                last one; 0 for results that are always fresh.
             power_up: draws the stage registers, which power-up leaves undefined.
         """
         self._sense, self._refresh = sense, refresh_s
@@ -192,7 +206,9 @@ class FakeAD7147(FakeChip):
 
     def write(self, data: bytes, t: float) -> None:
         """Pointer, then words; writes to the read-only registers are lost."""
-        for i, word in enumerate(np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()):
+        for i, word in enumerate(
+            np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()
+        ):
             if i and not STATUS <= self._pointer <= DEVICE_ID:
                 self.registers[self._pointer] = word
             self._pointer = (self._pointer + 1 if i else word) & 0x3FF

@@ -9,13 +9,21 @@ docs/block-protocol.md describes the protocol for whoever writes the firmware, a
 docs/examples/firmware/ has one.
 """
 
-from binascii import crc_hqx
-
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.bus.crc import crc16, sealed
 from edge.bus.i2c import Bus, fetch, read, write
-from edge.chips.chip import Chip, ChipKind, ChipSpec, Defaults, FakeChip, Option, Parsed, Sense
+from edge.chips.chip import (
+    Chip,
+    ChipKind,
+    ChipSpec,
+    Defaults,
+    FakeChip,
+    Option,
+    Parsed,
+    Sense,
+)
 from edge.clock import TIME_ROUNDING_S
 
 IDENTITY, FRAME = b"\x00", b"\x10"
@@ -25,15 +33,6 @@ UNCHANGED_FRAMES = 25
 """Readings with one sequence number after which the microcontroller hangs."""
 FAKE_RATE_HZ = 100.0
 """Samples a second of the model; its sequence number counts them."""
-
-
-def crc16(data: bytes) -> int:
-    """CRC-16/CCITT-FALSE.
-
-    >>> hex(crc16(b"123456789"))
-    '0x29b1'
-    """
-    return crc_hqx(data, 0xFFFF)
 
 
 def data_bytes(taxels: int, bits: int) -> int:
@@ -58,11 +57,6 @@ def unpack(data: NDArray[np.uint8], taxels: int, bits: int) -> NDArray[np.uint16
     packed = np.unpackbits(data, axis=1, count=taxels * bits)
     digits[:, :, 16 - bits :] = packed.reshape(len(data), taxels, bits)
     return np.packbits(digits, axis=2).view(">u2")[:, :, 0].astype(np.uint16)
-
-
-def sealed(data: bytes) -> bytes:
-    """Bytes with their CRC."""
-    return data + crc16(data).to_bytes(2, "big")
 
 
 def parse(data: NDArray[np.uint8], taxels: int, bits: int) -> Parsed:
@@ -124,7 +118,9 @@ class Block(Chip):
             return
         if served[:5] == MAGIC and served == sealed(served[:8]):
             number = int.from_bytes(served[6:8], "big")
-            raise self.wrong(f"serves {number} taxels of {served[5]} bits, not {taxels} of {bits}")
+            raise self.wrong(
+                f"serves {number} taxels of {served[5]} bits, not {taxels} of {bits}"
+            )
         raise self.wrong("not a microcontroller that serves frames")
 
     def healthy(self) -> bool:
@@ -163,7 +159,9 @@ class FakeBlock(FakeChip):
         elif self._pointer == FRAME[0]:
             sample = int((t + TIME_ROUNDING_S) * FAKE_RATE_HZ)
             values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
-            out = sealed((sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits))
+            out = sealed(
+                (sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits)
+            )
         return out[:n].ljust(n, b"\0")
 
 

@@ -1,7 +1,8 @@
-"""A chip with taxels: its driver, its descriptor, its place in the wiring, and its model.
+"""A chip with taxels: its driver, its descriptor, its place in the wiring, and its
+model.
 
-To add a chip, write one module with a driver (a `Chip`), a model (a `FakeChip`) and a descriptor (a
-`ChipKind`), and add the descriptor to the list in `edge.chips.kinds`.
+To add a chip, write one module with a driver (a `Chip`), a model (a `FakeChip`) and a
+descriptor (a `ChipKind`), and add the descriptor to the list in `edge.chips.kinds`.
 """
 
 from __future__ import annotations
@@ -31,14 +32,16 @@ Sense = Callable[[float], NDArray[np.uint16]]
 
 
 class WrongChip(BusError, LookupError):
-    """Something answers at the address, but it is not the chip that the skin file names."""
+    """Something answers at the address, but it is not the chip that the skin file
+    names."""
 
 
 class Chip(ABC):
     """A driver of one chip.
 
-    The constructor sends only the reads that identify the chip. `settings` configures it in steps
-    of one transaction each, so that a chip can be set up between two frames.
+    The constructor sends only the reads that identify the chip. `settings` configures
+    it in steps of one transaction each, so that a chip can be set up between two
+    frames.
 
     Attributes:
         bus: a bus or a mux's channel.
@@ -55,11 +58,12 @@ class Chip(ABC):
     def settings(self) -> Iterator[None]:
         """Write the settings and read them back, one transaction a step.
 
-        The last step reads a register that a reset changes, so that a chip that resets during
-        set-up does not pass. A chip without settings has no steps.
+        The last step reads a register that a reset changes, so that a chip that resets
+        during set-up does not pass. A chip without settings has no steps.
 
         Raises:
-            BusError: a transaction failed, or a register does not hold what was written.
+            BusError: a transaction failed, or a register does not hold what was
+                written.
         """
         return iter(())
 
@@ -103,8 +107,10 @@ class Defaults:
 
     Attributes:
         sign: 1 where a touch raises the raw value, -1 where it lowers it.
-        threshold_counts, onset_counts: see `edge.touch.layout.SkinLayout`; 0 for no default.
-        dead_band_counts, drift_counts_per_s, drift_limit_counts: see `edge.skin.file.Signal`.
+        threshold_counts, onset_counts: see `edge.touch.layout.SkinLayout`; 0 for no
+            default.
+        dead_band_counts, drift_counts_per_s, drift_limit_counts: see
+            `edge.skin.file.Signal`.
     """
 
     sign: int = 1
@@ -117,7 +123,8 @@ class Defaults:
 
 @dataclass(frozen=True)
 class Option:
-    """A key of a skin file that only one kind of chip has: its default and allowed values."""
+    """A key of a skin file that only one kind of chip has: its default and allowed
+    values."""
 
     default: int
     allowed: tuple[int, ...]
@@ -130,8 +137,10 @@ class ChipSpec:
     Attributes:
         kind: the descriptor.
         address: 7 bits; 0 on a serial port.
-        taxels: flat index (row * cols + col) of each stage, `UNUSED` for a stage without one.
-        mux, channel: the mux's address and channel, or None where the chip is on the bus itself.
+        taxels: flat index (row * cols + col) of each stage, `UNUSED` for a stage
+            without one.
+        mux, channel: the mux's address and channel, or None where the chip is on the
+            bus itself.
         sign: 1 where a touch raises the raw value, -1 where it lowers it.
         options: values of the kind's options; the defaults apply to those left out.
     """
@@ -179,22 +188,25 @@ class ChipKind:
         name: the value of `kind` in a skin file.
         description: a few words for a person.
         driver: makes the driver of a chip, which reads frames into the given bytes.
-        parse: values and intact taxels of n chips from their bytes (n, frame_bytes); a pure
-            function.
-        fake: makes a model from the spec, the sensed values, whether conversions take their real
-            time, and a random stream for the registers that power-up leaves undefined.
+        parse: values and intact taxels of n chips from their bytes (n, frame_bytes); a
+            pure function.
+        fake: makes a model from the spec, the sensed values, whether conversions take
+            their real time, and a random stream for the registers that power-up leaves
+            undefined.
         frame_bytes: bytes of one reading.
         highest: the largest raw value that is not saturated.
         rest: raw value at rest of a fake chip without calibration.
         addresses: addresses that the chip can have.
-        stages: number of its stages; None where the skin file decides, up to `MOST_TAXELS`.
+        stages: number of its stages; None where the skin file decides, up to
+            `MOST_TAXELS`.
         pointer_bytes: bytes of the register pointer.
         options: keys of a skin file that only this kind has.
         defaults: values that the skin file need not give.
-        unchanged_frames: readings with the same bytes after which the chip hangs for certain;
-            None where bytes at rest may stay the same.
+        unchanged_frames: readings with the same bytes after which the chip hangs for
+            certain; None where bytes at rest may stay the same.
         serial: whether it can be on a serial port.
-        rests_at_zero: whether 0 is a usable value at rest, and no sign of a broken input.
+        rests_at_zero: whether 0 is a usable value at rest, and no sign of a broken
+            input.
     """
 
     name: str

@@ -1,7 +1,8 @@
 """MPR121: 12 capacitive taxels of 10 bits; a touch lowers the value.
 
-Registers have 8 bits behind an 8-bit pointer, with auto-increment. Most take a write only while
-the chip is stopped (MPR121 data sheet; application note AN3944 for the filter).
+Registers have 8 bits behind an 8-bit pointer, with auto-increment. Most take a write
+only while the chip is stopped (MPR121 data sheet; application note AN3944 for the
+filter).
 """
 
 from collections.abc import Iterator
@@ -19,23 +20,24 @@ RESET_KEY, RESET_CONFIG2, RESET_WAIT_S = 0x63, 0x24, 0.001
 RUNNING = 0x8F
 """ECR: baseline from the first reading, twelve electrodes."""
 OVER_CURRENT = 0x80
-"""Bit of `TOUCH_HIGH`: the current at pin REXT is too high. The data read 0 and ECR stays 0."""
+"""Bit of `TOUCH_HIGH`: the current at pin REXT is too high. The data read 0 and ECR
+stays 0."""
 SATURATED = 1023
 SETTINGS: tuple[tuple[int, tuple[int, ...]], ...] = (
     (THRESHOLDS, (12, 6) * ELECTRODES),
     (FILTER, (0x01, 0x01, 0x0E, 0x00, 0x01, 0x05, 0x01, 0x00, 0x00, 0x00, 0x00)),
     (CONFIG1, (0x10, 0x20)),
 )
-"""(first register, values) to write while stopped: touch and release thresholds; baseline filter;
-charge current 16 uA, charge time 0.5 us and 4 samples each 1 ms."""
+"""(first register, values) to write while stopped: touch and release thresholds;
+baseline filter; charge current 16 uA, charge time 0.5 us and 4 samples each 1 ms."""
 SET_CONFIG2 = SETTINGS[-1][1][1]
 
 
 def parse(data: NDArray[np.uint8]) -> Parsed:
     """12 words a chip, low byte first, 10 bits used.
 
-    A word with one of the upper six bits set is damaged. A stopped chip serves 0, and 1023 is
-    the end of the range: neither is a value.
+    A word with one of the upper six bits set is damaged. A stopped chip serves 0, and
+    1023 is the end of the range: neither is a value.
 
     Args:
         data: (n, 24) bytes.
@@ -59,8 +61,8 @@ class MPR121(Chip):
     ) -> None:
         """Identify the chip as far as that is possible without a reset.
 
-        It has no identity register. CONFIG2 holds our value where it runs, and its own after a
-        reset; `settings` resets the chip and checks the latter.
+        It has no identity register. CONFIG2 holds our value where it runs, and its own
+        after a reset; `settings` resets the chip and checks the latter.
 
         Args:
             bus: a bus or a mux's channel.
@@ -75,13 +77,17 @@ class MPR121(Chip):
         self._state = bus.prepare(write(address, [CONFIG2]), read(address, 2))
         config = fetch(bus, address, bytes([CONFIG2]), 1)[0]
         if config not in (RESET_CONFIG2, SET_CONFIG2):
-            raise self.wrong(f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20")
+            raise self.wrong(
+                f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20"
+            )
 
     def settings(self) -> Iterator[None]:
-        """Reset, check, write all while stopped, read back, start; one transaction a step.
+        """Reset, check, write all while stopped, read back, start; one transaction a
+        step.
 
         Raises:
-            WrongChip: a register does not hold what was written, or the chip reports over-current.
+            WrongChip: a register does not hold what was written, or the chip reports
+                over-current.
             BusError: a transaction failed.
         """
         send(self.bus, self.address, [RESET, RESET_KEY])
@@ -100,18 +106,23 @@ class MPR121(Chip):
         send(self.bus, self.address, [ECR, RUNNING])
         yield
         if fetch(self.bus, self.address, bytes([TOUCH_HIGH]), 1)[0] & OVER_CURRENT:
-            raise self.wrong("reports over-current; check the resistor at its pin REXT (75 kOhm)")
+            raise self.wrong(
+                "reports over-current; check the resistor at its pin REXT (75 kOhm)"
+            )
         yield
         # A reset at any earlier moment shows here: it changes both registers.
         if not self.healthy():
             raise self.wrong("loses its settings; check its power")
 
     def _check(self, register: int, values: tuple[int, ...], otherwise: str) -> None:
-        if fetch(self.bus, self.address, bytes([register]), len(values)) != bytes(values):
+        if fetch(self.bus, self.address, bytes([register]), len(values)) != bytes(
+            values
+        ):
             raise self.wrong(f"register {register:#04x} of the MPR121 {otherwise}")
 
     def healthy(self) -> bool:
-        """Whether CONFIG2 and ECR are as they were set; reset and over-current change ECR."""
+        """Whether CONFIG2 and ECR are as they were set; reset and over-current change
+        ECR."""
         self.bus.transfer(self._state)
         return self._state.buffer.tobytes() == bytes([SET_CONFIG2, RUNNING])
 

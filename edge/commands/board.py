@@ -23,7 +23,8 @@ LEAST_FREE_MB = 200
 
 
 class Row(NamedTuple):
-    """A fact about the machine: its name, its value, and a remedy where it will not do."""
+    """A fact about the machine: its name, its value, and a remedy where it will not
+    do."""
 
     name: str
     value: str
@@ -36,10 +37,16 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
     Args:
         root: holds `dev` and `sys`.
     """
-    yield Row("program", f"edge-classify {__version__}; reads models of format {FORMAT}")
+    yield Row(
+        "program", f"edge-classify {__version__}; reads models of format {FORMAT}"
+    )
     wide = sys.maxsize > 2**32
     system = f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield Row("system", system, "" if wide else "install a 64-bit system: ONNX Runtime needs one")
+    yield Row(
+        "system",
+        system,
+        "" if wide else "install a 64-bit system: ONNX Runtime needs one",
+    )
     yield Row("python", platform.python_version())
     for package in PACKAGES:
         try:
@@ -48,11 +55,15 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
             yield Row(package, "missing", f"run `pip install {package}`")
     yield from _devices(root)
     groups = sorted(_group(number) for number in {os.getegid(), *os.getgroups()})
-    yield Row("user", f"{pwd.getpwuid(os.geteuid()).pw_name}; groups {', '.join(groups)}")
+    yield Row(
+        "user", f"{pwd.getpwuid(os.geteuid()).pw_name}; groups {', '.join(groups)}"
+    )
     # A board without a battery for its clock starts in the past.
     behind = time.time() < Path(__file__).stat().st_mtime
     utc = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
-    yield Row("clock", utc, "set the clock: `sudo timedatectl set-ntp true`" if behind else "")
+    yield Row(
+        "clock", utc, "set the clock: `sudo timedatectl set-ntp true`" if behind else ""
+    )
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     busy = "end other programs: they delay the frames" if load > cores else ""
     yield Row("load", f"{load:.1f} on {cores} cores", busy)
@@ -63,14 +74,22 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
 
 def _devices(root: Path) -> Iterator[Row]:
     """I2C buses and serial ports, and whether this user may open them."""
-    devices = [(d, group) for p, group in GROUPS.items() for d in sorted((root / "dev").glob(p))]
+    devices = [
+        (d, group)
+        for p, group in GROUPS.items()
+        for d in sorted((root / "dev").glob(p))
+    ]
     for device, group in devices:
         name = root / "sys/class/i2c-dev" / device.name / "name"
         adapter = f"{name.read_text().strip()}, " if name.exists() else ""
         owner = f"{adapter}group {_group(device.stat().st_gid)}"
-        join = f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
+        join = (
+            f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
+        )
         yield Row(
-            f"/dev/{device.name}", owner, "" if os.access(device, os.R_OK | os.W_OK) else join
+            f"/dev/{device.name}",
+            owner,
+            "" if os.access(device, os.R_OK | os.W_OK) else join,
         )
     if not devices:
         switch_on = "switch I2C on (`sudo raspi-config`, or `sudo modprobe i2c-dev`), or plug it in"

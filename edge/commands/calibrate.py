@@ -1,8 +1,8 @@
 """Measure rest values and noise and write them into the skin file.
 
-Reads the skin while nothing touches it, and writes each taxel's mean and standard deviation into
-the skin file. The old file is kept as skin.toml.bak. A skin that is touched, or has taxels that
-cannot be read or are saturated, is refused.
+Reads the skin while nothing touches it, and writes each taxel's mean and standard
+deviation into the skin file. The old file is kept as skin.toml.bak. A skin that is
+touched, or has taxels that cannot be read or are saturated, is refused.
 """
 
 import argparse
@@ -28,8 +28,8 @@ FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
 RESTLESS, RESTLESS_COUNTS = 10.0, 5.0
-"""A taxel is being touched, or broken, if its noise exceeds this factor times the median noise plus
-so many counts."""
+"""A taxel is being touched, or broken, if its noise exceeds this factor times the
+median noise plus so many counts."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +52,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def measure(
     skin: Skin, frames: int, lasts_s: float = math.inf
 ) -> tuple[TaxelCalibration, NDArray[np.int64], int]:
-    """Mean and standard deviation of each taxel's raw values, from sums of whole numbers.
+    """Mean and standard deviation of each taxel's raw values, from sums of whole
+    numbers.
 
     Args:
         skin: set up, and touched by nothing.
@@ -60,7 +61,8 @@ def measure(
         lasts_s: the greatest time to read for.
 
     Returns:
-        The calibration, the number of valid values of each taxel, and the number of frames.
+        The calibration, the number of valid values of each taxel, and the number of
+        frames.
     """
     n, total, squares = np.zeros((3, *skin.layout.shape), dtype=np.int64)
     seen = 0
@@ -79,8 +81,8 @@ def mean_and_deviation(
 ) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
     """Rounded mean and sample standard deviation; 0 for a taxel that was never read.
 
-    Squared deviations are summed about the rounded mean in whole numbers, so that a large mean
-    loses no digits.
+    Squared deviations are summed about the rounded mean in whole numbers, so that a
+    large mean loses no digits.
     """
     divisor = np.maximum(n, 1)
     mean = (2 * total + divisor) // (2 * divisor)
@@ -95,8 +97,8 @@ def unusable(
 ) -> NDArray[np.bool_]:
     """(rows, cols), True for working taxels without a usable rest value.
 
-    They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the chip's range:
-    a saturated input, or 0 on a chip that does not rest there.
+    They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the
+    chip's range: a saturated input, or 0 on a chip that does not rest there.
 
     Args:
         file: the skin's.
@@ -124,14 +126,20 @@ def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
 def run(arguments: argparse.Namespace) -> int:
     """Measure, refuse a skin that is being touched, and write."""
     if arguments.skin is None:
-        raise InputError("give --skin skin.toml, the file into which the calibration is written")
+        raise InputError(
+            "give --skin skin.toml, the file into which the calibration is written"
+        )
     former = load(arguments.skin).calibration
     with open_skin(arguments, calibrated=False) as opened:
         LOG.info("measuring; keep everything off the skin")
-        calibration, valid, seen = measure(opened.skin, arguments.frames, opened.lasts_s)
+        calibration, valid, seen = measure(
+            opened.skin, arguments.frames, opened.lasts_s
+        )
         file = opened.skin.file
     if seen < FEWEST_FRAMES:
-        raise InputError(f"only {seen} frames could be read; at least {FEWEST_FRAMES} are needed")
+        raise InputError(
+            f"only {seen} frames could be read; at least {FEWEST_FRAMES} are needed"
+        )
     lost = unusable(file, calibration.baseline, valid / seen)
     if lost.any():
         row, col = np.argwhere(lost)[0].tolist()
@@ -158,8 +166,16 @@ def run(arguments: argparse.Namespace) -> int:
         )
     calibration = replace(calibration, taken=datetime.now(UTC).replace(microsecond=0))
     backup = save_calibration(arguments.skin, calibration)
-    median, largest = float(np.median(calibration.noise)), float(calibration.noise.max())
-    event = {"event": "calibrated", "skin": arguments.skin, "backup": str(backup), "frames": seen}
+    median, largest = (
+        float(np.median(calibration.noise)),
+        float(calibration.noise.max()),
+    )
+    event = {
+        "event": "calibrated",
+        "skin": arguments.skin,
+        "backup": str(backup),
+        "frames": seen,
+    }
     event |= {"noise_median": round(median, 3), "noise_largest": round(largest, 3)}
     Output.of(arguments).event(
         {**event, "kept": int(lost.sum()), "moving": moving},

@@ -1,9 +1,11 @@
-"""Find mistakes in a skin file, and the frame rate that its wires carry; or look at the board.
+"""Find mistakes in a skin file, and the frame rate that its wires carry; or look at the
+board.
 
-Reads a skin file and runs its drivers over a fake bus that counts the bits on the wires. The exit
-status is 1 if the skin cannot work as the file describes it, or the wires cannot carry the frame
-rate that the file asks for. Without a skin file, prints the state of this machine: buses and
-rights, versions, clock, load and disk, with a remedy for each shortcoming.
+Reads a skin file and runs its drivers over a fake bus that counts the bits on the
+wires. The exit status is 1 if the skin cannot work as the file describes it, or the
+wires cannot carry the frame rate that the file asks for. Without a skin file, prints
+the state of this machine: buses and rights, versions, clock, load and disk, with a
+remedy for each shortcoming.
 """
 
 import argparse
@@ -76,7 +78,9 @@ def check_board(output: Output) -> int:
 
     rows = list(look())
     width = max(len(row.name) for row in rows)
-    lines = [f"{'!' if row.remedy else ' '} {row.name:<{width}}  {row.value}" for row in rows]
+    lines = [
+        f"{'!' if row.remedy else ' '} {row.name:<{width}}  {row.value}" for row in rows
+    ]
     remedies = [f"! {row.name}: {row.remedy}" for row in rows if row.remedy]
     table = "\n".join([*lines, *remedies])
     output.event({"event": "board", "rows": [row._asdict() for row in rows]}, table)
@@ -109,7 +113,12 @@ def run(arguments: argparse.Namespace) -> int:
         "taxels": file.layout.rows * file.layout.cols,
         "chips": len(file.chips),
         "buses": [
-            {"device": bus.device, "chips": len(bus.chips), "clock_hz": bus.clock_hz, "bits": b}
+            {
+                "device": bus.device,
+                "chips": len(bus.chips),
+                "clock_hz": bus.clock_hz,
+                "bits": b,
+            }
             for bus, b in zip(file.buses, bits, strict=True)
         ],
         "frame_rate_hz": round(rate, 1),

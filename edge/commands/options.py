@@ -1,4 +1,5 @@
-"""Command-line options that several commands share, and the checks that go with them."""
+"""Command-line options that several commands share, and the checks that go with
+them."""
 
 import argparse
 import math
@@ -21,7 +22,9 @@ def within(kind: type, low: float, high: float) -> Callable[[str], float]:
             if low <= value <= high:
                 return value
         number = "a whole number" if kind is int else "a number"
-        raise argparse.ArgumentTypeError(f"must be {number} from {low:g} to {high:g}, not {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"must be {number} from {low:g} to {high:g}, not {text!r}"
+        )
 
     return parse
 
@@ -31,16 +34,21 @@ seconds = within(float, 1e-3, 1e9)
 
 
 def task_label(text: str) -> tuple[str, str]:
-    """The type of an option that takes a task and its label, in printable characters."""
+    """The type of an option that takes a task and its label, in printable
+    characters."""
     task, _, label = (part.strip() for part in text.partition("="))
     if not (task and label and text.isprintable()):
-        raise argparse.ArgumentTypeError(f"must be TASK=LABEL, such as object=box, not {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"must be TASK=LABEL, such as object=box, not {text!r}"
+        )
     return task, label
 
 
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
-    parser.add_argument("--skin", metavar="skin.toml", help="the file that describes the skin")
+    parser.add_argument(
+        "--skin", metavar="skin.toml", help="the file that describes the skin"
+    )
     parser.add_argument(
         "--fake",
         metavar="REC.npz",
@@ -49,11 +57,18 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
     )
     add_noise(parser, "the fake chips of a --skin")
     parser.add_argument(
-        "--real-time", action="store_true", help="play the recording at its original speed"
+        "--real-time",
+        action="store_true",
+        help="play the recording at its original speed",
     )
-    parser.add_argument("--loop", action="store_true", help="play the recording over and over")
     parser.add_argument(
-        "--seconds", type=seconds, default=math.inf, help="stop after this time (default: never)"
+        "--loop", action="store_true", help="play the recording over and over"
+    )
+    parser.add_argument(
+        "--seconds",
+        type=seconds,
+        default=math.inf,
+        help="stop after this time (default: never)",
     )
 
 
@@ -103,17 +118,24 @@ def add_arm(parser: argparse.ArgumentParser, use: str) -> None:
         use: completes the help "the arm that carries the skin, ...".
     """
     parser.add_argument(
-        "--arm", metavar="arm.toml|arm.urdf", help=f"the arm that carries the skin, {use}"
+        "--arm",
+        metavar="arm.toml|arm.urdf",
+        help=f"the arm that carries the skin, {use}",
     )
-    parser.add_argument("--base", metavar="LINK", help="in a URDF, the first link of the arm")
-    parser.add_argument("--tip", metavar="LINK", help="in a URDF, the link that carries the skin")
+    parser.add_argument(
+        "--base", metavar="LINK", help="in a URDF, the first link of the arm"
+    )
+    parser.add_argument(
+        "--tip", metavar="LINK", help="in a URDF, the link that carries the skin"
+    )
 
 
 def open_arm(arguments: argparse.Namespace) -> Chain | None:
     """The arm that the options name, or None.
 
     Raises:
-        InputError: the file describes no chain of joints, or `--base` and `--tip` do not suit it.
+        InputError: the file describes no chain of joints, or `--base` and `--tip` do
+            not suit it.
     """
     if arguments.arm is not None:
         return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
@@ -123,7 +145,8 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
 
 
 def add_error(parser: argparse.ArgumentParser) -> None:
-    """Add the option that asks for an error rate; `check_error` checks it against the model."""
+    """Add the option that asks for an error rate; `check_error` checks it against the
+    model."""
     parser.add_argument(
         "--error",
         type=float,

@@ -1,4 +1,5 @@
-"""Output of a command: text for a person, JSON lines for a program, and messages on stderr."""
+"""Output of a command: text for a person, JSON lines for a program, and messages on
+stderr."""
 
 import argparse
 import logging
@@ -39,7 +40,8 @@ class Output:
         print(self.line(line, text), flush=True)
 
     def line(self, line: Mapping[str, Any], text: str | None = None) -> str:
-        """The text that `event` prints; it has no control characters but line breaks."""
+        """The text that `event` prints; it has no control characters but line
+        breaks."""
         if self.as_json:
             return json_line(line)
         lines = (event_text(line) if text is None else text).split("\n")
@@ -95,7 +97,9 @@ def event_text(line: Mapping[str, Any]) -> str:
         error = f": {line['error']}" if line.get("error") else ""
         return f"{line['t']:8.3f} s  {line['bus']}, {line['place']} is {line['state']}{error}"
     if kind == "bus":
-        again = "; it is opened again until it answers" if line["state"] == "lost" else ""
+        again = (
+            "; it is opened again until it answers" if line["state"] == "lost" else ""
+        )
         return f"{line['t']:8.3f} s  {line['bus']} is {line['state']}{again}"
     if kind == "taxels":
         silent = f"taxels without a valid value for {line['frames']} frames: {line['invalid']}"
@@ -106,7 +110,11 @@ def event_text(line: Mapping[str, Any]) -> str:
         return f"{line['frames']} frames{median if period else ''}, {line['missed_ticks']} missed"
     if kind == "saved":
         labels = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
-        cut = "" if line["complete"] else "; incomplete: reading stopped before the contact's end"
+        cut = (
+            ""
+            if line["complete"]
+            else "; incomplete: reading stopped before the contact's end"
+        )
         return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {labels}{cut}"
     if kind == "unknown_touches":
         return f"{line['unknown']} of the last {line['touches']} touches are unknown to the model"
@@ -120,7 +128,9 @@ def decision_text(line: Mapping[str, Any], contact: str = "") -> str:
     label = "out of range" if line["label"] is None else line["label"]
     notes = [", ".join(line["flags"])] if line["flags"] else []
     if "strongest" in line:
-        notes.append(f"the strongest taxel came to {line['strongest']:.0%} of the onset")
+        notes.append(
+            f"the strongest taxel came to {line['strongest']:.0%} of the onset"
+        )
     if "expected" in line and line["expected"] != line["label"]:
         notes.append(f"labelled {line['expected']}")
     time = line["onset_s"] + line["window_s"]

@@ -1,8 +1,8 @@
 """Read the skin and decide, live.
 
-Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C, SIGTERM or
-SIGHUP ends it cleanly after the current frame, a second one at once. It tells systemd when it is
-ready and that it is alive.
+Reads the skin and reports contacts, decisions, and chips that fail or recover. Ctrl-C,
+SIGTERM or SIGHUP ends it cleanly after the current frame, a second one at once. It
+tells systemd when it is ready and that it is alive.
 """
 
 import argparse
@@ -65,11 +65,14 @@ class UnknownTouches:
         self._noticed = False
 
     def push(self, events: Sequence[Event]) -> dict[str, Any] | None:
-        """Take in events; returns the event of the notice, which is also logged, when it is due."""
+        """Take in events; returns the event of the notice, which is also logged, when
+        it is due."""
         for event in events:
             if isinstance(event, Decided):
                 touch = event.onset_s, event.contact
-                self._touches[touch] = self._touches.get(touch, False) or "unknown" in event.flags
+                self._touches[touch] = (
+                    self._touches.get(touch, False) or "unknown" in event.flags
+                )
         for old in list(self._touches)[:-LAST_TOUCHES]:
             del self._touches[old]
         unknown, touches = sum(self._touches.values()), len(self._touches)
@@ -85,25 +88,31 @@ class UnknownTouches:
 
 
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
-    """The last event: how well the loop kept its period, and how many lines were lost."""
+    """The last event: how well the loop kept its period, and how many lines were
+    lost."""
     periods = schedule.periods
     percentiles = (50, 99, 99.9) if periods.n else ()
     return {
         "event": "end",
         "frames": frames,
         "missed_ticks": schedule.missed_ticks,
-        "period_ms": {f"p{p:g}": round(periods.percentile(p) * 1e3, 2) for p in percentiles},
+        "period_ms": {
+            f"p{p:g}": round(periods.percentile(p) * 1e3, 2) for p in percentiles
+        },
         **({"lost": lost} if lost else {}),
     }
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, decide and print until the recording ends, or the user or systemd stops it."""
+    """Read, decide and print until the recording ends, or the user or systemd stops
+    it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
     on_skin = arguments.without_joints == "skin"
     notifier = Notifier(now=time.monotonic)
-    with reading(arguments, model=model, needs_joints=not on_skin, decides=True) as live:
+    with reading(
+        arguments, model=model, needs_joints=not on_skin, decides=True
+    ) as live:
         classifier = Classifier(
             model,
             live.skin.layout,

@@ -1,8 +1,8 @@
 """Show which chips answer, as a map of the skin.
 
-Sets up every chip, reads some frames, and prints each chip's state and a map of the skin: # is a
-taxel with a valid value, . one without, and a blank one without a chip. The exit status is 1 if a
-chip does not answer or a taxel has no valid value.
+Sets up every chip, reads some frames, and prints each chip's state and a map of the
+skin: # is a taxel with a valid value, . one without, and a blank one without a chip.
+The exit status is 1 if a chip does not answer or a taxel has no valid value.
 """
 
 import argparse
@@ -17,7 +17,8 @@ from edge.skin.loop import Loop
 from edge.skin.skin import ChipStatus
 
 FRAMES = 30
-"""A microcontroller that hangs serves the same frame over and over, which shows after 25."""
+"""A microcontroller that hangs serves the same frame over and over, which shows after
+25."""
 SILENT = "taxels without a valid value"
 
 
@@ -35,7 +36,8 @@ def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print each chip and the map; 1 if a chip does not answer or a taxel is not valid."""
+    """Print each chip and the map; 1 if a chip does not answer or a taxel is not
+    valid."""
     output = Output.of(arguments)
     with open_skin(arguments, calibrated=False) as opened:
         skin = opened.skin
@@ -54,5 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
                 output.event(event, f"{spec.kind.name}: {fault}")
         output.text(skin_map(statuses, invalid))
     silent_taxels = f"; {SILENT}: {invalid.sum()}" if invalid.any() else ""
-    output.text(f"{len(statuses) - silent} of {len(statuses)} chips answer{silent_taxels}")
+    output.text(
+        f"{len(statuses) - silent} of {len(statuses)} chips answer{silent_taxels}"
+    )
     return 1 if silent or silent_taxels else 0

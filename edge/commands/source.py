@@ -1,11 +1,14 @@
-"""Opens the skin that a command's options name, and reads it with all that they put beside it."""
+"""Opens the skin that a command's options name, and reads it with all that they put
+beside it."""
+
+from __future__ import annotations
 
 import argparse
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from edge.commands.output import LOG, Output, event_text
 from edge.errors import InputError
@@ -18,20 +21,24 @@ from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
-from edge.tools.page import Page
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.joint_stream import Joints, joint_source
 from edge.touch.layout import for_device
 
+if TYPE_CHECKING:
+    from edge.tools.page import Page
+
 
 def ending_signals() -> list[int]:
     """The signals that end a command after the current frame.
 
-    SIGHUP, sent when an ssh session drops, is one unless it was ignored from the start, as under
-    nohup.
+    SIGHUP, sent when an ssh session drops, is one unless it was ignored from the start,
+    as under nohup.
     """
-    hangup = [] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else [signal.SIGHUP]
+    hangup = (
+        [] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else [signal.SIGHUP]
+    )
     return [signal.SIGINT, signal.SIGTERM, *hangup]
 
 
@@ -78,7 +85,8 @@ def open_skin(
         arguments: with the options of `options.add_skin`.
         calibrated: refuse a real skin that has no calibration.
         model: its contact threshold is used if it is lower than the skin's.
-        arm: whose joint angles a recording must have; they are put into the arm's order.
+        arm: whose joint angles a recording must have; they are put into the arm's
+            order.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
@@ -97,13 +105,18 @@ def open_skin(
         file = skin_file(recording.layout)
     else:
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
-    touch = None if model is None else for_device(model.info.layout, file.layout).threshold_counts
+    touch = (
+        None
+        if model is None
+        else for_device(model.info.layout, file.layout).threshold_counts
+    )
     lasts_s, source = arguments.seconds, arguments.skin
     if recording is None:
         skin = Skin.open(file, calibrated=calibrated, touch_counts=touch)
     else:
         clock = PacedClock() if arguments.real_time else VirtualClock()
-        # Without a skin file nobody calibrates, and the chips serve the recording as it is.
+        # Without a skin file nobody calibrates, and the chips serve the recording as it
+        # is.
         noise = 0.0 if arguments.skin is None else arguments.noise
         skin, playback = play(
             file, recording, loop=arguments.loop, clock=clock, noise_counts=noise,
@@ -134,11 +147,17 @@ class Reading(Opened):
     output: Output
 
     def frames(self) -> Iterator[tuple[Frame, list[dict[str, Any]]]]:
-        """Each frame, with the events of buses, taxels and chips that fail or recover."""
+        """Each frame, with the events of buses, taxels and chips that fail or
+        recover."""
         skin = self.skin
         for frame in self.loop.frames():
             events: list[dict[str, Any]] = [
-                {"event": "bus", "t": frame.t, "bus": name, "state": "lost" if lost else "back"}
+                {
+                    "event": "bus",
+                    "t": frame.t,
+                    "bus": name,
+                    "state": "lost" if lost else "back",
+                }
                 for name, lost in skin.bus_changes()
             ]
             if (silent := skin.silent_changes()) is not None:
@@ -148,7 +167,10 @@ class Reading(Opened):
             yield frame, events
 
     def show(
-        self, frame: Frame, faults: Sequence[dict[str, Any]], events: Sequence[Event] = ()
+        self,
+        frame: Frame,
+        faults: Sequence[dict[str, Any]],
+        events: Sequence[Event] = (),
     ) -> None:
         """Show a frame on the page, if there is one."""
         if self.page is not None:
@@ -158,7 +180,9 @@ class Reading(Opened):
 
     def lines(self, udp: str | None = None, more: Sequence[LineWriter] = ()) -> Lines:
         """The events' way out; in virtual time it waits for a slow reader of stdout."""
-        virtual = self.playback is not None and not isinstance(self.skin.clock, PacedClock)
+        virtual = self.playback is not None and not isinstance(
+            self.skin.clock, PacedClock
+        )
         return Lines(
             udp=udp,
             form=self.output.line,
@@ -186,8 +210,8 @@ def reading(
         arm: whose angles are wanted, without a model.
         dof: how many angles are wanted, without a model.
         needs_joints: refuse a source without the angles that the model needs.
-        real_time: play a recording at its original speed, whatever the options say, as a page
-            always does.
+        real_time: play a recording at its original speed, whatever the options say, as
+            a page always does.
         page: further arguments of `edge.tools.page.Page`.
 
     Raises:
@@ -211,13 +235,19 @@ def reading(
             now = clock.real if isinstance(clock, PacedClock) else clock.now
             source = stack.enter_context(joint_source(arguments.joints))
             names = None if arm is None else arm.names
-            joints = stack.enter_context(closing(Joints(source, dof=dof, names=names, now=now)))
+            joints = stack.enter_context(
+                closing(Joints(source, dof=dof, names=names, now=now))
+            )
         elif model is not None and needs_joints:
             require_joints(model, opened.dof, opened.source)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
+            from edge.tools.page import Page  # few runs show one
+
             live = Page(arguments.web, opened.skin.layout, title=opened.source, **page)
             stack.callback(live.server.close)
             LOG.info(f"open {live.server.link} in a browser")
-        yield Reading(**vars(opened), loop=loop, stop=stop, page=live, output=Output.of(arguments))
+        yield Reading(
+            **vars(opened), loop=loop, stop=stop, page=live, output=Output.of(arguments)
+        )

@@ -1,8 +1,8 @@
 """Check that this machine computes the workstation's results.
 
-Runs the frames and feature vectors of a golden file on this machine, and compares every result with
-the stored one: integers must be equal, floats within their stated bounds. The exit status is 1 if a
-result differs.
+Runs the frames and feature vectors of a golden file on this machine, and compares every
+result with the stored one: integers must be equal, floats within their stated bounds.
+The exit status is 1 if a result differs.
 """
 
 import argparse
@@ -27,16 +27,26 @@ def run(arguments: argparse.Namespace) -> int:
     checks = verify(Model(arguments.model), arguments.golden)
     width = max(len(check.name) for check in checks)
     for check in checks:
-        line: dict[str, Any] = {"event": "check", "name": check.name, "rows": check.rows}
+        line: dict[str, Any] = {
+            "event": "check",
+            "name": check.name,
+            "rows": check.rows,
+        }
         line["passed"] = check.passed
         verdict = "ok" if check.passed else "DIFFERS"
         text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
         if check.worst < float("inf"):
             line["share_of_bound"] = round(check.worst, 6)
         if check.row is not None:
-            line |= {"worst_row": check.row, "seen": check.seen, "expected": check.expected}
+            line |= {
+                "worst_row": check.row,
+                "seen": check.seen,
+                "expected": check.expected,
+            }
         if not check.passed:
-            seen, expected = (" ".join(str(x).split()) for x in (check.seen, check.expected))
+            seen, expected = (
+                " ".join(str(x).split()) for x in (check.seen, check.expected)
+            )
             text += f"; the worst is row {check.row}: {seen} instead of {expected}"
         output.event(line, text)
     failed = [check.name for check in checks if not check.passed]

@@ -1,4 +1,5 @@
-"""What `edge-classify demo` shows: a small model, and touches that it was not fitted on.
+"""What `edge-classify demo` shows: a small model, and touches that it was not fitted
+on.
 
 Model and recordings are simulated (`make demo-data`).
 """

@@ -1,4 +1,5 @@
-"""A fake bus: models of chips on a wire, refusing the transactions that real adapters refuse."""
+"""A fake bus: models of chips on a wire, refusing the transactions that real adapters
+refuse."""
 
 import errno
 from collections.abc import Callable, Mapping, Sequence
@@ -17,8 +18,8 @@ NACK_BITS = 11
 class FakeBus:
     """A bus with chips and muxes.
 
-    It refuses the shapes that some real adapter refuses: a read anywhere but last (EOPNOTSUPP,
-    Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
+    It refuses the shapes that some real adapter refuses: a read anywhere but last
+    (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
     >>> from edge.bus.i2c import fetch, send
     >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
@@ -72,7 +73,8 @@ class FakeBus:
         self.is_open = True
 
     def prepare(self, *messages: Message) -> Transfer:
-        """Keep the messages; their shape is checked when they are sent, as in a kernel."""
+        """Keep the messages; their shape is checked when they are sent, as in a
+        kernel."""
         return Transfer(messages)
 
     def transfer(self, prepared: Transfer) -> None:

@@ -52,11 +52,12 @@ class VirtualClock:
 
 
 class PacedClock(VirtualClock):
-    """Virtual time that keeps to real time from the first wait on, for a person to watch.
+    """Virtual time that keeps to real time from the first wait on, for a person to
+    watch.
 
-    While the machine keeps up, times have the same bits as on a clock that never waits. For a late
-    loop time has gone on, as with real chips: other programs send joint angles at real times, so
-    the clock must not change its speed to catch up.
+    While the machine keeps up, times have the same bits as on a clock that never waits.
+    For a late loop time has gone on, as with real chips: other programs send joint
+    angles at real times, so the clock must not change its speed to catch up.
     """
 
     def __init__(self) -> None:
@@ -64,7 +65,8 @@ class PacedClock(VirtualClock):
         self._ahead = math.nan
 
     def real(self) -> float:
-        """Real time on this clock's scale, for the arrival of another program's line."""
+        """Real time on this clock's scale, for the arrival of another program's
+        line."""
         return self.now() if math.isnan(self._ahead) else time.monotonic() - self._ahead
 
     def sleep_until(self, t: float) -> None:

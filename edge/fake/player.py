@@ -1,4 +1,5 @@
-"""A fake skin: a recording or any other scene, played onto the registers of fake chips."""
+"""A fake skin: a recording or any other scene, played onto the registers of fake
+chips."""
 
 import math
 import random
@@ -27,10 +28,12 @@ from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
 NOISE_COUNTS = 0.7
-"""Noise of the fake skins that commands open, below that from which a chip that always serves the
-same bytes is stuck: a fake may be calibrated with noise, and then played without."""
+"""Noise of the fake skins that commands open, below that from which a chip that always
+serves the same bytes is stuck: a fake may be calibrated with noise, and then played
+without."""
 NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
-"""The noise is this many frames, repeated, each of which lasts for this many seconds."""
+"""The noise is this many frames, repeated, each of which lasts for this many
+seconds."""
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
@@ -64,7 +67,9 @@ class Playback:
         t -= self.start
         if self.ends == math.inf:
             t %= self._length
-        return max(0, int(np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")) - 1)
+        return max(
+            0, int(np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")) - 1
+        )
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
@@ -103,7 +108,8 @@ def fake_buses(
         file: the wiring; the chips rest at its calibration, if it has one.
         scene: the counts that the chips feel.
         clock: shared by the buses.
-        timed: the clock advances with the bits on the wire, and conversions take their time.
+        timed: the clock advances with the bits on the wire, and conversions take their
+            time.
         overhead_s: time of the software for each transaction, where timed.
         noise_counts: standard deviation of the noise on raw values.
         seed: of the noise, and of the registers that power-up leaves undefined.
@@ -143,8 +149,8 @@ def fake_buses(
 def _sense(
     chip: ChipSpec, scene: Scene, rest: NDArray[np.uint16], noise: NDArray[np.int64]
 ) -> Sense:
-    """The function that gives a chip its raw values: rest values, and the scene with its sign and
-    noise. A stage without a taxel rests."""
+    """The function that gives a chip its raw values: rest values, and the scene with
+    its sign and noise. A stage without a taxel rests."""
     taxels = np.array(chip.taxels)
     used = taxels != UNUSED
     at_rest = np.where(used, rest[taxels], chip.kind.rest(chip)).astype(np.int64)
@@ -212,22 +218,29 @@ def play(
 
 
 def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:
-    """Bits on the wire of each bus for some frames, counted while the drivers send them.
+    """Bits on the wire of each bus for some frames, counted while the drivers send
+    them.
 
-    The software's time of each transaction counts as the bits that the wire would carry in it.
+    The software's time of each transaction counts as the bits that the wire would carry
+    in it.
     """
     every_chip = replace(file, reading=replace(file.reading, region_of_interest=False))
     with still(every_chip) as skin:
-        buses = [reader.bus for reader in skin.readers if isinstance(reader.bus, FakeBus)]
+        buses = [
+            reader.bus for reader in skin.readers if isinstance(reader.bus, FakeBus)
+        ]
         for bus in buses:
             bus.bits = bus.transactions = 0
         for _ in range(frames):
             skin.read()
-        return [bus.bits + bus.transactions * overhead_s * bus.clock_hz for bus in buses]
+        return [
+            bus.bits + bus.transactions * overhead_s * bus.clock_hz for bus in buses
+        ]
 
 
 def skin_file(layout: SkinLayout) -> SkinFile:
-    """Fake wiring for a skin that has only a layout: Cody's chips where its shape is Cody's.
+    """Fake wiring for a skin that has only a layout: Cody's chips where its shape is
+    Cody's.
 
     Else microcontrollers that serve 16-bit frames, one for each 4000 taxels.
     """
@@ -236,5 +249,7 @@ def skin_file(layout: SkinLayout) -> SkinFile:
         return replace(cody, name="fake", layout=layout)
     taxels = range(layout.rows * layout.cols)
     shares = [taxels[first : first + MOST_TAXELS] for first in taxels[::MOST_TAXELS]]
-    chips = tuple(ChipSpec(block.KIND, 0x08 + i, tuple(share)) for i, share in enumerate(shares))
+    chips = tuple(
+        ChipSpec(block.KIND, 0x08 + i, tuple(share)) for i, share in enumerate(shares)
+    )
     return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

@@ -1,9 +1,10 @@
-"""Labelled touches for any skin: the demo's simulated contacts, mapped onto its geometry.
+"""Labelled touches for any skin: the demo's simulated contacts, mapped onto its
+geometry.
 
-The force on each taxel of a simulated contact is spread over the taxel's patch, and added up on
-the patches of the other skin: the sum of the forces stays, and so do lengths. Trials differ in
-place, strength and speed. They serve to rehearse before a wire is soldered; a model fitted on them
-knows nothing of the real skin.
+The force on each taxel of a simulated contact is spread over the taxel's patch, and
+added up on the patches of the other skin: the sum of the forces stays, and so do
+lengths. Trials differ in place, strength and speed. They serve to rehearse before a
+wire is soldered; a model fitted on them knows nothing of the real skin.
 """
 
 import math
@@ -26,13 +27,17 @@ STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
 LEAD_S = 0.3
 """Time before the simulated contact begins."""
 TAIL_S = 0.3
-"""Time after it, during which its last forces go on: no touch ends within a decision's window."""
+"""Time after it, during which its last forces go on: no touch ends within a decision's
+window."""
 WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
-"""Where counts per newton are unknown, the strongest taxel of the weakest contact has the counts of
-this many onsets; an onset below the second number is taken to be that number of counts."""
+"""Where counts per newton are unknown, the strongest taxel of the weakest contact has
+the counts of this many onsets; an onset below the second number is taken to be that
+number of counts."""
 
 
-def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str, Recording]]:
+def touches(
+    file: SkinFile, *, trials: int, seed: int = 0
+) -> Iterator[tuple[str, Recording]]:
     """Name and recording of each touch, for every contact of the demo.
 
     Args:
@@ -42,14 +47,18 @@ def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str
     """
     sources = [(path, load(path)) for path in demo.recordings()]
 
-    def trial(kind: int, *number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def trial(
+        kind: int, *number: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rng = np.random.default_rng([seed, kind, *number])
         return _mapped(sources[kind][1], file.layout, file.reading.rate_hz, rng)
 
     counts_per_newton = file.layout.counts_per_newton
     if counts_per_newton is None:
         weakest = min(trial(kind)[1].max() for kind in range(len(sources)))
-        counts_per_newton = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
+        counts_per_newton = (
+            WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
+        )
     most = reach(file)
     covered = Decoder(file).served.reshape(file.layout.shape)
     for number in range(trials):
@@ -71,7 +80,12 @@ def touches(file: SkinFile, *, trials: int, seed: int = 0) -> Iterator[tuple[str
 def still(file: SkinFile, seconds: float) -> Recording:
     """A recording of the skin while nothing touches it."""
     t = np.arange(max(1, round(seconds * file.reading.rate_hz))) / file.reading.rate_hz
-    meta = {"labels": {}, "skin": file.layout.to_dict(), "source": "nothing touches", "trial": 0}
+    meta = {
+        "labels": {},
+        "skin": file.layout.to_dict(),
+        "source": "nothing touches",
+        "trial": 0,
+    }
     return Recording(t, np.zeros((len(t), *file.layout.shape), np.uint16), meta=meta)
 
 
@@ -111,7 +125,9 @@ def _mapped(
     played[at < source.t[0]] = 0.0
     along, around = (
         _spread(source.layout, onto, axis, middle, centre)
-        for axis, (middle, centre) in enumerate(zip(_middle(forces), (row, col), strict=True))
+        for axis, (middle, centre) in enumerate(
+            zip(_middle(forces), (row, col), strict=True)
+        )
     )
     return t, along.T @ played @ around
 
@@ -128,10 +144,11 @@ def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
 def _spread(
     source: SkinLayout, onto: SkinLayout, axis: int, middle: float, centre: float
 ) -> NDArray[np.float64]:
-    """(sources, taxels) shares of each source row (axis 0) or column on each row or column.
+    """(sources, taxels) shares of each source row (axis 0) or column on each row or
+    column.
 
-    Sources and taxels are as wide as their pitch. The position `middle` of the sources is mapped
-    to the position `centre` of the taxels.
+    Sources and taxels are as wide as their pitch. The position `middle` of the sources
+    is mapped to the position `centre` of the taxels.
     """
     sources, taxels = source.shape[axis], onto.shape[axis]
     offset = np.arange(sources) - middle
@@ -144,5 +161,7 @@ def _spread(
     # A contact that is wider than the skin goes round it as often as it must.
     for turn in range(-2, 3) if axis == 1 and onto.wraps else range(1):
         low = edges + turn * taxels
-        shares += np.maximum(0.0, np.minimum(left + ratio, low + 1.0) - np.maximum(left, low))
+        shares += np.maximum(
+            0.0, np.minimum(left + ratio, low + 1.0) - np.maximum(left, low)
+        )
     return shares / ratio

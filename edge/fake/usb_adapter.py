@@ -1,8 +1,9 @@
 """A USB adapter in user space: it puts a fake bus on this machine's own `/dev/i2c-N`.
 
-The adapter is an i2c-tiny-usb, for which Linux has a driver (drivers/i2c/busses/i2c-tiny-usb.c). It
-is attached over USB/IP (Documentation/usb/usbip_protocol.rst): the kernel's virtual host controller
-`vhci_hcd` takes one end of a socket pair, and this module answers requests at the other. Every
+The adapter is an i2c-tiny-usb, for which Linux has a driver
+(drivers/i2c/busses/i2c-tiny-usb.c). It is attached over USB/IP
+(Documentation/usb/usbip_protocol.rst): the kernel's virtual host controller `vhci_hcd`
+takes one end of a socket pair, and this module answers requests at the other. Every
 program then reaches the bus through the kernel, as it reaches a real one.
 """
 
@@ -17,7 +18,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from edge.bus.i2c import Bus, BusError, BusNack, BusTimeout, Message, bus_error, read, write
+from edge.bus.i2c import (
+    Bus,
+    BusError,
+    BusNack,
+    BusTimeout,
+    Message,
+    bus_error,
+    read,
+    write,
+)
 from edge.errors import EdgeError, InputError
 
 VENDOR, PRODUCT = 0x0403, 0xC631
@@ -31,7 +41,8 @@ CONFIGURATION_DESCRIPTOR = struct.pack(
 """A single configuration with a single interface; every request goes to endpoint 0."""
 
 STANDARD = 0x00
-"""The kind of a request that every USB device answers (bits 5 and 6 of its first byte)."""
+"""The kind of a request that every USB device answers (bits 5 and 6 of its first
+byte)."""
 KIND = 0x60
 GET_STATUS, GET_DESCRIPTOR, SET_CONFIGURATION, SET_INTERFACE = 0, 6, 9, 11
 STANDARD_ANSWERS = {
@@ -43,7 +54,8 @@ STANDARD_ANSWERS = {
 }
 """Data by request and value."""
 FUNCTIONS, DELAY, STATUS, TRANSFER = 1, 2, 3, 4
-"""Requests of the adapter; TRANSFER is the first of four, to which BEGIN and END are added."""
+"""Requests of the adapter; TRANSFER is the first of four, to which BEGIN and END are
+added."""
 BEGIN, END = 1, 2
 I2C_M_RD = 1
 CARRIES = struct.pack("<I", 0x0EFF0001)
@@ -65,10 +77,11 @@ APPEARS_S = 10.0
 class UsbAdapter:
     """An i2c-tiny-usb adapter on a bus: USB requests in, answers out.
 
-    Messages are collected up to the last of a call and then sent at once, so that the bus refuses
-    the same calls as from any other program. A chip that does not answer is not acknowledged (the
-    kernel then gives ENXIO), a bus that hangs leaves the request without an answer (EIO after the
-    driver's 2 s), and every other error stalls the request (EIO).
+    Messages are collected up to the last of a call and then sent at once, so that the
+    bus refuses the same calls as from any other program. A chip that does not answer is
+    not acknowledged (the kernel then gives ENXIO), a bus that hangs leaves the request
+    without an answer (EIO after the driver's 2 s), and every other error stalls the
+    request (EIO).
 
     >>> from edge.fake.bus import FakeBus
     >>> from edge.bus.tca9548a import FakeTCA9548A
@@ -83,7 +96,8 @@ class UsbAdapter:
         self._status = 0
 
     def reply(self, request: bytes) -> bytes:
-        """The answer to one USB/IP request with its data, or nothing where the bus hangs."""
+        """The answer to one USB/IP request with its data, or nothing where the bus
+        hangs."""
         command, number, _, direction, _ = struct.unpack_from(">5I", request)
         if command == UNLINK:
             # The kernel ignores this for a request that has been answered already.
@@ -96,7 +110,10 @@ class UsbAdapter:
         except BusError:
             status = -errno.EPIPE
         done = len(answer) if direction == TO_HOST else len(request) - HEADER
-        return struct.pack(">5Iiiiii8x", SUBMITTED, number, 0, 0, 0, status, done, 0, 0, 0) + answer
+        return (
+            struct.pack(">5Iiiiii8x", SUBMITTED, number, 0, 0, 0, status, done, 0, 0, 0)
+            + answer
+        )
 
     def control(self, setup: bytes, data: bytes = b"") -> bytes:
         """The data that a control request asks for, empty for one that brings data.
@@ -115,7 +132,9 @@ class UsbAdapter:
         if standard or not FUNCTIONS <= request < TRANSFER + 4:
             raise bus_error(errno.EOPNOTSUPP, self.bus.name)
         if request < TRANSFER:
-            return {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}[request]
+            return {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}[
+                request
+            ]
         message = read(index, length) if value & I2C_M_RD else write(index, data)
         begins, ends = request - TRANSFER & BEGIN, request - TRANSFER & END
         self._messages = [message] if begins else [*self._messages, message]
@@ -140,18 +159,22 @@ def serve(adapter: UsbAdapter, connection: socket.socket) -> None:
     """Answer requests until the kernel closes the connection."""
     with connection, connection.makefile("rb") as requests:
         while len(header := requests.read(HEADER)) == HEADER:
-            connection.sendall(adapter.reply(header + requests.read(data_length(header))))
+            connection.sendall(
+                adapter.reply(header + requests.read(data_length(header)))
+            )
 
 
 @contextmanager
 def plugged(adapter: UsbAdapter) -> Iterator[str]:
-    """Attach the adapter to this machine's kernel, and detach it at the end of the block.
+    """Attach the adapter to this machine's kernel, and detach it at the end of the
+    block.
 
     Yields:
         The path of its device, such as `/dev/i2c-7`.
 
     Raises:
-        InputError: this is no Linux, its modules are not loaded, or the user is not root.
+        InputError: this is no Linux, its modules are not loaded, or the user is not
+            root.
         EdgeError: the kernel does not accept the adapter.
     """
     if sys.platform != "linux":
@@ -166,7 +189,9 @@ def plugged(adapter: UsbAdapter) -> Iterator[str]:
     port = free_port((HUB / "status").read_text())
     our_end, kernels_end = socket.socketpair()
     with kernels_end:
-        (HUB / "attach").write_text(f"{port} {kernels_end.fileno()} {port + 1} {LOW_SPEED}\n")
+        (HUB / "attach").write_text(
+            f"{port} {kernels_end.fileno()} {port + 1} {LOW_SPEED}\n"
+        )
     threading.Thread(target=serve, args=(adapter, our_end), daemon=True).start()
     try:
         yield _device(port)
@@ -176,7 +201,8 @@ def plugged(adapter: UsbAdapter) -> Iterator[str]:
 
 
 def free_port(status: str) -> int:
-    """The first free port for a slow device, from the text of the virtual hub's `status` file.
+    """The first free port for a slow device, from the text of the virtual hub's
+    `status` file.
 
     Raises:
         EdgeError: all are taken.

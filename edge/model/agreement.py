@@ -1,4 +1,5 @@
-"""Tasks that agree: one whose labels are the pairs of two others' labels is decided with them."""
+"""Tasks that agree: one whose labels are the pairs of two others' labels is decided
+with them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Factors = Mapping[str, Sequence[int]]
-"""{factor: the index of its label for each label of the product}. A product, such as category, has
-one label for each pair of its two factors' labels, such as mobility and softness."""
+"""{factor: the index of its label for each label of the product}. A product, such as
+category, has one label for each pair of its two factors' labels, such as mobility and
+softness."""
 
 
 def agreed(
@@ -24,16 +26,20 @@ def agreed(
         distances: {task: (..., labels) in log odds} of the three tasks at least.
 
     Returns:
-        {task: (...) indices of the answer's labels}, and {task: (..., labels) distance of the
-        nearest answer with each label}, of the three tasks.
+        {task: (...) indices of the answer's labels}, and {task: (..., labels) distance
+        of the nearest answer with each label}, of the three tasks.
     """
     columns = {factor: np.array(indices) for factor, indices in factors.items()}
-    totals = sum((distances[f][..., indices] for f, indices in columns.items()), distances[task])
+    totals = sum(
+        (distances[f][..., indices] for f, indices in columns.items()), distances[task]
+    )
     best = np.asarray(totals.argmin(axis=-1))
     labels, nearest = {task: best}, {task: totals}
     for factor, indices in columns.items():
         labels[factor] = indices[best]
-        with_label = [totals[..., indices == i].min(axis=-1) for i in range(indices.max() + 1)]
+        with_label = [
+            totals[..., indices == i].min(axis=-1) for i in range(indices.max() + 1)
+        ]
         nearest[factor] = np.stack(with_label, axis=-1)
     return labels, nearest
 

@@ -22,7 +22,9 @@ from edge.touch.track import ContactTracker
 
 METADATA_KEY = "edge-classify"
 FORMAT = 6
-OPTIONAL = "decision_points_s stopping novelty joints kernels name trials taught".split()
+OPTIONAL = (
+    "decision_points_s stopping novelty joints kernels name trials taught".split()
+)
 """Keys that are left out where they would be empty."""
 
 
@@ -38,9 +40,11 @@ class Task:
         accuracy: nested accuracy of the whole choice at export, 0 to 1.
         projection: "pca" (principal components) or "lda" (discriminants).
         features: the features that it takes, in the model's order; empty for all.
-        left_out: the groups left out to score the accuracy: "trial", or a label such as "object".
+        left_out: the groups left out to score the accuracy: "trial", or a label such as
+            "object".
         no_contact: the answer for a recording that ends without a contact, or None.
-        factors: of a task that is decided together with two others; see `edge.model.agreement`.
+        factors: of a task that is decided together with two others; see
+            `edge.model.agreement`.
     """
 
     labels: tuple[str, ...]
@@ -75,7 +79,8 @@ class ModelInfo:
     data_digest: str
     versions: dict[str, str] = field(default_factory=dict)
     decision_points_s: tuple[float, ...] = ()
-    """Windows for which the model can decide, the full one last; empty without calibration."""
+    """Windows for which the model can decide, the full one last; empty without
+    calibration."""
     stopping: dict[str, Stopping] = field(default_factory=dict)
     """The stopping rules of each task; empty without decision points."""
     novelty: Novelty | None = None
@@ -87,9 +92,11 @@ class ModelInfo:
     name: str = ""
     """Of the model, as its owner calls it."""
     trials: tuple[str, ...] = ()
-    """(rows,) names of the training trials; empty where they were too many to be kept."""
+    """(rows,) names of the training trials; empty where they were too many to be
+    kept."""
     taught: int = 0
-    """Number of the last trials, which were added on a board (`edge.tools.teaching`)."""
+    """Number of the last trials, which were added on a board
+    (`edge.tools.teaching`)."""
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -105,14 +112,20 @@ class ModelInfo:
         """Length of a feature vector."""
         return sum(self.widths)
 
-    def vector(self, series: FeatureSeries, window_s: float | None = None) -> NDArray[np.float64]:
-        """The model's features of a contact, by default at the full window: `feature_vector`."""
+    def vector(
+        self, series: FeatureSeries, window_s: float | None = None
+    ) -> NDArray[np.float64]:
+        """The model's features of a contact, by default at the full window:
+        `feature_vector`."""
         window_s = window_s or self.window_s
-        return feature_vector(series, window_s, self.samples, self.features, self.kernels)
+        return feature_vector(
+            series, window_s, self.samples, self.features, self.kernels
+        )
 
     @property
     def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
-        """{task: its factors} of the tasks that are decided together with two others."""
+        """{task: its factors} of the tasks that are decided together with two
+        others."""
         return {name: task.factors for name, task in self.tasks.items() if task.factors}
 
     @property
@@ -122,7 +135,8 @@ class ModelInfo:
 
     @property
     def dof(self) -> int | None:
-        """Number of joint angles that a frame must have; None if the model needs none."""
+        """Number of joint angles that a frame must have; None if the model needs
+        none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
     def tracker(
@@ -169,7 +183,8 @@ class ModelInfo:
         """Read the text that `to_json` wrote.
 
         Raises:
-            InputError: something is missing or of the wrong kind; the sentence names `name`.
+            InputError: something is missing or of the wrong kind; the sentence names
+                `name`.
         """
         where = f"{name}: its metadata"
         try:
@@ -194,15 +209,22 @@ class ModelInfo:
                 features=names,
                 units={name: meta.table("units").text(name) for name in names},
                 motion_frame=meta.choice("motion_frame", ("world", "skin")),
-                chain=Chain.from_dict(arm, where=f"{where}: arm") if arm is not None else None,
+                chain=Chain.from_dict(arm, where=f"{where}: arm")
+                if arm is not None
+                else None,
                 rows=meta.whole("rows"),
                 data_digest=meta.text("data_digest", empty=True),
-                versions={str(k): str(v) for k, v in meta.table("versions", {}).raw.items()},
+                versions={
+                    str(k): str(v) for k, v in meta.table("versions", {}).raw.items()
+                },
                 decision_points_s=points,
                 stopping={
-                    task: Stopping.from_table(rules.table(task), len(points)) for task in rules.raw
+                    task: Stopping.from_table(rules.table(task), len(points))
+                    for task in rules.raw
                 },
-                novelty=None if novelty is None else Novelty.from_table(novelty, len(points)),
+                novelty=None
+                if novelty is None
+                else Novelty.from_table(novelty, len(points)),
                 joints=meta.whole("joints", 0, allowed=range(0, 1001)),
                 kernels={
                     name: KernelTable.from_table(
@@ -235,7 +257,8 @@ class ModelInfo:
         dof = self.joints if self.chain is None else self.chain.dof
         points = self.decision_points_s
         contradictions = {
-            "its features contradict its joints": self.joints != (dof if of_joints else 0)
+            "its features contradict its joints": self.joints
+            != (dof if of_joints else 0)
             or of_joints > (self.joints > 0),
             "its metadata names no task": not self.tasks,
             "its decision points are impossible": points
@@ -246,7 +269,9 @@ class ModelInfo:
                 or self.novelty is None
                 or self.novelty.task not in self.tasks
             ),
-            "the factors of a task are impossible": not all(map(self._factors_fit, self.products)),
+            "the factors of a task are impossible": not all(
+                map(self._factors_fit, self.products)
+            ),
             f"names {len(self.trials)} of {self.rows} trials": self.trials
             and len(self.trials) != self.rows,
             "its motion frame contradicts its arm": (self.motion_frame == "world")
@@ -260,7 +285,9 @@ class ModelInfo:
         """Whether each pair of the factors' labels is one label of the task."""
         indices = self.products[task]
         ranges = [range(len(self.tasks[f].labels)) for f in indices if f in self.tasks]
-        if len(ranges) != 2 or {len(self.tasks[task].labels)} != {*map(len, indices.values())}:
+        if len(ranges) != 2 or {len(self.tasks[task].labels)} != {
+            *map(len, indices.values())
+        }:
             return False
         return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
 

@@ -32,15 +32,17 @@ class Decision(NamedTuple):
             `edge.model.agreement`) may have another label than most votes.
         confidence: the label's share of the votes, 0 to 1.
         scores: (labels,) share of the votes of each label.
-        distances: (k,) of the neighbours, nearest first, in the space of the projection.
+        distances: (k,) of the neighbours, nearest first, in the space of the
+            projection.
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) how far the nearest training trials of each label lie
-            (`edge.tools.teaching.nearest_of_label` says how many), in log odds, of a model with
-            decision points or with tasks that are decided together. For these it is the distance
-            of the nearest answer with this label in which they agree.
-        out_of_range: the features lie so far outside those of the training trials that the model
-            cut them off; see `train.projection.Grid`.
+            (`edge.tools.teaching.nearest_of_label` says how many), in log odds, of a
+            model with decision points or with tasks that are decided together. For
+            these it is the distance of the nearest answer with this label in which they
+            agree.
+        out_of_range: the features lie so far outside those of the training trials that
+            the model cut them off; see `train.projection.Grid`.
     """
 
     label: str
@@ -71,7 +73,8 @@ class Model:
         version: the first eight digits of the file's SHA-256.
 
     Raises:
-        InputError: the file is missing, is not an exported model, or contradicts itself.
+        InputError: the file is missing, is not an exported model, or contradicts
+            itself.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -87,7 +90,8 @@ class Model:
                 f"{name}: has no {METADATA_KEY} metadata; export it with `make export`"
             )
         self.version = hashlib.sha256(data).hexdigest()[:8]
-        # First the format: an older one has other operators, but is named by its number.
+        # First the format: an older one has other operators, but is named by its
+        # number.
         self.info = ModelInfo.from_json(text, name)
         onnx_file.check(self.contents, name)
         runtime = _onnxruntime()
@@ -95,14 +99,19 @@ class Model:
         # One thread is fastest for models of this size.
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
-        # Converts the constants that are stored in float32 once. More would change nothing.
-        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+        # Converts the constants that are stored in float32 once. More would change
+        # nothing.
+        options.graph_optimization_level = (
+            runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+        )
         options.enable_cpu_mem_arena = False
         try:
             self._session = runtime.InferenceSession(
                 data, options, providers=["CPUExecutionProvider"]
             )
-        except Exception as error:  # onnxruntime's own exceptions share no base but this
+        except (
+            Exception
+        ) as error:  # onnxruntime's own exceptions share no base but this
             raise InputError(
                 f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
             ) from None
@@ -110,13 +119,16 @@ class Model:
         self._check()
 
     def _check(self) -> None:
-        """Refuse a graph whose inputs and outputs are not those that the metadata describes."""
+        """Refuse a graph whose inputs and outputs are not those that the metadata
+        describes."""
         session = self._session
         expected = {"features": ("tensor(double)", [self.info.width]), **self._outputs}
         if self.info.decision_points_s:
             expected["decision_point"] = "tensor(int64)", []
         inputs = [*session.get_inputs(), *session.get_overridable_initializers()]
-        declared = {x.name: (x.type, x.shape[1:]) for x in (*inputs, *session.get_outputs())}
+        declared = {
+            x.name: (x.type, x.shape[1:]) for x in (*inputs, *session.get_outputs())
+        }
         for name, (kind, shape) in expected.items():
             seen_kind, seen = declared.get(name, (None, []))
             # Older versions of ONNX Runtime leave some sizes open; `run` checks these.
@@ -140,7 +152,8 @@ class Model:
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
-        """Windows for which the model can decide; without calibration, only the full one."""
+        """Windows for which the model can decide; without calibration, only the full
+        one."""
         return self.info.decision_points_s or (self.info.window_s,)
 
     def run(
@@ -158,7 +171,9 @@ class Model:
         last = len(self.decision_points_s) - 1
         point = last if decision_point is None else decision_point
         if not 0 <= point <= last:
-            raise InputError(f"{self.path}: has the decision points 0 to {last}, not {point}")
+            raise InputError(
+                f"{self.path}: has the decision points 0 to {last}, not {point}"
+            )
         inputs: dict[str, NDArray[Any]] = {"features": vectors}
         if self.info.decision_points_s:
             inputs["decision_point"] = np.array([point], dtype=np.int64)
@@ -172,23 +187,32 @@ class Model:
                 raise self._broken(f"{name} has the shape {outputs[name].shape}")
         return outputs
 
-    def decide(self, vector: ArrayLike, decision_point: int | None = None) -> dict[str, Decision]:
+    def decide(
+        self, vector: ArrayLike, decision_point: int | None = None
+    ) -> dict[str, Decision]:
         """Decide all tasks for one feature vector.
 
         Args:
             vector: (width,) measured over the window of the decision point.
-            decision_point: index in `decision_points_s`; None for the last, the full window.
+            decision_point: index in `decision_points_s`; None for the last, the full
+                window.
 
         Raises:
             OutOfRange: a value of the vector is not finite, before or after scaling.
-            InputError: the vector has another length, the model has no such decision point, or
-                its file is damaged.
+            InputError: the vector has another length, the model has no such decision
+                point, or its file is damaged.
         """
         x = np.asarray(vector, dtype=np.float64)
         if x.shape != (self.info.width,):
-            raise InputError(f"{self.path}: takes {self.info.width} features, not {x.shape}")
-        outputs = {name: value[0] for name, value in self.run(x[None], decision_point).items()}
-        labels: dict[str, Any] = {task: outputs[f"{task}_label"] for task in self.info.tasks}
+            raise InputError(
+                f"{self.path}: takes {self.info.width} features, not {x.shape}"
+            )
+        outputs = {
+            name: value[0] for name, value in self.run(x[None], decision_point).items()
+        }
+        labels: dict[str, Any] = {
+            task: outputs[f"{task}_label"] for task in self.info.tasks
+        }
         if min(labels.values()) < 0:
             raise self._refusal(x)
         distances: dict[str, Any] = {
@@ -203,7 +227,9 @@ class Model:
             index, scores = int(labels[task]), outputs[f"{task}_scores"]
             shares = scores.tolist()
             if index >= len(shares) or not 0.0 <= shares[index] <= 1.0:
-                raise self._broken(f"{task} is answered by label {index} of {len(shares)}")
+                raise self._broken(
+                    f"{task} is answered by label {index} of {len(shares)}"
+                )
             decisions[task] = Decision(
                 entry.labels[index],
                 shares[index],
@@ -217,17 +243,24 @@ class Model:
         return decisions
 
     def _broken(self, reason: str) -> InputError:
-        """The error for a file that loads, but does not answer as an exported model does."""
+        """The error for a file that loads, but does not answer as an exported model
+        does."""
         reason = " ".join(reason.split())[:200]
-        return InputError(f"{self.path}: cannot be run ({reason}); copy or export it again")
+        return InputError(
+            f"{self.path}: cannot be run ({reason}); copy or export it again"
+        )
 
     def _refusal(self, x: NDArray[np.float64]) -> OutOfRange:
         """The error for a vector that the graph answers with label -1."""
         finite = np.isfinite(x)
         if finite.all():
-            return OutOfRange("the features are too large to be scaled; check the skin's units")
+            return OutOfRange(
+                "the features are too large to be scaled; check the skin's units"
+            )
         feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
-        return OutOfRange(f"value {finite.argmin()} of the features, of {feature}, is not finite")
+        return OutOfRange(
+            f"value {finite.argmin()} of the features, of {feature}, is not finite"
+        )
 
 
 def require_joints(model: Model, dof: int | None, where: str) -> None:
@@ -250,7 +283,8 @@ def require_joints(model: Model, dof: int | None, where: str) -> None:
 
 
 def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
-    """{output: its type, and its shape for one vector} of a graph with this metadata."""
+    """{output: its type, and its shape for one vector} of a graph with this
+    metadata."""
     outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
     for task, entry in info.tasks.items():
         outputs |= {
@@ -265,10 +299,13 @@ def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
 
 
 def _onnxruntime() -> Any:
-    """onnxruntime, imported where a model is first needed: it is most of the start-up time."""
+    """onnxruntime, imported where a model is first needed: it is most of the start-up
+    time."""
     try:
         with delayed():
             import onnxruntime
     except ImportError as error:
-        raise EdgeError(f"onnxruntime cannot be imported ({error}); install it with pip") from None
+        raise EdgeError(
+            f"onnxruntime cannot be imported ({error}); install it with pip"
+        ) from None
     return onnxruntime

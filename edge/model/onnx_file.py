@@ -1,8 +1,9 @@
 """Contents of a model file, checked before ONNX Runtime loads it.
 
-ONNX Runtime would follow a path to another file, and would run any operator that it knows. Reading
-a few fields of the ONNX protobuf (onnx.proto3) shows that a file refers to nothing outside itself
-and uses only the operators of an exported model, in a graph of its size.
+ONNX Runtime would follow a path to another file, and would run any operator that it
+knows. Reading a few fields of the ONNX protobuf (onnx.proto3) shows that a file refers
+to nothing outside itself and uses only the operators of an exported model, in a graph
+of its size.
 """
 
 from collections import defaultdict
@@ -31,7 +32,8 @@ NODES, INITIALIZERS, SPARSE = 1, 5, 15
 OPERATOR, ATTRIBUTES, DOMAIN = 4, 5, 7
 """Fields of a NodeProto."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
-"""Fields of an attribute that is a number, a text or several numbers, not a tensor or a graph."""
+"""Fields of an attribute that is a number, a text or several numbers, not a tensor or a
+graph."""
 TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
 """Fields of a TensorProto."""
 
@@ -39,8 +41,8 @@ TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
 """{type of a TensorProto: its numbers}."""
 
 Message = dict[int, list[Any]]
-"""{field number: its values}: numbers, or memoryviews of the bytes of a text or an inner message.
-A damaged file may have one where the other belongs."""
+"""{field number: its values}: numbers, or memoryviews of the bytes of a text or an
+inner message. A damaged file may have one where the other belongs."""
 
 
 class Node(NamedTuple):
@@ -74,14 +76,17 @@ class Contents:
 
         Args:
             name: of the constant, or of a value that `Gather` and `Cast` make of one.
-            point: the decision point at which to take such a value; None for all of them.
+            point: the decision point at which to take such a value; None for all of
+                them.
 
         Raises:
             KeyError: the graph has no such constant.
         """
         if name in self.tensors:
             tensor: Any = self.tensors[name]
-            return np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]]).reshape(tensor.get(1, []))
+            return np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]]).reshape(
+                tensor.get(1, [])
+            )
         node = self.makers[name]
         values = self.constant(node.inputs[0], point)
         return values if point is None or node.operator != "Gather" else values[point]
@@ -112,7 +117,8 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def _fields(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
-    """Number, value and bytes of each field of a protobuf message (protobuf.dev, Encoding)."""
+    """Number, value and bytes of each field of a protobuf message (protobuf.dev,
+    Encoding)."""
     at = 0
     while at < len(value):
         first = at
@@ -125,7 +131,9 @@ def _fields(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
         if key & 7 == 2:
             size, at = _varint(value, at)
         if size is None or at + size > len(value):
-            raise ValueError("a field of an unknown kind, or one that runs past its message")
+            raise ValueError(
+                "a field of an unknown kind, or one that runs past its message"
+            )
         at += size
         yield key >> 3, value[at - size : at], value[first:at]
 
@@ -168,7 +176,9 @@ def read(data: bytes, name: str) -> Contents:
             unusual |= SPARSE in graph
             for fields in _messages(graph, NODES):
                 domain, operator = _text(fields, DOMAIN), _text(fields, OPERATOR)
-                contents.nodes.append(Node(operator, _texts(fields, 1), _texts(fields, 2)))
+                contents.nodes.append(
+                    Node(operator, _texts(fields, 1), _texts(fields, 2))
+                )
                 if domain not in ("", "ai.onnx") or operator not in OPERATORS:
                     foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
                 for attribute in _messages(fields, ATTRIBUTES):
@@ -177,7 +187,8 @@ def read(data: bytes, name: str) -> Contents:
                 contents.tensors[_text(tensor, TENSOR_NAME)] = tensor
                 if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
                     foreign.append("weights in another file")
-    # A field that runs past its message or is of no known kind; a number in place of bytes.
+    # A field that runs past its message or is of no known kind; a number in place of
+    # bytes.
     except (IndexError, TypeError, ValueError):
         contents.nodes.clear()
     if not contents.nodes:
@@ -196,7 +207,9 @@ def check(contents: Contents, name: str) -> None:
         InputError: one sentence that names the file.
     """
     for reason in contents.foreign:
-        raise InputError(f"{name}: has {reason}, as no exported model has; export it again")
+        raise InputError(
+            f"{name}: has {reason}, as no exported model has; export it again"
+        )
 
 
 def rewritten(
@@ -220,10 +233,16 @@ def _constants_changed(
 ) -> Iterator[bytes | memoryview]:
     kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
     for number, value, unchanged in _fields(graph):
-        if number == INITIALIZERS and (name := _text(_message(value), TENSOR_NAME)) in constants:
+        if (
+            number == INITIALIZERS
+            and (name := _text(_message(value), TENSOR_NAME)) in constants
+        ):
             array = np.ascontiguousarray(constants[name])
             tensor = [_field(1, size) for size in array.shape]
-            tensor += [_field(2, kinds[array.dtype]), _field(TENSOR_NAME, name.encode())]
+            tensor += [
+                _field(2, kinds[array.dtype]),
+                _field(TENSOR_NAME, name.encode()),
+            ]
             yield _field(INITIALIZERS, b"".join([*tensor, _field(9, array.tobytes())]))
         else:
             yield unchanged

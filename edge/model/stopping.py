@@ -1,4 +1,5 @@
-"""When a contact is decided: a calibrated confidence, and rules whose error rate is certified."""
+"""When a contact is decided: a calibrated confidence, and rules whose error rate is
+certified."""
 
 from __future__ import annotations
 
@@ -12,12 +13,12 @@ from edge.errors import InputError
 UNKNOWN = "unknown"
 """The label of a contact that is unlike everything in training."""
 NOVELTY_RATE = 0.02
-"""Rate at which contacts with trained objects may be called unknown. Such answers are counted among
-the certified errors."""
+"""Rate at which contacts with trained objects may be called unknown. Such answers are
+counted among the certified errors."""
 
 TEST_SHARE = 0.5
-"""Part of the risk that the tests on calibration trials take. The rest covers the exported model,
-which errs more or less often than the folds' models do on average."""
+"""Part of the risk that the tests on calibration trials take. The rest covers the
+exported model, which errs more or less often than the folds' models do on average."""
 
 
 def check_rate(value: float, name: str) -> None:
@@ -31,15 +32,16 @@ def check_rate(value: float, name: str) -> None:
 
 
 def margin(distances: Sequence[float], label: int) -> float:
-    """Evidence for a label: how much farther the training trials of the nearest other one lie.
+    """Evidence for a label: how much farther the training trials of the nearest other
+    one lie.
 
     Args:
         distances: (labels,) of `edge.model.Decision.label_distances`.
         label: index of the label.
 
     Returns:
-        The difference. It is minus infinity if the label's own trials are infinitely far away, and
-        0 if there is no other label.
+        The difference. It is minus infinity if the label's own trials are infinitely
+        far away, and 0 if there is no other label.
     """
     own_distance = distances[label]
     others = [d for other, d in enumerate(distances) if other != label]
@@ -53,15 +55,16 @@ def _logistic(x: float) -> float:
 
 @dataclass(frozen=True)
 class StoppingRule:
-    """Decide at the first decision point that is sure enough, and at the last one in any case.
+    """Decide at the first decision point that is sure enough, and at the last one in
+    any case.
 
     A contact that is unknown there waits until it no longer is, or for the full window.
 
     Attributes:
         error: certified: decisions are wrong at most this often.
         mean_s: mean seconds from onset to decision, on the calibration trials.
-        confidence: decide from this confidence on, by the curve of all decision points. Above 1 no
-            confidence is enough, so the rule waits for a fixed window.
+        confidence: decide from this confidence on, by the curve of all decision points.
+            Above 1 no confidence is enough, so the rule waits for a fixed window.
         last: decision point at which to decide in any case.
     """
 
@@ -81,12 +84,14 @@ class Stopping:
     """The calibration of one task's early decisions, which `train.stopping` makes.
 
     Attributes:
-        slopes, intercepts: of each decision point: the probability that the label is right is the
-            logistic function of slope * `margin` + intercept.
-        slope, intercept: the same of all decision points together, for the rules. A point's own
-            curve seldom rises high early, so with it the rules would wait on clear contacts too.
-        rules: in the order of rising error. Mean times fall along them, except from a factor's own
-            rules to those that it shares with its product (see `edge.model.agreement`).
+        slopes, intercepts: of each decision point: the probability that the label is
+            right is the logistic function of slope * `margin` + intercept.
+        slope, intercept: the same of all decision points together, for the rules. A
+            point's own curve seldom rises high early, so with it the rules would wait
+            on clear contacts too.
+        rules: in the order of rising error. Mean times fall along them, except from a
+            factor's own rules to those that it shares with its product (see
+            `edge.model.agreement`).
         trials: number of trials that certify the rules.
         wrong: number of these trials that are decided wrongly at the full window.
         risk: probability that a rule errs more often than its certificate says.
@@ -108,7 +113,9 @@ class Stopping:
 
     def confidence(self, decision_point: int, evidence: float) -> float:
         """Probability, 0 to 1, that a label with this `margin` is right."""
-        return _logistic(self.slopes[decision_point] * evidence + self.intercepts[decision_point])
+        return _logistic(
+            self.slopes[decision_point] * evidence + self.intercepts[decision_point]
+        )
 
     def sure(self, rule: StoppingRule, evidence: float) -> bool:
         """Whether a label with this `margin` is sure enough for a rule."""
@@ -120,7 +127,8 @@ class Stopping:
         return able[-1] if able else None
 
     def refusal(self, error: float) -> str:
-        """A sentence that says why an error rate cannot be certified, and how many trials could."""
+        """A sentence that says why an error rate cannot be certified, and how many
+        trials could."""
         share = self.wrong / self.trials
         known = (
             f"the smallest error that {self.trials} calibration trials certify is "
@@ -141,7 +149,8 @@ class Stopping:
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:
-        """Read the table from the metadata of a model with this number of decision points.
+        """Read the table from the metadata of a model with this number of decision
+        points.
 
         Raises:
             InputError: the table is damaged.
@@ -171,12 +180,12 @@ class Stopping:
 class Novelty:
     """When a contact is unlike everything in training.
 
-    The distance to the nearest training trial is taken in the space of the task with most labels:
-    of all spaces, it distinguishes objects best.
+    The distance to the nearest training trial is taken in the space of the task with
+    most labels: of all spaces, it distinguishes objects best.
 
     Attributes:
-        task: whose space it is. It names no label for an unknown contact: a new object can still
-            be called soft or movable.
+        task: whose space it is. It names no label for an unknown contact: a new object
+            can still be called soft or movable.
         rates: shares of trained contacts that lie farther than the limits, falling.
         limits: (decision points, rates) distances.
     """
@@ -186,20 +195,26 @@ class Novelty:
     limits: tuple[tuple[float, ...], ...]
 
     def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest novelty rate at which the distance counts as unknown; 1 if it never does."""
+        """The smallest novelty rate at which the distance counts as unknown; 1 if it
+        never does."""
         limits = zip(self.rates, self.limits[decision_point], strict=True)
         return min((rate for rate, limit in limits if distance > limit), default=1.0)
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:
-        """Read the table from the metadata of a model with this number of decision points.
+        """Read the table from the metadata of a model with this number of decision
+        points.
 
         Raises:
             InputError: the table is damaged.
         """
         rates, rows = table.numbers("rates"), table.get("limits")
         if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
-            raise table.fail("limits", f"{points} rows of a number for each of the rates")
-        lines = (ConfigTable({"limits": row}, table.where, table.prefix) for row in rows)
+            raise table.fail(
+                "limits", f"{points} rows of a number for each of the rates"
+            )
+        lines = (
+            ConfigTable({"limits": row}, table.where, table.prefix) for row in rows
+        )
         limits = tuple(line.numbers("limits", len(rates)) for line in lines)
         return cls(table.text("task"), rates, limits)

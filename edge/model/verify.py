@@ -1,4 +1,5 @@
-"""golden.npz: raw frames with every result on the way to a decision, to check a machine by.
+"""golden.npz: raw frames with every result on the way to a decision, to check a machine
+by.
 
 | key | type | meaning |
 |---|---|---|
@@ -15,9 +16,9 @@
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin`, `bounds` {`scores`, `label_distances`, `features`, `time_s`} |
 
-A bound b allows abs(seen - expected) <= b * max(1, abs(expected)). A quantity without a bound must
-be equal. Distances have none: they come from whole numbers, and an engine that computes in float32
-gives others.
+A bound b allows abs(seen - expected) <= b * max(1, abs(expected)). A quantity without a
+bound must be equal. Distances have none: they come from whole numbers, and an engine
+that computes in float32 gives others.
 """
 
 import os
@@ -51,7 +52,8 @@ class Check:
     Attributes:
         name: the quantity.
         rows: how many rows were compared.
-        worst: largest difference over its allowance; infinity where nothing was allowed.
+        worst: largest difference over its allowance; infinity where nothing was
+            allowed.
         row: its row, or None where all rows are equal.
         seen: the value there.
         expected: the golden value there.
@@ -70,7 +72,9 @@ class Check:
         return self.worst <= 1.0
 
 
-def first_series(recording: Recording, model: Model) -> tuple[float, FeatureSeries] | None:
+def first_series(
+    recording: Recording, model: Model
+) -> tuple[float, FeatureSeries] | None:
     """Onset and series of a recording's first contact, by the board's own path."""
     return first_contact(recording, model.info.tracker(recording.layout))
 
@@ -84,14 +88,21 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     name = os.fspath(path)
     arrays = load_arrays(name)
     meta = load_meta(name, arrays)
-    with parsing(name, "a golden file of this model", "; export it again with the model"):
+    with parsing(
+        name, "a golden file of this model", "; export it again with the model"
+    ):
         SkinLayout.from_dict(meta["skin"], where=name)
         bounds = {str(key): float(bound) for key, bound in meta["bounds"].items()}
-        lines = [*_path(model, arrays, meta, bounds), *_graph(model, name, arrays, bounds)]
+        lines = [
+            *_path(model, arrays, meta, bounds),
+            *_graph(model, name, arrays, bounds),
+        ]
         return [compared(*line) for line in lines]
 
 
-def _trials(arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) -> Iterator[Recording]:
+def _trials(
+    arrays: dict[str, NDArray[Any]], meta: dict[str, Any]
+) -> Iterator[Recording]:
     keys = [key for key in ("t", "frames", "joints", "valid") if key in arrays]
     for first, end in pairwise(arrays["start"].tolist()):
         if not 0 <= first < end <= len(arrays["t"]):
@@ -101,7 +112,10 @@ def _trials(arrays: dict[str, NDArray[Any]], meta: dict[str, Any]) -> Iterator[R
 
 
 def _path(
-    model: Model, arrays: dict[str, NDArray[Any]], meta: dict[str, Any], bounds: dict[str, float]
+    model: Model,
+    arrays: dict[str, NDArray[Any]],
+    meta: dict[str, Any],
+    bounds: dict[str, float],
 ) -> Iterator[Line]:
     """Onsets, series and feature vectors of the trials."""
     info = model.info
@@ -141,14 +155,19 @@ def _graph(
         yield key, seen, arrays[key], bound
 
 
-def answers(model: Model, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """{key: the graph's output} for the vectors of a golden file, each at its decision point."""
+def answers(
+    model: Model, arrays: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """{key: the graph's output} for the vectors of a golden file, each at its decision
+    point."""
     ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
     seen = {"": _outputs(model, arrays["vectors"])}
     if model.info.decision_points_s:
         rows = enumerate(arrays["decision_point_vectors"])
         points = [_outputs(model, vectors, point) for point, vectors in rows]
-        seen["decision_point_"] = {key: np.stack([p[key] for p in points]) for key in points[0]}
+        seen["decision_point_"] = {
+            key: np.stack([p[key] for p in points]) for key in points[0]
+        }
     return {
         f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
         for prefix, outputs in seen.items()
@@ -160,9 +179,12 @@ def answers(model: Model, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArr
 def _outputs(
     model: Model, vectors: NDArray[np.float64], decision_point: int | None = None
 ) -> dict[str, NDArray[Any]]:
-    """The graph's outputs for vectors (n, width), asked one by one as the board does."""
+    """The graph's outputs for vectors (n, width), asked one by one as the board
+    does."""
     vectors = np.ascontiguousarray(vectors, np.float64)
-    single = [model.run(vectors[i : i + 1], decision_point) for i in range(len(vectors))]
+    single = [
+        model.run(vectors[i : i + 1], decision_point) for i in range(len(vectors))
+    ]
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
 
 
@@ -190,22 +212,34 @@ def renew(
     save_arrays(target, arrays | answers(model, arrays), meta, compress=True)
 
 
-def compared(name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float) -> Check:
-    """Compare a quantity, whose first axis is the rows; see the module for the bound."""
+def compared(
+    name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float
+) -> Check:
+    """Compare a quantity, whose first axis is the rows; see the module for the
+    bound."""
     if seen.shape != expected.shape:
-        return Check(name, len(expected), np.inf, 0, f"shape {seen.shape}", f"{expected.shape}")
+        return Check(
+            name, len(expected), np.inf, 0, f"shape {seen.shape}", f"{expected.shape}"
+        )
     if seen.size == 0:
         return Check(name, 0, 0.0, None)
     same = (seen == expected) | (np.isnan(seen) & np.isnan(expected))
     allowance = bound * np.maximum(1.0, np.abs(expected))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         # An infinite value is near no other, though its allowance is infinite.
-        gap = np.where(np.isfinite(allowance), np.abs(seen - expected) / allowance, np.inf)
-    share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(len(seen), -1)
+        gap = np.where(
+            np.isfinite(allowance), np.abs(seen - expected) / allowance, np.inf
+        )
+    share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(
+        len(seen), -1
+    )
     row, column = (int(i) for i in np.unravel_index(int(np.argmax(share)), share.shape))
     worst = float(share[row, column])
     if worst == 0.0:
         return Check(name, len(seen), 0.0, None)
     at_row = (values.reshape(share.shape)[row] for values in (seen, expected))
-    texts = [str(values) if bound == 0.0 else repr(float(values[column])) for values in at_row]
+    texts = [
+        str(values) if bound == 0.0 else repr(float(values[column]))
+        for values in at_row
+    ]
     return Check(name, len(seen), worst, row, *texts)

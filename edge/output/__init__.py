@@ -1,1 +1,2 @@
-"""Beside the classifier on the board: joint angles, event output, the map of touch, systemd."""
+"""Beside the classifier on the board: joint angles, event output, the map of touch,
+systemd."""

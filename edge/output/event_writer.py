@@ -1,7 +1,7 @@
 """Events to other programs: each is a line of JSON, to stdout, to a file, or by UDP.
 
-A slow reader never delays a decision. A pipe that nobody empties, a full disk or a network that is
-down costs lines, and those are counted.
+A slow reader never delays a decision. A pipe that nobody empties, a full disk or a
+network that is down costs lines, and those are counted.
 """
 
 import errno
@@ -41,7 +41,8 @@ class LineWriter:
         name: of the destination, for messages.
         lost: number of lines that could not be written.
         problem: the reason.
-        gone: the reader has gone, as `head` does once it has enough; all further lines are lost.
+        gone: the reader has gone, as `head` does once it has enough; all further lines
+            are lost.
     """
 
     def __init__(
@@ -57,7 +58,8 @@ class LineWriter:
             name: of the destination.
             write: writes a line, and may wait; an OSError loses the line.
             form: makes the line of an event, or None to leave the event out.
-            patient: says whether a full queue waits for a slow reader rather than lose lines.
+            patient: says whether a full queue waits for a slow reader rather than lose
+                lines.
         """
         self.name = name
         self.lost, self.problem, self.gone = 0, "", False
@@ -65,11 +67,14 @@ class LineWriter:
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         """Lines that wait, and None at the end."""
         self._closed = False
-        self._thread = threading.Thread(target=self._work, name=f"lines to {name}", daemon=True)
+        self._thread = threading.Thread(
+            target=self._work, name=f"lines to {name}", daemon=True
+        )
         self._thread.start()
 
     def put(self, event: Event) -> None:
-        """Queue an event's line; if the queue is full, it is lost once patience has an end."""
+        """Queue an event's line; if the queue is full, it is lost once patience has an
+        end."""
         text = self._form(event)
         if text is None:
             return
@@ -135,8 +140,8 @@ class Lines:
             out: a file; stdout where None.
             udp: `HOST:PORT`, which receives each line as a datagram, or None.
             form: makes the file's line of an event; UDP always carries JSON.
-            patient: says whether to wait for a slow reader of the file rather than lose lines,
-                as where time is virtual.
+            patient: says whether to wait for a slow reader of the file rather than lose
+                lines, as where time is virtual.
             more: further writers, which get each event and are closed with the others.
 
         Raises:
@@ -172,7 +177,9 @@ class Lines:
         if self._socket is not None:
             self._socket.close()
         for writer in self._writers:
-            left_early = writer is self._out and writer.problem == os.strerror(errno.EPIPE)
+            left_early = writer is self._out and writer.problem == os.strerror(
+                errno.EPIPE
+            )
             if writer.lost and not left_early:
                 lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
                 print(f"edge-classify: {lost}", file=sys.stderr)
@@ -203,9 +210,13 @@ def _line_by_line(out: TextIO) -> Callable[[bytes], None]:
 def _connected(address: str) -> socket.socket:
     from edge.address import parse_address  # few runs send datagrams
 
-    host, port = parse_address("--udp ", address, "127.0.0.1:47400", ports=range(1, 65536))
+    host, port = parse_address(
+        "--udp ", address, "127.0.0.1:47400", ports=range(1, 65536)
+    )
     with refusing(f"--udp {address}: cannot be reached"):
-        family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        family, kind, protocol, _, where = socket.getaddrinfo(
+            host, port, type=socket.SOCK_DGRAM
+        )[0]
         sender = socket.socket(family, kind, protocol)
         sender.setblocking(False)
         sender.connect(where)

@@ -1,4 +1,5 @@
-"""Messages to the service manager: ready, alive, stopping (sd_notify(3): a datagram each)."""
+"""Messages to the service manager: ready, alive, stopping (sd_notify(3): a datagram
+each)."""
 
 import os
 import socket
@@ -9,17 +10,20 @@ NEVER = float("inf")
 
 
 class Notifier:
-    """Tells systemd that the service is ready, alive or stopping; silent where none listens.
+    """Tells systemd that the service is ready, alive or stopping; silent where none
+    listens.
 
     >>> Notifier({}, now=lambda: 0.0).ready()
     """
 
-    def __init__(self, environment: Mapping[str, str] = os.environ, *, now: Callable[[], float]):
+    def __init__(
+        self, environment: Mapping[str, str] = os.environ, *, now: Callable[[], float]
+    ):
         """Take the manager's address from the environment.
 
         Args:
-            environment: NOTIFY_SOCKET (a path, or @name in the abstract namespace), and where
-                the manager watches, WATCHDOG_USEC and WATCHDOG_PID.
+            environment: NOTIFY_SOCKET (a path, or @name in the abstract namespace), and
+                where the manager watches, WATCHDOG_USEC and WATCHDOG_PID.
             now: a clock in seconds that never goes back.
         """
         self._now = now
@@ -29,8 +33,8 @@ class Notifier:
         microseconds = environment.get("WATCHDOG_USEC", "") if watched else ""
         allowed = int(microseconds) if microseconds.isdecimal() else 0
         self.period_s = 0.5e-6 * allowed if allowed else NEVER
-        """Half of the time that the manager allows between two signs of life; infinity if it does
-        not watch."""
+        """Half of the time that the manager allows between two signs of life; infinity
+        if it does not watch."""
         self._due = NEVER if self.period_s == NEVER else now()
 
     def ready(self, status: str = "") -> None:

@@ -1,9 +1,10 @@
 """A map of touch: a log of decisions with their places.
 
-A run begins with a line such as `{"event": "map", "frame": "torso", "unit": "metre", "tasks": []}`,
-where `frame` is the arm's base, or `skin`. The decisions that have a place follow, as the events of
-`edge-classify run`. Lines are only appended, so that earlier ones survive any failure. Readers
-leave out a line that was cut short (`train.touch_map`).
+A run begins with a line such as `{"event": "map", "frame": "torso", "unit": "metre",
+"tasks": []}`, where `frame` is the arm's base, or `skin`. The decisions that have a
+place follow, as the events of `edge-classify run`. Lines are only appended, so that
+earlier ones survive any failure. Readers leave out a line that was cut short
+(`train.touch_map`).
 """
 
 import errno
@@ -27,7 +28,8 @@ NOT_A_MAP = "not a map; give a file that `run --map` wrote"
 def map_writer(
     path: str | os.PathLike[str], info: ModelInfo, patient: Patience = impatient
 ) -> LineWriter:
-    """A writer that appends a run to a map: of the events it gets, the decisions with a place.
+    """A writer that appends a run to a map: of the events it gets, the decisions with a
+    place.
 
     Only the beginning of the file is read, however long it is.
 
@@ -45,7 +47,9 @@ def map_writer(
             former.seek(-min(len(first_line), 1), os.SEEK_END)
             torn = former.read() not in (b"", b"\n")
     with refusing(f"{name}: cannot be written"):
-        file = os.open(name, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        file = os.open(
+            name, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666
+        )
 
     def write(line: bytes) -> None:
         nonlocal torn
@@ -62,13 +66,15 @@ def map_writer(
 
 
 def _line(event: Mapping[str, Any]) -> str | None:
-    """The line of a map's head, or of a decision that has a place; None for other events."""
+    """The line of a map's head, or of a decision that has a place; None for other
+    events."""
     placed = event["event"] == "decision" and event.get("place") is not None
     return json_line(event) if placed or event["event"] == "map" else None
 
 
 def _check_head(line: bytes, head: Mapping[str, str], name: str) -> None:
-    """Check that the first line of a map has the frame and the unit of this run's head."""
+    """Check that the first line of a map has the frame and the unit of this run's
+    head."""
     try:
         former = parse_json(line, name)
         same = all(former[key] == value for key, value in head.items())

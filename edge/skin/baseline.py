@@ -1,10 +1,12 @@
-"""Counts above a baseline that follows slow drift, in integers, so that results repeat."""
+"""Counts above a baseline that follows slow drift, in integers, so that results
+repeat."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SCALE_BITS = 12
-"""The baseline is kept in 1/4096 counts, so that a slow drift is not lost to rounding."""
+"""The baseline is kept in 1/4096 counts, so that a slow drift is not lost to
+rounding."""
 FOLLOW_BITS = 2
 """A step is at most 1/4 of the distance, so that noise hardly moves the baseline."""
 
@@ -12,8 +14,9 @@ FOLLOW_BITS = 2
 class Baseline:
     """The rest values of n taxels.
 
-    Each call of `follow` moves them by at most `step_counts` towards the raw values, and never more
-    than `limit` counts away from the calibration. Without calls they stay.
+    Each call of `follow` moves them by at most `step_counts` towards the raw values,
+    and never more than `limit` counts away from the calibration. Without calls they
+    stay.
     """
 
     def __init__(
@@ -29,7 +32,8 @@ class Baseline:
 
         Args:
             rest: (n,) raw counts with nothing touching.
-            sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it lowers it.
+            sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it
+                lowers it.
             dead_band: (n,) or a scalar, counts under which a taxel reads 0; at least 1.
             step_counts: length of a step; rounded up to 1/4096 count.
             limit: greatest distance from `rest`, in counts.
@@ -38,7 +42,9 @@ class Baseline:
         n = self._rest.shape
         self._now = self._rest.copy()
         self._sign = np.broadcast_to(np.asarray(sign, dtype=np.int32), n)
-        self._dead = np.broadcast_to(np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n)
+        self._dead = np.broadcast_to(
+            np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n
+        )
         self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
         self._low = self._rest - (limit << SCALE_BITS)
         self._high = self._rest + (limit << SCALE_BITS)
@@ -49,13 +55,15 @@ class Baseline:
         return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
     def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
-        """Counts above the baseline (n,), 0 to 65535, with sign and dead band applied."""
+        """Counts above the baseline (n,), 0 to 65535, with sign and dead band
+        applied."""
         counts = (raw.astype(np.int32) - self.counts) * self._sign
         counts *= counts >= self._dead
         return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)
 
     def follow(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
-        """Follow the drift of the `valid` taxels by a step; call it while nothing touches."""
+        """Follow the drift of the `valid` taxels by a step; call it while nothing
+        touches."""
         error = (raw.astype(np.int32) << SCALE_BITS) - self._now
         error += 1 << (FOLLOW_BITS - 1)
         error >>= FOLLOW_BITS

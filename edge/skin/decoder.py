@@ -11,7 +11,8 @@ from edge.skin.bus_reader import NEVER, Slot
 from edge.skin.file import SkinFile
 
 NOISY_COUNTS = 1.0
-"""A chip with a taxel of at least this standard deviation has new bytes in every conversion."""
+"""A chip with a taxel of at least this standard deviation has new bytes in every
+conversion."""
 
 
 class Decoder:
@@ -29,8 +30,8 @@ class Decoder:
         """Map stages to taxels."""
         chips, n = file.chips, file.layout.rows * file.layout.cols
         self._groups: list[tuple[ChipSpec, NDArray[np.uint8]]] = []
-        """Neighbours of one kind with equal options and number of taxels, which one call parses:
-        the first of them, and their bytes (n, frame_bytes) in `_bytes`."""
+        """Neighbours of one kind with equal options and number of taxels, which one
+        call parses: the first of them, and their bytes (n, frame_bytes) in `_bytes`."""
         starts = np.cumsum([0, *(chip.kind.frame_bytes(chip) for chip in chips)])
         self._bytes = np.zeros(starts[-1], dtype=np.uint8)
         self._before, self._starts = self._bytes.copy(), starts[:-1]
@@ -38,7 +39,9 @@ class Decoder:
         """Readings in a row that gave the same bytes."""
         self.rows = np.split(self._bytes, starts[1:-1])
         first = 0
-        for _, group in groupby(chips, key=lambda c: (c.kind.name, len(c.taxels), c.options)):
+        for _, group in groupby(
+            chips, key=lambda c: (c.kind.name, len(c.taxels), c.options)
+        ):
             spec, *others = group
             last = first + 1 + len(others)
             data = self._bytes[starts[first] : starts[last]].reshape(last - first, -1)
@@ -68,10 +71,13 @@ class Decoder:
             reach = file.signal.saturation_counts + file.signal.drift_limit_counts
             lowest = np.maximum(baseline - reach, 0)
             highest = np.minimum(highest, baseline + reach)
-            np.logical_or.at(noisy, self._chip_of, file.calibration.noise.ravel() >= NOISY_COUNTS)
+            np.logical_or.at(
+                noisy, self._chip_of, file.calibration.noise.ravel() >= NOISY_COUNTS
+            )
         stuck = file.reading.stuck_frames
         self._limits = np.where(noisy[:-1], stuck, np.iinfo(np.int64).max)
-        """Equal readings in a row after which a chip is stuck, if its bytes must change."""
+        """Equal readings in a row after which a chip is stuck, if its bytes must
+        change."""
         for i, chip in enumerate(chips):
             if chip.kind.unchanged_frames is not None:
                 self._limits[i] = min(chip.kind.unchanged_frames, stuck)
@@ -79,11 +85,13 @@ class Decoder:
         self._range = (highest - lowest).astype(np.uint16)
         """A taxel's values lie from `_lowest` to so much above it."""
 
-    def decode(self, slots: Sequence[Slot], began: float, oldest: float) -> NDArray[np.bool_]:
+    def decode(
+        self, slots: Sequence[Slot], began: float, oldest: float
+    ) -> NDArray[np.bool_]:
         """Parse the bytes of all chips into `values` and `times`.
 
-        A chip that was read and serves damaged bytes, values that no touch reaches, or the same
-        bytes for too long is counted in its slot's `damaged`.
+        A chip that was read and serves damaged bytes, values that no touch reaches, or
+        the same bytes for too long is counted in its slot's `damaged`.
 
         Args:
             slots: the chips in the file's order.
@@ -100,14 +108,18 @@ class Decoder:
         self._intact[:-1] = np.concatenate([intact for _, intact in parsed], axis=None)
         fresh = at[:-1] >= began
         self._unchanged += fresh
-        self._unchanged[np.logical_or.reduceat(self._bytes != self._before, self._starts)] = 0
+        self._unchanged[
+            np.logical_or.reduceat(self._bytes != self._before, self._starts)
+        ] = 0
         np.copyto(self._before, self._bytes)
         damaged = np.append(self._unchanged >= self._limits, False)
         good &= ~damaged & (at >= oldest)
         self.values = values = self._raw.take(self._stage_of)
         self.times = at.take(self._chip_of)
         # A value under the lowest wraps round to above every range.
-        intact = self._intact.take(self._stage_of) & (values - self._lowest <= self._range)
+        intact = self._intact.take(self._stage_of) & (
+            values - self._lowest <= self._range
+        )
         damaged[self._chip_of[~intact & self.served]] = True
         for i in np.flatnonzero(fresh).tolist():
             if slots[i].good:

@@ -23,13 +23,14 @@ class Signal:
     """From raw values to counts above baseline.
 
     Attributes:
-        dead_band_sigma: counts under this many standard deviations of the noise become 0.
+        dead_band_sigma: counts under this many standard deviations of the noise become
+            0.
         dead_band_counts: counts under this become 0 too.
         drift_counts_per_s: how fast the baseline follows while nothing touches.
         drift_limit_counts: how far from the calibration it may move.
         settle_s: how long after a contact it stays frozen.
-        saturation_counts: no touch takes a taxel further from its baseline; a value beyond it is a
-            fault of the wire.
+        saturation_counts: no touch takes a taxel further from its baseline; a value
+            beyond it is a fault of the wire.
         dead: broken taxels, (row, col).
     """
 
@@ -50,10 +51,12 @@ class Reading:
         rate_hz: of frames.
         timeout_s: longest time that a hung chip costs; adapters round it up to 10 ms.
         verify_mux: read a mux's control byte back after each selection.
-        recheck_frames: number of frames between two checks of a chip's settings on each bus.
-        stuck_frames: a chip whose bytes do not change for this many frames is invalid, if it made
-            noise during calibration.
-        region_of_interest: read the chips near the contact at full rate, the rest in turn.
+        recheck_frames: number of frames between two checks of a chip's settings on each
+            bus.
+        stuck_frames: a chip whose bytes do not change for this many frames is invalid,
+            if it made noise during calibration.
+        region_of_interest: read the chips near the contact at full rate, the rest in
+            turn.
     """
 
     rate_hz: float = 100.0
@@ -69,7 +72,8 @@ class TaxelCalibration:
     """Rest values and noise as `edge-classify calibrate` measured them.
 
     Attributes:
-        baseline: (rows, cols) raw counts, rounded means; 0 where a taxel could not be read.
+        baseline: (rows, cols) raw counts, rounded means; 0 where a taxel could not be
+            read.
         noise: (rows, cols) raw counts, standard deviations.
         taken: time of measurement (UTC), or None where unknown.
     """
@@ -151,7 +155,9 @@ def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signa
         raise table.fail("dead", "a list of [row, col]")
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole("dead_band_counts", defaults.dead_band_counts, range(65536)),
+        dead_band_counts=table.whole(
+            "dead_band_counts", defaults.dead_band_counts, range(65536)
+        ),
         drift_counts_per_s=table.number(
             "drift_counts_per_s", defaults.drift_counts_per_s, 0.0, 65535.0
         ),
@@ -179,12 +185,18 @@ def _reading(table: ConfigTable) -> Reading:
     return reading
 
 
-def _calibration(table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]) -> TaxelCalibration:
+def _calibration(
+    table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]
+) -> TaxelCalibration:
     arrays: dict[str, NDArray[np.float64]] = {}
     for key in ("baseline", "noise"):
         try:
             array = np.array(table.get(key), dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):  # no numbers, or rows of different lengths
+        except (
+            TypeError,
+            ValueError,
+            OverflowError,
+        ):  # no numbers, or rows of different lengths
             array = np.empty(0)
         are_whole = key == "noise" or bool((array == np.floor(array)).all())
         in_range = ((array >= 0.0) & (array <= 65535.0)).all()
@@ -212,5 +224,6 @@ def _calibration(table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]) 
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
-    """Frames a second that buses carry side by side, from each bus's bits a frame and clock."""
+    """Frames a second that buses carry side by side, from each bus's bits a frame and
+    clock."""
     return 1.0 / max(b / hz for b, hz in zip(bits, clocks, strict=True))

@@ -25,11 +25,13 @@ class JointSource(Protocol):
     """A source of joint angles."""
 
     def at(self, t: float) -> NDArray[np.float64] | None:
-        """Angles (dof,) in radians at a time of the loop's clock; None where unknown."""
+        """Angles (dof,) in radians at a time of the loop's clock; None where
+        unknown."""
 
 
 class Periods:
-    """Times between ticks, counted in bins of 10 us, so that a long run needs no more memory.
+    """Times between ticks, counted in bins of 10 us, so that a long run needs no more
+    memory.
 
     >>> periods = Periods()
     >>> for period in (0.01, 0.01, 0.01, 0.02):
@@ -54,7 +56,8 @@ class Periods:
         self._counts[int(min(period_s, 1.0) / self.BIN_S + 1e-6)] += 1
 
     def percentile(self, percent: float) -> float:
-        """The seconds that this percentage of periods does not exceed, rounded up to a bin.
+        """The seconds that this percentage of periods does not exceed, rounded up to a
+        bin.
 
         NaN without periods.
         """
@@ -114,7 +117,8 @@ class Schedule:
 
 @contextmanager
 def stop_on(*signals: int) -> Iterator[Stop]:
-    """Let a signal end the loop after the current frame; a second one terminates at once."""
+    """Let a signal end the loop after the current frame; a second one terminates at
+    once."""
     stop = Stop()
     # All of them before any changes: a signal may come in between.
     handlers: dict[int, Any] = {number: signal.getsignal(number) for number in signals}
@@ -164,13 +168,16 @@ class Loop:
 
     def frames(self) -> Iterator[Frame]:
         """Read until the time is over or a stop is asked for."""
-        # To search all objects made so far for garbage takes 8 ms on a workstation: most of a tick.
+        # To search all objects made so far for garbage takes 8 ms on a workstation:
+        # most of a tick.
         gc.freeze()
         try:
             while not self._stop.asked:
                 due = self.schedule.wait(self._stop)
                 # A thousandth of a tick allows for rounding.
-                ended = due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s
+                ended = (
+                    due - self.schedule.start > self._lasts - 1e-3 * self.skin.period_s
+                )
                 if ended or self._stop.asked:
                     return
                 frame = self.skin.read()

@@ -1,8 +1,9 @@
 """The chips to read next, where one bus cannot carry the whole skin at the loop's rate.
 
-The chips that have waited longest come first, as many in a frame as the wire carries. During a
-contact, the chips at and around the touched taxels come before all others, except those that are
-overdue. A taxel that was not read keeps its last value and its own time (`Frame.times`).
+The chips that have waited longest come first, as many in a frame as the wire carries.
+During a contact, the chips at and around the touched taxels come before all others,
+except those that are overdue. A taxel that was not read keeps its last value and its
+own time (`Frame.times`).
 """
 
 import numpy as np
@@ -17,8 +18,8 @@ MARGIN = 0.9
 OVERDUE_FRAMES = 12
 """A chip that has waited for this many frames comes before those at a contact."""
 OLDEST_FRAMES = 25
-"""After this many frames without a reading a taxel is no longer valid. Of 32 chips on a bus, none
-waits for more than 20."""
+"""After this many frames without a reading a taxel is no longer valid. Of 32 chips on a
+bus, none waits for more than 20."""
 
 
 class ReadScheduler:
@@ -38,13 +39,17 @@ class ReadScheduler:
         """Bits to connect a mux channel."""
         self._near = []
         for bus in file.buses:
-            taxels_of_chip = np.zeros((len(bus.chips), *file.layout.shape), dtype=np.bool_)
+            taxels_of_chip = np.zeros(
+                (len(bus.chips), *file.layout.shape), dtype=np.bool_
+            )
             for i, chip in enumerate(bus.chips):
                 taxels_of_chip[i].flat[chip.served] = True
             # A chip is near a contact on its own taxels or on those next to them.
             near = with_neighbours(taxels_of_chip, file.layout.wraps)
             self._near.append(near.reshape(len(near), -1))
-        self._read_at = [np.full(len(bus.chips), -1, dtype=np.int64) for bus in file.buses]
+        self._read_at = [
+            np.full(len(bus.chips), -1, dtype=np.int64) for bus in file.buses
+        ]
         self._tick = 0
 
     def plan(self, frame: Frame | None, touch_counts: int = 0) -> list[list[int]]:
@@ -81,7 +86,8 @@ class ReadScheduler:
 
 
 def with_neighbours(mask: NDArray[np.bool_], wraps: bool) -> NDArray[np.bool_]:
-    """Masks (n, rows, cols) grown by one taxel in all directions, also across the seam."""
+    """Masks (n, rows, cols) grown by one taxel in all directions, also across the
+    seam."""
     tall = np.pad(mask, ((0, 0), (1, 1), (0, 0)))
     tall = tall[:, :-2] | tall[:, 1:-1] | tall[:, 2:]
     wide = np.pad(tall, ((0, 0), (0, 0), (1, 1)), mode="wrap" if wraps else "constant")

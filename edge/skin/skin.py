@@ -25,8 +25,8 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
 SILENT_FRAMES = 50
-"""A taxel without a valid value in this many frames in a row is silent: half a second at 100 Hz,
-within which a taxel returns from any fault that has ended."""
+"""A taxel without a valid value in this many frames in a row is silent: half a second
+at 100 Hz, within which a taxel returns from any fault that has ended."""
 
 
 class ChipStatus(NamedTuple):
@@ -46,7 +46,8 @@ class ChipStatus(NamedTuple):
 
 
 class Skin:
-    """A skin on its buses: `Skin.open` for real ones; those of `edge.fake` have the same face.
+    """A skin on its buses: `Skin.open` for real ones; those of `edge.fake` have the
+    same face.
 
     >>> from edge.fake.player import still
     >>> from edge.skin import file
@@ -68,19 +69,26 @@ class Skin:
 
         Args:
             file: which chip is where.
-            buses: one for each of the file's buses, in their order; `close` closes them.
+            buses: one for each of the file's buses, in their order; `close` closes
+                them.
             clock: of the loop and the buses; the kernel's where None.
             touch_counts: a taxel above this is touched: the baseline is frozen, and
-                region-of-interest reading turns to its chip. The file's threshold applies where
-                this is None or higher.
+                region-of-interest reading turns to its chip. The file's threshold
+                applies where this is None or higher.
         """
         self.file, self.layout = file, file.layout
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
-        self.scheduler = ReadScheduler(file) if file.reading.region_of_interest else None
+        self.scheduler = (
+            ReadScheduler(file) if file.reading.region_of_interest else None
+        )
         threshold = file.layout.threshold_counts
-        self.touch_counts = threshold if touch_counts is None else min(threshold, touch_counts)
-        self.oldest_s = self.period_s * (OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES)
+        self.touch_counts = (
+            threshold if touch_counts is None else min(threshold, touch_counts)
+        )
+        self.oldest_s = self.period_s * (
+            OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES
+        )
         """How old a taxel's value may be."""
         self._decoder = Decoder(file)
         rows = iter(self._decoder.rows)
@@ -118,7 +126,8 @@ class Skin:
 
         Args:
             file: the skin file or its path.
-            calibrated: refuse a file without calibration: its counts would mean nothing.
+            calibrated: refuse a file without calibration: its counts would mean
+                nothing.
             touch_counts: as for `Skin`.
 
         Raises:
@@ -135,7 +144,9 @@ class Skin:
             )
         with ExitStack() as opened:
             timeout_s = file.reading.timeout_s
-            buses = [opened.enter_context(closing(_open(b, timeout_s))) for b in file.buses]
+            buses = [
+                opened.enter_context(closing(_open(b, timeout_s))) for b in file.buses
+            ]
             skin = cls(file, buses, touch_counts=touch_counts)
             opened.callback(skin.close)
             skin.start()
@@ -164,13 +175,18 @@ class Skin:
         ]
 
     def bus_changes(self) -> list[tuple[str, bool]]:
-        """The buses that were lost or have come back since the last call: name and whether lost.
+        """The buses that were lost or have come back since the last call: name and
+        whether lost.
 
         A bus is lost while every chip on it fails, as when its adapter is unplugged.
         """
         former, self._lost = self._lost, [reader.lost for reader in self.readers]
         readers = zip(self.readers, former, strict=True)
-        return [(reader.bus.name, reader.lost) for reader, lost in readers if reader.lost != lost]
+        return [
+            (reader.bus.name, reader.lost)
+            for reader, lost in readers
+            if reader.lost != lost
+        ]
 
     def changes(self) -> list[ChipStatus]:
         """The chips whose state has changed since the last call, or since the start.
@@ -178,20 +194,27 @@ class Skin:
         A chip that is down stays so until it runs, whatever is tried.
         """
         former, self._states = self._states, [slot.state for slot in self._slots]
-        return [s for s, state in zip(self.status(), former, strict=True) if s.state != state]
+        return [
+            s
+            for s, state in zip(self.status(), former, strict=True)
+            if s.state != state
+        ]
 
     @property
     def invalid_for(self) -> NDArray[np.int64]:
-        """Number of frames in a row (rows, cols) for which a taxel has had no valid value.
+        """Number of frames in a row (rows, cols) for which a taxel has had no valid
+        value.
 
         It is 0 for a taxel that is dead or has no chip.
         """
         return self._invalid_for.reshape(self.layout.shape)
 
     def silent_changes(self) -> int | None:
-        """Number of taxels without a valid value for `SILENT_FRAMES` frames, if it has changed.
+        """Number of taxels without a valid value for `SILENT_FRAMES` frames, if it has
+        changed.
 
-        Call it once a frame; it gives a number in one of `SILENT_FRAMES` frames at most.
+        Call it once a frame; it gives a number in one of `SILENT_FRAMES` frames at
+        most.
         """
         self._since_silent += 1
         silent = int((self._invalid_for >= SILENT_FRAMES).sum())
@@ -201,20 +224,27 @@ class Skin:
         return silent
 
     def read(self) -> Frame:
-        """Read one frame; with region-of-interest reading, some chips keep their last values.
+        """Read one frame; with region-of-interest reading, some chips keep their last
+        values.
 
         Returns:
-            A frame whose `times` tell when each taxel was read. A taxel that could not be read,
-            is dead, or was last read more than `oldest_s` ago is not `valid` and reads 0.
+            A frame whose `times` tell when each taxel was read. A taxel that could not
+            be read, is dead, or was last read more than `oldest_s` ago is not `valid`
+            and reads 0.
         """
         clock = self.clock
-        clock.sleep_until(clock.now())  # lets the buses of a virtual clock start together
+        clock.sleep_until(
+            clock.now()
+        )  # lets the buses of a virtual clock start together
         t = clock.now()
         # The buses are read side by side, each in a thread.
         jobs: list[list[Slot]] = [reader.slots for reader in self.readers]
         if self.scheduler is not None:
             chosen = self.scheduler.plan(self._last, self.touch_counts)
-            jobs = [[job[i] for i in indices] for job, indices in zip(jobs, chosen, strict=True)]
+            jobs = [
+                [job[i] for i in indices]
+                for job, indices in zip(jobs, chosen, strict=True)
+            ]
         deadlines = [t + self.period_s - LONGEST_STEP_S] * len(jobs)
         list(self._threads.map(BusReader.read, self.readers, jobs, deadlines))
         return self._assemble(t)
@@ -237,7 +267,9 @@ class Skin:
         if settled and self.file.calibration is not None:
             self.baseline.follow(self._decoder.values, valid)
         shape, times = self.layout.shape, self._decoder.times
-        self._last = Frame(t, counts.reshape(shape), valid.reshape(shape), times.reshape(shape))
+        self._last = Frame(
+            t, counts.reshape(shape), valid.reshape(shape), times.reshape(shape)
+        )
         return self._last
 
     def close(self) -> None:

@@ -61,13 +61,19 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     table.done()
     if serial and len(chips) > 1:
-        raise InputError(f"{table.called('chips')} has {len(chips)}; a serial port has one")
+        raise InputError(
+            f"{table.called('chips')} has {len(chips)}; a serial port has one"
+        )
     specs = []
     for chip in chips:
         kind = _kind(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix))
         of_others = options - set(kind.options)
-        raw = {key: value for key, value in shared.items() if key not in of_others} | {**chip.raw}
-        specs.append(_chip(ConfigTable(raw, chip.where, chip.prefix), kind, layout, sign, serial))
+        raw = {key: value for key, value in shared.items() if key not in of_others} | {
+            **chip.raw
+        }
+        specs.append(
+            _chip(ConfigTable(raw, chip.where, chip.prefix), kind, layout, sign, serial)
+        )
     return BusSpec(device, tuple(specs), clock_hz, serial)
 
 
@@ -75,7 +81,9 @@ def _port(table: ConfigTable) -> tuple[str, int]:
     """A serial port and its bits per second."""
     port = table.text("serial")
     if table.has("device"):
-        raise InputError(f"{table.called('device')} is an I2C bus; give it or serial, not both")
+        raise InputError(
+            f"{table.called('device')} is an I2C bus; give it or serial, not both"
+        )
     return port, table.whole("baud", 115_200, range(1_200, 20_000_001))
 
 
@@ -98,20 +106,32 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
 def _kind(table: ConfigTable) -> ChipKind:
     name = table.get("kind")
     if not isinstance(name, str) or name not in KINDS:
-        kinds = ", ".join(f"{kind.name} ({kind.description})" for kind in KINDS.values())
+        kinds = ", ".join(
+            f"{kind.name} ({kind.description})" for kind in KINDS.values()
+        )
         raise table.fail("kind", f"one of {kinds}")
     return KINDS[name]
 
 
 def _chip(
-    table: ConfigTable, kind: ChipKind, layout: SkinLayout, sign: int | None, serial: bool
+    table: ConfigTable,
+    kind: ChipKind,
+    layout: SkinLayout,
+    sign: int | None,
+    serial: bool,
 ) -> ChipSpec:
     table.has("kind")
     if serial and not kind.serial:
-        raise InputError(f"{table.called('kind')} is {kind.name}; a serial port carries block only")
+        raise InputError(
+            f"{table.called('kind')} is {kind.name}; a serial port carries block only"
+        )
     if serial and table.has("address"):
-        raise InputError(f"{table.called('address')} has no meaning on a serial port; leave it out")
-    address = 0 if serial else table.whole("address", allowed=kind.addresses, form="#04x")
+        raise InputError(
+            f"{table.called('address')} has no meaning on a serial port; leave it out"
+        )
+    address = (
+        0 if serial else table.whole("address", allowed=kind.addresses, form="#04x")
+    )
     mux = channel = None
     if table.has("mux"):
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
@@ -149,15 +169,25 @@ def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
         row, col = table.pair("first")
         high, wide = table.pair("block")
         if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
-            raise table.fail("block", f"[rows, cols] within {layout.rows} x {layout.cols}")
+            raise table.fail(
+                "block", f"[rows, cols] within {layout.rows} x {layout.cols}"
+            )
         taxels = [[row + i, col + j] for i in range(high) for j in range(wide)]
     else:
-        raise InputError(f"{table.called('taxels')} is missing; give it, or first and block")
-    pairs = [None if taxel == [] else taxel_at(table, key, taxel, layout) for taxel in taxels]
-    return tuple(UNUSED if pair is None else pair[0] * layout.cols + pair[1] for pair in pairs)
+        raise InputError(
+            f"{table.called('taxels')} is missing; give it, or first and block"
+        )
+    pairs = [
+        None if taxel == [] else taxel_at(table, key, taxel, layout) for taxel in taxels
+    ]
+    return tuple(
+        UNUSED if pair is None else pair[0] * layout.cols + pair[1] for pair in pairs
+    )
 
 
-def taxel_at(table: ConfigTable, key: str, value: object, layout: SkinLayout) -> tuple[int, int]:
+def taxel_at(
+    table: ConfigTable, key: str, value: object, layout: SkinLayout
+) -> tuple[int, int]:
     """Row and column of a taxel that a key names.
 
     Raises:
@@ -179,22 +209,30 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
     for b, bus in enumerate(buses):
         place = f"{where}: bus {b}"
         if bus.device in devices[:b]:
-            raise InputError(f"{place} has the same device as bus {devices.index(bus.device)}")
+            raise InputError(
+                f"{place} has the same device as bus {devices.index(bus.device)}"
+            )
         claimed: dict[tuple[int | None, ...], str] = {
-            (None, None, chip.mux): "a mux" for chip in bus.chips if chip.mux is not None
+            (None, None, chip.mux): "a mux"
+            for chip in bus.chips
+            if chip.mux is not None
         }
         if claimed and bus.clock_hz > FASTEST_MUX_HZ:
             raise InputError(
                 f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most {FASTEST_MUX_HZ}"
             )
-        # While its channel is connected, a chip behind a mux also hears messages to the chips on
-        # the bus itself, so these claim their addresses first.
-        for c, chip in sorted(enumerate(bus.chips), key=lambda entry: entry[1].mux is not None):
+        # While its channel is connected, a chip behind a mux also hears messages to the
+        # chips on the bus itself, so these claim their addresses first.
+        for c, chip in sorted(
+            enumerate(bus.chips), key=lambda entry: entry[1].mux is not None
+        ):
             place = f"bus {b} chip {c}"
             route = (chip.mux, chip.channel, chip.address)
             other = claimed.get(route) or claimed.get((None, None, chip.address))
             if other is not None:
-                raise InputError(f"{where}: {place} has the same address as {other}, {chip.route}")
+                raise InputError(
+                    f"{where}: {place} has the same address as {other}, {chip.route}"
+                )
             claimed[route] = f"chip {c}"
             for taxel in chip.taxels:
                 if taxel in owner and taxel != UNUSED:

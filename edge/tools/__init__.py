@@ -1,1 +1,2 @@
-"""What stands beside the core: commands that decide nothing, with the page and the terminal."""
+"""What stands beside the core: commands that decide nothing, with the page and the
+terminal."""

@@ -1,9 +1,10 @@
 """Time each stage of a decision on this machine.
 
 Times each stage with a touch that grows over the model's skin, and writes medians, 99th
-percentiles, memory and start-up time as JSON, for `make tradeoff BOARD=board.json` on the
-workstation. Each figure is that of the fastest of five rounds, as other programs only ever make
-one slower; if they took part of the processor's time, a warning says how much.
+percentiles, memory and start-up time as JSON, for `make tradeoff BOARD=board.json` on
+the workstation. Each figure is that of the fastest of five rounds, as other programs
+only ever make one slower; if they took part of the processor's time, a warning says how
+much.
 """
 
 import argparse
@@ -34,12 +35,14 @@ from edge.touch.track import first_contact
 
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)
-"""The frames of the touch in which a contact is followed but neither begins nor is decided."""
+"""The frames of the touch in which a contact is followed but neither begins nor is
+decided."""
 REPEATS = 5
 ROUNDS = 400
 """How often each stage is timed in each repeat."""
 BUSY_SHARE = 0.05
-"""Share of the time in which this process had to wait, from which a machine counts as busy."""
+"""Share of the time in which this process had to wait, from which a machine counts as
+busy."""
 COLD = "import edge, sys; edge.Classifier(edge.Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 
@@ -47,7 +50,9 @@ Timings = dict[str, float | int]
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
-    parser.add_argument("--out", required=True, metavar="board.json", help="the file to write")
+    parser.add_argument(
+        "--out", required=True, metavar="board.json", help="the file to write"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,13 +63,17 @@ def run(arguments: argparse.Namespace) -> int:
     with write_whole(arguments.out) as file:
         file.write(json.dumps(board, indent=1, ensure_ascii=False).encode() + b"\n")
     for name, stage in board["stages"].items():
-        output.text(f"{name:<10} {stage['median_us']:>9} us median {stage['p99_us']:>9} us p99")
+        output.text(
+            f"{name:<10} {stage['median_us']:>9} us median {stage['p99_us']:>9} us p99"
+        )
     output.text(
         f"model      {board['model']['bytes'] / 1e6:>9.3f} MB\n"
         f"memory     {board['memory_mb']:>9.1f} MB\n"
         f"cold start {board['cold_start_ms']:>9.1f} ms (fastest of {REPEATS})"
     )
-    output.event({"event": "bench", "file": arguments.out}, f"written to {arguments.out}")
+    output.event(
+        {"event": "bench", "file": arguments.out}, f"written to {arguments.out}"
+    )
     return 0
 
 
@@ -73,7 +82,10 @@ def measure(model: Model) -> dict[str, Any]:
     real_s, own_s = time.perf_counter(), time.process_time()
     repeats = [time_stages(model, ROUNDS) for _ in range(REPEATS)]
     real_s, own_s = time.perf_counter() - real_s, time.process_time() - own_s
-    waited, load = round(max(0.0, 1.0 - own_s / real_s), 3), round(os.getloadavg()[0], 2)
+    waited, load = (
+        round(max(0.0, 1.0 - own_s / real_s), 3),
+        round(os.getloadavg()[0], 2),
+    )
     if waited > BUSY_SHARE:
         LOG.warning(
             f"this machine is busy: bench waited {waited:.0%} of the time, at a load of {load:g} "
@@ -100,16 +112,22 @@ def measure(model: Model) -> dict[str, Any]:
         },
         "rounds": REPEATS * ROUNDS,
         "stages": {
-            stage: min((times[stage] for times in repeats), key=lambda timing: timing["median_us"])
+            stage: min(
+                (times[stage] for times in repeats),
+                key=lambda timing: timing["median_us"],
+            )
             for stage in repeats[0]
         },
-        "memory_mb": round(peak / (1 << 20 if sys.platform == "darwin" else 1 << 10), 1),
+        "memory_mb": round(
+            peak / (1 << 20 if sys.platform == "darwin" else 1 << 10), 1
+        ),
         "cold_start_ms": round(cold_start_ms(model.path), 1),
     }
 
 
 def touch(model: Model, seconds: float) -> list[Frame]:
-    """Frames of a touch on the model's skin that begins at once and grows in force and area."""
+    """Frames of a touch on the model's skin that begins at once and grows in force and
+    area."""
     layout, dof = model.info.layout, model.info.dof
     rows, cols = np.ogrid[: layout.rows, : layout.cols]
     distance = np.hypot(rows - layout.rows // 2, cols - layout.cols // 2)
@@ -118,7 +136,9 @@ def touch(model: Model, seconds: float) -> list[Frame]:
         age = i / RATE_HZ
         force = (layout.onset + 1) * (2.0 + 3.0 * age)
         reach = 1.0 + 2.0 * age
-        counts = np.minimum(force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535)
+        counts = np.minimum(
+            force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535
+        )
         joints = None if dof is None else np.full(dof, 0.1 * age)
         valid = np.ones(layout.shape, dtype=bool)
         frames.append(Frame(age, counts.astype(np.uint16), valid, joints=joints))
@@ -128,10 +148,11 @@ def touch(model: Model, seconds: float) -> list[Frame]:
 def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     """Median and 99th percentile of each stage in microseconds.
 
-    `region`: finding the largest region of a frame. `track`: that, the arm's pose and the measures
-    of the features. `features`: from a contact's series to its vector. `decision`: ONNX Runtime
-    and the answers of all tasks. `answer`: features and decision together. `frame`: a frame within
-    a contact, from counts to events. `last`: the frame at which a decision is due, likewise.
+    `region`: finding the largest region of a frame. `track`: that, the arm's pose and
+    the measures of the features. `features`: from a contact's series to its vector.
+    `decision`: ONNX Runtime and the answers of all tasks. `answer`: features and
+    decision together. `frame`: a frame within a contact, from counts to events. `last`:
+    the frame at which a decision is due, likewise.
     """
     info = model.info
     layout, frames = info.layout, touch(model, info.window_s)
@@ -145,7 +166,10 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     few = max(rounds // 10, 4)
     stages = {
         "region": timed(
-            lambda i: largest_region(counts[i % len(counts)], limit, wraps=layout.wraps), calls
+            lambda i: largest_region(
+                counts[i % len(counts)], limit, wraps=layout.wraps
+            ),
+            calls,
         ),
         "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
         "features": timed(lambda _: info.vector(series), calls),
@@ -157,8 +181,11 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     return {name: summary(times) for name, times in stages.items()}
 
 
-def pushed(make: Callable[[], Any], frames: list[Frame], keep: slice, rounds: int) -> list[float]:
-    """Microseconds of each frame in `keep`, pushed among the others into new objects of `make`."""
+def pushed(
+    make: Callable[[], Any], frames: list[Frame], keep: slice, rounds: int
+) -> list[float]:
+    """Microseconds of each frame in `keep`, pushed among the others into new objects of
+    `make`."""
     times: list[float] = []
     while len(times) < rounds:
         times += timed(make().push, frames)[keep]
@@ -185,15 +212,21 @@ def summary(times: list[float]) -> Timings:
 def cold_start_ms(path: str) -> float:
     """Fewest milliseconds from the start of Python to a ready classifier."""
     command = [sys.executable, "-c", COLD, path]
-    return min(timed(lambda _: subprocess.run(command, check=True), range(REPEATS))) / 1e3
+    return (
+        min(timed(lambda _: subprocess.run(command, check=True), range(REPEATS))) / 1e3
+    )
 
 
 def kind() -> str:
     """The name of the board, or else of the processor."""
     with suppress(OSError):
-        return Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
+        return (
+            Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
+        )
     with suppress(OSError):
-        named = re.search(r"^model name\s*:(.*)", Path("/proc/cpuinfo").read_text(), re.M)
+        named = re.search(
+            r"^model name\s*:(.*)", Path("/proc/cpuinfo").read_text(), re.M
+        )
         if named:
             return named[1].strip()
     return platform.processor() or "unknown"

@@ -1,8 +1,9 @@
 """Decide on recorded touches that come with the program.
 
-Plays the simulated recordings that come with the program onto fake chips, reads these with the real
-drivers, and decides with the model that comes with the program. Everything but the wires works as
-on a robot. The exit status is 1 if a decision is wrong.
+Plays the simulated recordings that come with the program onto fake chips, reads these
+with the real drivers, and decides with the model that comes with the program.
+Everything but the wires works as on a robot. The exit status is 1 if a decision is
+wrong.
 """
 
 import argparse
@@ -33,7 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
             output.text(path.stem.replace("-", " "))
         skin, playback = play(skin_file(recording.layout), recording)
         with skin:
-            events = list(classifier.watch(skin, joints=playback, lasts_s=playback.ends))
+            events = list(
+                classifier.watch(skin, joints=playback, lasts_s=playback.ends)
+            )
         for event in events:
             line = {"source": path.stem, **event.to_dict()}
             if isinstance(event, Decided):
@@ -46,12 +49,15 @@ def run(arguments: argparse.Namespace) -> int:
     if output.as_json:
         LOG.info(score)
     else:
-        output.text(f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens.")
+        output.text(
+            f"{score}; `edge-classify view --fake REC.npz` shows a touch as it happens."
+        )
     return 0 if right and all(right) else 1
 
 
 def picture(recording: Recording) -> str:
-    """The frame of a recording with the largest sum of counts, as lines for a terminal."""
+    """The frame of a recording with the largest sum of counts, as lines for a
+    terminal."""
     layout = recording.layout
     strongest = int(recording.frames.sum(axis=(1, 2), dtype=np.int64).argmax())
     full = int(recording.frames.max())

@@ -1,9 +1,10 @@
 """Explain a model's decisions on recordings.
 
-Prints the training trials nearest to a touch, the features for and against the answer, and the
-least change of a single feature that would have given another answer. A feature's number says how
-much nearer, as a squared distance, it brings the touch to the nearest trial with the answer than to
-the nearest one with another label. `python -m train show REC --model model.onnx` draws the curves.
+Prints the training trials nearest to a touch, the features for and against the answer,
+and the least change of a single feature that would have given another answer. A
+feature's number says how much nearer, as a squared distance, it brings the touch to the
+nearest trial with the answer than to the nearest one with another label. `python -m
+train show REC --model model.onnx` draws the curves.
 """
 
 import argparse
@@ -26,7 +27,9 @@ DIRECTED = 0.5
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
-    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
+    parser.add_argument(
+        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,7 +43,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict[str, Any]]:
+def explanations(
+    model: Model, recording: Recording, name: str
+) -> Iterator[dict[str, Any]]:
     """For each task, why the model answers a recording's first contact as it does.
 
     Raises:
@@ -57,7 +62,11 @@ def explanations(model: Model, recording: Recording, name: str) -> Iterator[dict
         why = explain(space, vector, rows, answer, info.features, info.widths, truth)
 
         def trial(near: Near, labels: tuple[str, ...] = labels) -> dict[str, Any]:
-            return {**near._asdict(), "label": labels[near.label], "trial": info.trial(near.row)}
+            return {
+                **near._asdict(),
+                "label": labels[near.label],
+                "trial": info.trial(near.row),
+            }
 
         yield {
             "event": "explanation",
@@ -77,7 +86,10 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
     label, nearest, rival = line["label"], line["nearest"], line["rival"]
     votes = round(line["confidence"] * len(nearest))
     lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
-    lines += ["  The nearest training trials, each with its distance:", *map(trial_text, nearest)]
+    lines += [
+        "  The nearest training trials, each with its distance:",
+        *map(trial_text, nearest),
+    ]
     if rival:
         lines += ["  The nearest one with another label:", trial_text(rival)]
         strongest = list(line["pulls"].items())[:MOST]
@@ -86,12 +98,16 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
         lines += wrapped(f"Features {compared}: {pulls}.", "  ")
     for change in line["changes"][:MOST]:
         unit = info.units[change["feature"]]
-        plural = f"{unit}s" if unit.isalpha() else unit.removesuffix("1")  # "1" is a ratio's
+        plural = (
+            f"{unit}s" if unit.isalpha() else unit.removesuffix("1")
+        )  # "1" is a ratio's
         size = f"{change['size']:.2g} {plural}".rstrip()
         how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
         if abs(change["mean"]) <= DIRECTED * change["size"]:
             how = f"varied in another way, by {size} on average"
-        lines += wrapped(f"It would be {change['label']} if {change['feature']} {how}.", "  ")
+        lines += wrapped(
+            f"It would be {change['label']} if {change['feature']} {how}.", "  "
+        )
     return "\n".join(lines)
 
 

@@ -1,7 +1,8 @@
-"""Why a model answers as it does: how much each feature drew a touch towards a training trial.
+"""Why a model answers as it does: how much each feature drew a touch towards a training
+trial.
 
-A touch's coordinates are z = W'd, where d are its features less their mean in training, scaled and
-cut off at the training data's reach. Its squared distance to a trial at b is
+A touch's coordinates are z = W'd, where d are its features less their mean in training,
+scaled and cut off at the training data's reach. Its squared distance to a trial at b is
 |z|^2 + |b|^2 - 2 b'z. The last term is a sum over the features: 2 b'W_f'd_f is how much nearer
 feature f brings the touch to the trial than its mean would.
 """
@@ -16,12 +17,13 @@ from edge.files import parsing
 from edge.model.model import Model
 
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
-"""Multiples of the change at which two trials become equally near. A further trial on the way may
-take less, several votes more."""
+"""Multiples of the change at which two trials become equally near. A further trial on
+the way may take less, several votes more."""
 
 
 class Space(NamedTuple):
-    """The coordinates in which a task compares touches, and the training trials in them.
+    """The coordinates in which a task compares touches, and the training trials in
+    them.
 
     Attributes:
         columns: (p,) of the feature vectors that it takes.
@@ -29,7 +31,8 @@ class Space(NamedTuple):
         weights: (p, c) from scaled differences to coordinates.
         rows: (n, c) training trials.
         labels: (n,) indices of their labels.
-        reach, limit: the sizes at which scaled differences, and coordinates, are cut off.
+        reach, limit: the sizes at which scaled differences, and coordinates, are cut
+            off.
     """
 
     columns: NDArray[np.int64]
@@ -58,12 +61,20 @@ class Space(NamedTuple):
             # Of two operators of a kind, the one nearer to the features counts.
             path = contents.path(neighbours)
             further = dict(reversed(path))
-            limits = [float(constant(bounds[1])) for operator, bounds in path if operator == "Clip"]
+            limits = [
+                float(constant(bounds[1]))
+                for operator, bounds in path
+                if operator == "Clip"
+            ]
             unit = constant(contents.makers[f"{task}_distances"].inputs[1])
             rows = constant(further["Gemm"][0]).T[:, :components] * (-0.5 * unit)
-            rows[np.isinf(constant(further["Gemm"][1]))] = np.inf  # trials without a label
+            rows[np.isinf(constant(further["Gemm"][1]))] = (
+                np.inf
+            )  # trials without a label
             columns = further.get("Gather")
-            voters = next(node.inputs for node in contents.nodes if neighbours in node.inputs)
+            voters = next(
+                node.inputs for node in contents.nodes if neighbours in node.inputs
+            )
             return cls(
                 constant(columns[0]) if columns else np.arange(model.info.width),
                 constant(further["Sub"][0]),
@@ -87,15 +98,18 @@ class Space(NamedTuple):
 
     def vote(self, z: NDArray[np.float64], k: int) -> int:
         """The label of the k nearest trials; of tied ones that of the nearest."""
-        voters = self.labels[np.argsort(((self.rows - z) ** 2).sum(axis=1), kind="stable")[:k]]
+        voters = self.labels[
+            np.argsort(((self.rows - z) ** 2).sum(axis=1), kind="stable")[:k]
+        ]
         return int(voters[np.bincount(voters)[voters].argmax()])
 
 
 class Near(NamedTuple):
-    """A training trial near a touch: its row, label (index) and distance, and the features' pulls.
+    """A training trial near a touch: its row, label (index) and distance, and the
+    features' pulls.
 
-    A feature's pull is the amount by which it lowers the squared distance. The strongest pull comes
-    first.
+    A feature's pull is the amount by which it lowers the squared distance. The
+    strongest pull comes first.
     """
 
     row: int
@@ -105,9 +119,11 @@ class Near(NamedTuple):
 
 
 class Change(NamedTuple):
-    """The least change of one feature that would have given another answer (index of its label).
+    """The least change of one feature that would have given another answer (index of
+    its label).
 
-    Its size is a root mean square over the window, in the feature's unit, like its mean.
+    Its size is a root mean square over the window, in the feature's unit, like its
+    mean.
     """
 
     feature: str
@@ -121,13 +137,13 @@ class Explanation(NamedTuple):
 
     Attributes:
         voters: the nearest training trials, nearest first.
-        rival: the nearest trial with another label than the answer, or with the right label if that
-            is known; None without such a trial.
-        pulls: {feature: how much more it pulls towards the nearest trial with the answer than
-            towards the rival}, the strongest first.
-        changes: one for each feature that can change the answer, the smallest of them, in
-            deviations of the training trials, first. There are none where the votes are for
-            another label already, and the answer follows from other tasks.
+        rival: the nearest trial with another label than the answer, or with the right
+            label if that is known; None without such a trial.
+        pulls: {feature: how much more it pulls towards the nearest trial with the
+            answer than towards the rival}, the strongest first.
+        changes: one for each feature that can change the answer, the smallest of them,
+            in deviations of the training trials, first. There are none where the votes
+            are for another label already, and the answer follows from other tasks.
     """
 
     voters: tuple[Near, ...]
@@ -177,11 +193,14 @@ def explain(
         others = ~answered & (space.labels >= 0)
     if not others.any():
         return Explanation(nearest)
-    ally, rival = (int(np.where(rows, squares, np.inf).argmin()) for rows in (answered, others))
+    ally, rival = (
+        int(np.where(rows, squares, np.inf).argmin()) for rows in (answered, others)
+    )
     pulled = pulls(space.rows[ally] - space.rows[rival])
     if space.vote(z, len(voters)) != label:
         return Explanation(nearest, near(rival), pulled)
-    # A vote changes where a trial of another label comes as near as the last one for the answer.
+    # A vote changes where a trial of another label comes as near as the last one for
+    # the answer.
     votes = np.isin(np.arange(len(squares)), voters)
     leaves = np.where(votes & answered, squares, -np.inf).argmax()
     joins = np.where(others & ~votes, squares, np.inf).argmin()
@@ -198,7 +217,9 @@ def explain(
             answer = space.vote(space.coordinates(changed), len(voters))
             if answer != label:
                 x = times * step / space.gain[columns]
-                change = Change(name, answer, float(np.sqrt((x**2).mean())), float(x.mean()))
+                change = Change(
+                    name, answer, float(np.sqrt((x**2).mean())), float(x.mean())
+                )
                 changes.append((times**2 * (step**2).mean(), change))
                 break
     ordered = tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))

@@ -1,10 +1,10 @@
 """Make labelled touches for a skin file, to rehearse before it is wired.
 
-Maps the simulated touches that come with the program onto the geometry of a skin, and writes them
-as labelled recordings, with one more in which nothing touches the skin. Play them with --fake to
-rehearse calibrate, record, export and run. A model that is fitted to them knows nothing about the
-real skin. With --plug the skin's chips appear on this machine's own /dev/i2c-N instead, where every
-program can read them, until Ctrl-C.
+Maps the simulated touches that come with the program onto the geometry of a skin, and
+writes them as labelled recordings, with one more in which nothing touches the skin.
+Play them with --fake to rehearse calibrate, record, export and run. A model that is
+fitted to them knows nothing about the real skin. With --plug the skin's chips appear on
+this machine's own /dev/i2c-N instead, where every program can read them, until Ctrl-C.
 """
 
 import argparse
@@ -31,7 +31,10 @@ STILL_S = 5.0
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "--skin", required=True, metavar="skin.toml", help="the file that describes the skin"
+        "--skin",
+        required=True,
+        metavar="skin.toml",
+        help="the file that describes the skin",
     )
     goal = parser.add_mutually_exclusive_group(required=True)
     goal.add_argument("--out", type=Path, metavar="DIR", help="the folder to write to")
@@ -51,7 +54,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="number of trials of each touch (default: %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=within(int, 0, 2**63), default=0, help="seed of the trials' variation"
+        "--seed",
+        type=within(int, 0, 2**63),
+        default=0,
+        help="seed of the trials' variation",
     )
 
 
@@ -60,14 +66,16 @@ def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
 
     Args:
         file: the skin.
-        recording: the path of the recording that the chips feel over and over; without one (an
-            empty path) they feel nothing.
+        recording: the path of the recording that the chips feel over and over; without
+            one (an empty path) they feel nothing.
         noise: standard deviation of the raw values, in counts.
         output: where to print the device of each bus.
     """
     for spec in file.buses:
         if spec.serial:
-            raise InputError(f"{spec.device} is a serial port; --plug carries only I2C buses")
+            raise InputError(
+                f"{spec.device} is a serial port; --plug carries only I2C buses"
+            )
     felt = load_recording(recording) if recording else still(file, STILL_S)
     scene = playback(file, felt, loop=True)
     clock = PacedClock()
@@ -84,7 +92,8 @@ def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the recordings and print the commands to rehearse with, or plug the skin in."""
+    """Write the recordings and print the commands to rehearse with, or plug the skin
+    in."""
     file, output = load(arguments.skin), Output.of(arguments)
     if arguments.plug is not None:
         return plug(file, arguments.plug, arguments.noise, output)

@@ -1,7 +1,9 @@
-"""Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and arm.
+"""Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and
+arm.
 
-Prints a model's tasks with their labels and accuracy, its features and training data, and the skin
-and arm that it needs, and its size. Of two models it prints the differences.
+Prints a model's tasks with their labels and accuracy, its features and training data,
+and the skin and arm that it needs, and its size. Of two models it prints the
+differences.
 """
 
 import argparse
@@ -21,7 +23,9 @@ NAMED = 6
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
-    parser.add_argument("other", nargs="?", metavar="other.onnx", help="compare with this model")
+    parser.add_argument(
+        "other", nargs="?", metavar="other.onnx", help="compare with this model"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,7 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
         output.event(about, description(model.info, about))
         return 0
     changes = differences(described(model), described(Model(arguments.other)))
-    lines = [line for key, pair in changes.items() for line in wrapped(change_text(key, *pair))]
+    lines = [
+        line
+        for key, pair in changes.items()
+        for line in wrapped(change_text(key, *pair))
+    ]
     text = "\n".join(lines) or "the models do not differ"
     output.event({"event": "comparison", "changes": changes}, text)
     return 0
@@ -50,7 +58,8 @@ def described(model: Model) -> dict[str, Any]:
 
 
 def differences(a: Any, b: Any, key: str = "") -> dict[str, list[Any]]:
-    """{key, such as `tasks.object.k`: its values in a and b} where they differ; None for none."""
+    """{key, such as `tasks.object.k`: its values in a and b} where they differ; None
+    for none."""
     if not (isinstance(a, dict) and isinstance(b, dict)) or key in COARSE:
         return {} if a == b else {key: [a, b]}
     changes: dict[str, list[Any]] = {}
@@ -66,7 +75,9 @@ def change_text(key: str, a: Any, b: Any) -> str:
     if isinstance(a, list) or isinstance(b, list):
         a, b = a or [], b or []
         gone, new = [x for x in a if x not in b], [x for x in b if x not in a]
-        texts = [f"{sign} {_some(side)}" for sign, side in (("-", gone), ("+", new)) if side]
+        texts = [
+            f"{sign} {_some(side)}" for sign, side in (("-", gone), ("+", new)) if side
+        ]
         return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
     if key.endswith(".accuracy"):
         a, b = f"{a:.1%}", f"{b:.1%}"
@@ -76,7 +87,9 @@ def change_text(key: str, a: Any, b: Any) -> str:
 
 def _some(values: list[Any]) -> str:
     rest = len(values) - NAMED
-    return ", ".join(map(str, values[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
+    return ", ".join(map(str, values[:NAMED])) + (
+        f" and {rest} more" if rest > 0 else ""
+    )
 
 
 def description(info: ModelInfo, about: dict[str, Any]) -> str:
@@ -93,7 +106,10 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
         )
         lines += wrapped(", ".join(task.labels), "  ")
     units = ", ".join(f"{name} ({unit})" for name, unit in info.units.items())
-    lines += ["", f"Decides after {info.window_s:g} s, from {info.samples} samples of each of"]
+    lines += [
+        "",
+        f"Decides after {info.window_s:g} s, from {info.samples} samples of each of",
+    ]
     lines += wrapped(units, "  ")
     if info.decision_points_s and not info.taught:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)

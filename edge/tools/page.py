@@ -1,4 +1,5 @@
-"""The live page of a skin: its pictures, and the actions that a person can take there."""
+"""The live page of a skin: its pictures, and the actions that a person can take
+there."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -49,13 +50,17 @@ class Page:
             layout: the skin, with its thresholds.
             title: names the skin.
             folder: of the trials that are recorded; None if none are.
-            labels: of the first trials; without any, recording waits for a person to give some.
+            labels: of the first trials; without any, recording waits for a person to
+                give some.
             decides: a model decides on the contacts.
 
         Raises:
-            InputError: the address cannot be used, or a trial in the folder cannot be read.
+            InputError: the address cannot be used, or a trial in the folder cannot be
+                read.
         """
-        from edge.tools.web import WebServer  # commands without a page start sooner without it
+        from edge.tools.web import (
+            WebServer,
+        )  # commands without a page start sooner without it
 
         self._folder = folder
         self.labels = dict(labels or {})
@@ -82,9 +87,13 @@ class Page:
         self.server = WebServer(address, self._act)
 
     def push(
-        self, frame: Frame, events: Sequence[Event] = (), schedule: Schedule | None = None
+        self,
+        frame: Frame,
+        events: Sequence[Event] = (),
+        schedule: Schedule | None = None,
     ) -> None:
-        """Take in a frame and the events that came with it; now and then, show a picture."""
+        """Take in a frame and the events that came with it; now and then, show a
+        picture."""
         for event in events:
             if isinstance(event, Onset):
                 self._decisions = {}
@@ -95,17 +104,23 @@ class Page:
         self._contact = next(iter(self._tracker.push(frame)), self._contact)
         if frame.t < self._due:
             return
-        self._due = frame.t + PICTURE_S * (1.0 - 1e-6)  # the times of frames are rounded
+        self._due = frame.t + PICTURE_S * (
+            1.0 - 1e-6
+        )  # the times of frames are rounded
         picture = {
             **self._fixed,
             "t": frame.t,
             "counts": frame.counts.ravel().tolist(),
-            "invalid": [] if frame.valid is None else (~frame.valid).ravel().nonzero()[0].tolist(),
+            "invalid": []
+            if frame.valid is None
+            else (~frame.valid).ravel().nonzero()[0].tolist(),
             "contact": self._curves(),
             "decisions": list(self._decisions.values()),
             "labels": dict(self.labels),
             "recording": self.recording,
-            "trials": [{"file": name, **trial} for name, trial in list(self._trials.items())],
+            "trials": [
+                {"file": name, **trial} for name, trial in list(self._trials.items())
+            ],
             "notices": list(self._notices),
         }
         if schedule is not None:
@@ -130,11 +145,15 @@ class Page:
         series = contact.series()
         return {
             "ended": contact.ended,
-            "taxels": [] if region is None else region.mask.ravel().nonzero()[0].tolist(),
+            "taxels": []
+            if region is None
+            else region.mask.ravel().nonzero()[0].tolist(),
             "t": series.t.round(4).tolist(),
             "force": (series.peak / self._scale).round(4).tolist(),
             "area": series.area.tolist(),
-            "motion": [None if value != value else round(value, 5) for value in series.motion],
+            "motion": [
+                None if value != value else round(value, 5) for value in series.motion
+            ],
         }
 
     def _act(self, action: dict[str, Any]) -> None:
@@ -150,7 +169,9 @@ class Page:
             self.labels = _labels(action)
         elif kind == "record":
             if action.get("on") and not self.labels:
-                raise InputError("give a label first; a trial without one teaches nothing")
+                raise InputError(
+                    "give a label first; a trial without one teaches nothing"
+                )
             self.recording = bool(action.get("on"))
         elif kind not in ("relabel", "delete"):
             raise InputError(f"{kind!r} is no action")
@@ -169,9 +190,14 @@ class Page:
 def _decision(event: Decided) -> dict[str, Any]:
     """A decision for the page, with the nearest training trials."""
     line = event.to_dict()
-    distances = [] if event.decision is None else event.decision.distances.round(3).tolist()
+    distances = (
+        [] if event.decision is None else event.decision.distances.round(3).tolist()
+    )
     return {
-        **{key: line[key] for key in ("task", "label", "confidence", "flags", "window_s")},
+        **{
+            key: line[key]
+            for key in ("task", "label", "confidence", "flags", "window_s")
+        },
         "neighbours": list(zip(event.nearest, distances, strict=True)),
     }
 

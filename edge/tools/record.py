@@ -1,8 +1,9 @@
 """Wait for contacts and save each as a labelled trial.
 
-Waits for a contact, saves it with a short lead-in as one .npz file, and waits for the next one.
-Existing files are never overwritten. With --joints, --fake plays at the original speed. The exit
-status is 1 if nothing was saved, or if --joints gave no angles.
+Waits for a contact, saves it with a short lead-in as one .npz file, and waits for the
+next one. Existing files are never overwritten. With --joints, --fake plays at the
+original speed. The exit status is 1 if nothing was saved, or if --joints gave no
+angles.
 """
 
 import argparse
@@ -33,8 +34,8 @@ from edge.touch.frame import Frame
 from edge.touch.track import DEBOUNCE, ContactTracker
 
 LONGEST_STEM = 60
-"""Most characters of a file's name that come from labels. A name has at most 255 bytes, a character
-at most 4."""
+"""Most characters of a file's name that come from labels. A name has at most 255 bytes,
+a character at most 4."""
 LEAD_S = 0.2
 """Time that a trial keeps from before its onset."""
 LENGTH_S = 2.0
@@ -62,7 +63,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER|FILE.npz",
         help="a folder for numbered trials (default: %(default)s), or a file for one trial",
     )
-    parser.add_argument("--trials", type=within(int, 1, 1e9), help="stop after this many trials")
+    parser.add_argument(
+        "--trials", type=within(int, 1, 1e9), help="stop after this many trials"
+    )
     parser.add_argument(
         "--length",
         type=within(float, 0.1, 600.0),
@@ -71,7 +74,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="longest time to keep after onset (default: %(default)s)",
     )
     parser.add_argument(
-        "--dof", type=int, help="the number of angles in each line of --joints, without --arm"
+        "--dof",
+        type=int,
+        help="the number of angles in each line of --joints, without --arm",
     )
     add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
 
@@ -79,14 +84,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 class Trials:
     """Cuts a stream of frames into trials, one per contact.
 
-    A trial lasts from the lead-in before onset to the end of the contact, or to `length_s` after
-    onset. No other trial begins while a saved contact continues.
+    A trial lasts from the lead-in before onset to the end of the contact, or to
+    `length_s` after onset. No other trial begins while a saved contact continues.
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
         self._tracker = ContactTracker(skin.layout, horizon_s=0.0)
         self._length = length_s
-        self._before: deque[Frame] = deque(maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE)
+        self._before: deque[Frame] = deque(
+            maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE
+        )
         self._frames: list[Frame] | None = None
         self._saved: Contact | None = None
 
@@ -114,9 +121,13 @@ class Trials:
 
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
-    valid = np.array([f.valid for f in frames])  # a skin's frames always say which taxels are
+    valid = np.array(
+        [f.valid for f in frames]
+    )  # a skin's frames always say which taxels are
     dof = next((len(f.joints) for f in frames if f.joints is not None), None)
-    joints = np.array([np.full(dof or 0, np.nan) if f.joints is None else f.joints for f in frames])
+    joints = np.array(
+        [np.full(dof or 0, np.nan) if f.joints is None else f.joints for f in frames]
+    )
     return Recording(
         t=np.array([f.t - frames[0].t for f in frames]),
         frames=np.array([f.counts for f in frames]),
@@ -127,13 +138,17 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
 
 
 def trial_path(out: Path, labels: dict[str, str]) -> Path:
-    """The file for the next trial: `out` itself, or a file with the first free number in `out`.
+    """The file for the next trial: `out` itself, or a file with the first free number
+    in `out`.
 
     Raises:
         InputError: `out` names a file that exists, or that no folder can hold.
     """
     # A listing of the folder omits names that begin with a dot.
-    stem = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM] or "trial"
+    stem = (
+        re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM]
+        or "trial"
+    )
     with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
         if out.suffix != ".npz":
             taken = {path.name for path in out.glob(f"{stem}-*.npz")}
@@ -154,14 +169,20 @@ def run(arguments: argparse.Namespace) -> int:
     by_key = terminal.is_interactive() and arguments.web is None
     # Only the page of a folder takes labels.
     if not labels and (arguments.web is None or folder is None):
-        raise InputError("give --label TASK=LABEL; a trial without a label teaches nothing")
+        raise InputError(
+            "give --label TASK=LABEL; a trial without a label teaches nothing"
+        )
     if len(labels) < len(arguments.label) and not by_key:
-        raise InputError("--label names a task twice; only in a terminal do keys choose the label")
+        raise InputError(
+            "--label names a task twice; only in a terminal do keys choose the label"
+        )
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
     if arguments.joints is not None and dof is None:
-        raise InputError("--joints needs --arm, or --dof, the number of angles in each line")
+        raise InputError(
+            "--joints needs --arm, or --dof, the number of angles in each line"
+        )
     with (
         # Angles go by the real clock.
         reading(arguments, arm=arm, dof=dof, real_time=arguments.joints is not None,
@@ -223,7 +244,8 @@ class Recorder:
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
         lines: where the `saved` and `deleted` events go.
-        page: the live page, which then gives the labels and says whether to save; or None.
+        page: the live page, which then gives the labels and says whether to save; or
+            None.
         paths: the trials saved so far and not deleted.
         any_joints: whether a saved frame had joint angles.
     """
@@ -238,11 +260,15 @@ class Recorder:
     any_joints: bool = False
 
     def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
-        """Take a key: the number of a label holds it from now on, d deletes the last trial."""
+        """Take a key: the number of a label holds it from now on, d deletes the last
+        trial."""
         if key in DIGITS[: len(choices)]:
             task, label = choices[DIGITS.index(key)]
             self.labels = {**self.labels, task: label}
-            LOG.info("next: " + ", ".join(f"{task}={label}" for task, label in self.labels.items()))
+            LOG.info(
+                "next: "
+                + ", ".join(f"{task}={label}" for task, label in self.labels.items())
+            )
         elif key in ("d", "D") and self.paths:
             path = self.paths.pop()
             path.unlink(missing_ok=True)
@@ -278,7 +304,9 @@ class Recorder:
             "complete": complete,
         }
         if trial.joints is not None and unposed:
-            LOG.warning(f"{path}: {unposed} of {len(frames)} frames have no joint angles")
+            LOG.warning(
+                f"{path}: {unposed} of {len(frames)} frames have no joint angles"
+            )
             event["frames_without_joints"] = unposed
         self.lines.write([event])
         if self.page is not None:

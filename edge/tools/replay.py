@@ -1,7 +1,7 @@
 """Decide on recordings, frame by frame.
 
-Decides on recordings as `edge-classify run` decides live. Files that cannot be used are named on
-stderr and skipped; the exit status is then 2.
+Decides on recordings as `edge-classify run` decides live. Files that cannot be used are
+named on stderr and skipped; the exit status is then 2.
 """
 
 import argparse
@@ -33,7 +33,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="print each task's accuracy and confusion matrix, for labelled recordings",
     )
     add_error(parser)
-    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
+    parser.add_argument(
+        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+    )
 
 
 def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
@@ -46,17 +48,21 @@ def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
     with about(name):
         contact = first_series(recording, model)
         if contact is None:
-            raise InputError("holds no contact; leave it out, or record the touch again")
+            raise InputError(
+                "holds no contact; leave it out, or record the touch again"
+            )
     return contact[1]
 
 
 def decide(
     model: Model, recording: Recording, name: str, error: float | None = None
 ) -> list[dict[str, Any]]:
-    """All events of one recording as JSON objects, with early decisions if `error` is given.
+    """All events of one recording as JSON objects, with early decisions if `error` is
+    given.
 
     Raises:
-        InputError: the recording does not suit the model; the message begins with `name`.
+        InputError: the recording does not suit the model; the message begins with
+            `name`.
     """
     recording = suited(model, recording, name)
     with about(name):
@@ -83,7 +89,9 @@ def run(arguments: argparse.Namespace) -> int:
             continue
         labels = recording.labels
         if not output.as_json:
-            output.text(f"{path}" + "".join(f", {k}: {v}" for k, v in sorted(labels.items())))
+            output.text(
+                f"{path}" + "".join(f", {k}: {v}" for k, v in sorted(labels.items()))
+            )
         for event in events:
             line = {"source": str(path), **event}
             if event["event"] == "decision" and event["task"] in labels:
@@ -99,18 +107,26 @@ class Summary:
     """Compares each recording's first decision for each task with its label."""
 
     def __init__(self, tasks: Mapping[str, Task]) -> None:
-        self._pairs: dict[str, Counter[tuple[str, str]]] = {task: Counter() for task in tasks}
+        self._pairs: dict[str, Counter[tuple[str, str]]] = {
+            task: Counter() for task in tasks
+        }
         self.recordings = 0
         self.as_trained = 0
         """Recordings whose features equal those of a training trial."""
 
-    def add(self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]) -> None:
+    def add(
+        self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]
+    ) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
         decisions = [event for event in events if event["event"] == "decision"]
-        self.as_trained += any(AS_TRAINED in decision["flags"] for decision in decisions)
+        self.as_trained += any(
+            AS_TRAINED in decision["flags"] for decision in decisions
+        )
         # Of several decisions for a task, the first one stays.
-        first = {d["task"]: printable(d["label"] or UNDECIDED) for d in reversed(decisions)}
+        first = {
+            d["task"]: printable(d["label"] or UNDECIDED) for d in reversed(decisions)
+        }
         for task in self._pairs.keys() & labels:
             self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
 
@@ -121,7 +137,8 @@ class Summary:
         return right, pairs.total()
 
     def text(self) -> str:
-        """One table for each task: a row for each true label, a column for each decided one."""
+        """One table for each task: a row for each true label, a column for each decided
+        one."""
         recordings = counted(self.recordings, "recording")
         paragraphs = [recordings]
         if self.as_trained:
@@ -155,6 +172,8 @@ def _matrix(pairs: Counter[tuple[str, str]]) -> str:
     rows = [[str(pairs[truth, label] or ".") for label in decided] for truth in truths]
     return "\n".join(
         f"{name:<{width}}"
-        + "".join(f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True))
+        + "".join(
+            f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True)
+        )
         for name, cells in zip(["", *names], [heads, *rows], strict=True)
     )

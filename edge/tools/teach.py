@@ -1,10 +1,11 @@
 """Teach a model labelled trials, on the board.
 
-Adds the trials to the nearest neighbours of the model, in the projection that it has. Writes the
-new model into a folder, and a golden file if the model has a golden.npz beside it. A label that the
-model does not know is added with --new-labels, and is left out without it. A taught model
-carries no certificate: it decides at the end of its window, and `run --error` refuses it. The next
-`make export` with the same recordings fits everything anew.
+Adds the trials to the nearest neighbours of the model, in the projection that it has.
+Writes the new model into a folder, and a golden file if the model has a golden.npz
+beside it. A label that the model does not know is added with --new-labels, and is left
+out without it. A taught model carries no certificate: it decides at the end of its
+window, and `run --error` refuses it. The next `make export` with the same recordings
+fits everything anew.
 """
 
 import argparse
@@ -24,9 +25,14 @@ from edge.tools.teaching import joined, spelled_like, taught, unknown_labels
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
-    parser.add_argument("recordings", nargs="+", metavar="REC", help=".npz files or folders")
     parser.add_argument(
-        "--out", type=Path, default=Path("taught"), help="a folder (default: %(default)s)"
+        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("taught"),
+        help="a folder (default: %(default)s)",
     )
     text = "add the labels that the model does not know, such as a new object"
     parser.add_argument("--new-labels", action="store_true", help=text)
@@ -64,6 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
             of_label = f"{counted(trials, 'trial')} of the new label {label!r}"
             if not new:
                 of_label = f"left out {of_label}; --new-labels adds it"
-            LOG.warning(f"{task}: {of_label}{spelled_like(label, model.info.tasks[task].labels)}")
-    LOG.info(f"{target}: its accuracy is not measured, and no error rate is certified any more")
+            LOG.warning(
+                f"{task}: {of_label}{spelled_like(label, model.info.tasks[task].labels)}"
+            )
+    LOG.info(
+        f"{target}: its accuracy is not measured, and no error rate is certified any more"
+    )
     return 0

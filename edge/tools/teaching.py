@@ -1,8 +1,9 @@
-"""Teaching a model on the board: trials become neighbours, in the projection that the model has.
+"""Teaching a model on the board: trials become neighbours, in the projection that the
+model has.
 
-The neighbours of a task are constants of the model's graph that carry the task's name. Only these
-constants change. Scaling, projection, calibration and certificates remain those of the trials that
-the model was fitted on.
+The neighbours of a task are constants of the model's graph that carry the task's name.
+Only these constants change. Scaling, projection, calibration and certificates remain
+those of the trials that the model was fitted on.
 """
 
 import hashlib
@@ -29,10 +30,11 @@ JOINED = ("category", "softness", "mobility")
 
 
 def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many trials stand for a label with so many trials: a twentieth, but at least three.
+    """How many trials stand for a label with so many trials: a twentieth, but at least
+    three.
 
-    A label with fewer than three trials is represented by all of them. With a share rather than a
-    number, a label's distance does not shrink as its trials become more.
+    A label with fewer than three trials is represented by all of them. With a share
+    rather than a number, a label's distance does not shrink as its trials become more.
     """
     return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
@@ -45,9 +47,11 @@ def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[A
         classes: how many labels there are.
 
     Returns:
-        `members` (classes, largest): the trials of each label, filled up with n. `counts`
-        (classes,): how many trials stand for each label. `most` (1,): the largest count. `taken`
-        (classes, most): True in the first `counts` columns of each label.
+        `members` (classes, largest): the trials of each label, filled up with n.
+            `counts`
+        (classes,): how many trials stand for each label. `most` (1,): the largest
+        count. `taken` (classes, most): True in the first `counts` columns of each
+        label.
     """
     sizes = np.bincount(labels[labels >= 0], minlength=classes)
     counts = nearest_of_label(sizes)
@@ -78,31 +82,42 @@ def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str
     return {**implied, **labels}
 
 
-def unknown_labels(info: ModelInfo, labels: Sequence[Mapping[str, str]]) -> dict[str, Counter[str]]:
-    """{task: {label that the model does not know: how many trials have it}}, the labels sorted.
+def unknown_labels(
+    info: ModelInfo, labels: Sequence[Mapping[str, str]]
+) -> dict[str, Counter[str]]:
+    """{task: {label that the model does not know: how many trials have it}}, the labels
+    sorted.
 
     Args:
         info: of the model.
         labels: of each trial, {task: label}.
     """
-    of_task = {task: [own[task] for own in labels if task in own] for task in info.tasks}
+    of_task = {
+        task: [own[task] for own in labels if task in own] for task in info.tasks
+    }
     return {
-        task: Counter(sorted(label for label in each if label not in info.tasks[task].labels))
+        task: Counter(
+            sorted(label for label in each if label not in info.tasks[task].labels)
+        )
         for task, each in of_task.items()
     }
 
 
 def spelled_like(label: str, labels: Sequence[str]) -> str:
-    """A question for the known label that an unknown one may have been meant as, if any."""
+    """A question for the known label that an unknown one may have been meant as, if
+    any."""
     from difflib import get_close_matches  # rarely needed, and slow to load
 
-    return "".join(f"; did you mean {near!r}?" for near in get_close_matches(label, labels, 1, 0.8))
+    return "".join(
+        f"; did you mean {near!r}?" for near in get_close_matches(label, labels, 1, 0.8)
+    )
 
 
 def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> ModelInfo:
     """A model's metadata with new labels, each after those that its task knows.
 
-    No more neighbours vote than a new label has trials, for it could win no vote among more.
+    No more neighbours vote than a new label has trials, for it could win no vote among
+    more.
 
     Args:
         info: of the model.
@@ -142,16 +157,19 @@ def taught(
         names: (m,) of the trials' files.
         vectors: (decision points, m, width) of the trials.
         labels: (m,) {task: label}.
-        new_labels: the model gets to know the labels that it does not know, see `with_labels`.
+        new_labels: the model gets to know the labels that it does not know, see
+            `with_labels`.
 
     Raises:
-        InputError: a trial lies outside the projection's reach, or has no label that is known; or
-            the file was exported by an earlier version.
+        InputError: a trial lies outside the projection's reach, or has no label that is
+            known; or the file was exported by an earlier version.
     """
     info = model.info
     if new_labels:
         info = with_labels(info, unknown_labels(info, labels))
-    for name, trial, trial_labels in zip(names, vectors.swapaxes(0, 1), labels, strict=True):
+    for name, trial, trial_labels in zip(
+        names, vectors.swapaxes(0, 1), labels, strict=True
+    ):
         with about(name):
             points = [model.decide(vector, point) for point, vector in enumerate(trial)]
         if any(next(iter(decisions.values())).out_of_range for decisions in points):
@@ -159,9 +177,16 @@ def taught(
                 f"{name}: lies far outside the trials that the model was fitted on, so its "
                 "projection cannot place it; export a model with it"
             )
-        if not any(trial_labels.get(task) in entry.labels for task, entry in info.tasks.items()):
-            known = "; ".join(f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items())
-            meant = [spelled_like(trial_labels.get(t, ""), e.labels) for t, e in info.tasks.items()]
+        if not any(
+            trial_labels.get(task) in entry.labels for task, entry in info.tasks.items()
+        ):
+            known = "; ".join(
+                f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items()
+            )
+            meant = [
+                spelled_like(trial_labels.get(t, ""), e.labels)
+                for t, e in info.tasks.items()
+            ]
             raise InputError(
                 f"{name}: has no label that the model knows ({known}); label it, or teach it with "
                 f"--new-labels{''.join(meant)}"
@@ -172,7 +197,9 @@ def taught(
         for task, entry in info.tasks.items():
             index = {label: i for i, label in enumerate(entry.labels)}
             new = np.array([index.get(named.get(task, ""), -1) for named in labels])
-            z = np.stack([coordinates(contents, task, p, x) for p, x in enumerate(vectors)])
+            z = np.stack(
+                [coordinates(contents, task, p, x) for p, x in enumerate(vectors)]
+            )
             lengths = np.where(new < 0, np.inf, (z**2).sum(axis=2))
             more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": lengths}
             for key, values in more.items():
@@ -183,7 +210,10 @@ def taught(
             changed[f"labels of {task}"] = all_labels
             tables, classes = {}, len(entry.labels)
             if classes > len(model.info.tasks[task].labels):
-                tables = {"ballots": np.eye(classes + 1, classes), "k": np.array([entry.k])}
+                tables = {
+                    "ballots": np.eye(classes + 1, classes),
+                    "k": np.array([entry.k]),
+                }
             if f"members of {task}" in contents.tensors:
                 tables |= label_tables(all_labels, classes)
             for key, table in tables.items():
@@ -205,13 +235,17 @@ def coordinates(
     contents: Contents, task: str, point: int, x: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(m, c) whole coordinates of vectors (m, width), by the graph's own operators."""
-    *steps, _, _ = contents.path(f"{task}_neighbours")  # the last two take the coordinates
+    *steps, _, _ = contents.path(
+        f"{task}_neighbours"
+    )  # the last two take the coordinates
     for operator, further in steps:
         values = [contents.constant(name, point) for name in further]
         if operator == "Gather":
             x = x[:, values[0]]
         elif operator in ("Sub", "Mul", "MatMul"):
-            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](x, *values)
+            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](
+                x, *values
+            )
         else:
             x = np.clip(x, *values) if operator == "Clip" else np.rint(x)
     return x

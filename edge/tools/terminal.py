@@ -1,4 +1,5 @@
-"""A terminal: keys, and the skin in ANSI half-blocks, two rows of taxels in each line."""
+"""A terminal: keys, and the skin in ANSI half-blocks, two rows of taxels in each
+line."""
 
 import math
 import os
@@ -19,7 +20,13 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import Region, find_regions
 
-CLEAR, HOME, HIDE, SHOW, PLAIN = "\x1b[2J", "\x1b[H", "\x1b[?25l", "\x1b[?25h", "\x1b[0m"
+CLEAR, HOME, HIDE, SHOW, PLAIN = (
+    "\x1b[2J",
+    "\x1b[H",
+    "\x1b[?25l",
+    "\x1b[?25h",
+    "\x1b[0m",
+)
 REST = tuple(range(233, 242))
 """256-colour greys by force, for taxels outside every region."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
@@ -37,7 +44,9 @@ def skin_colours(
     The colours show force on a logarithmic scale up to `full` counts.
     """
     threshold = layout.threshold_counts
-    regions = find_regions(frame.counts, threshold, valid=frame.valid, wraps=layout.wraps)
+    regions = find_regions(
+        frame.counts, threshold, valid=frame.valid, wraps=layout.wraps
+    )
     counts, floor = frame.counts.astype(np.float64), max(threshold, 1)
     colours = _shades(REST, np.log1p(np.minimum(counts, threshold)) / math.log1p(floor))
     span = math.log(max(full, threshold + 2) / floor)
@@ -50,7 +59,8 @@ def skin_colours(
 
 
 def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """A palette's colour for each share from 0 to 1; others get the colour of the nearer end."""
+    """A palette's colour for each share from 0 to 1; others get the colour of the
+    nearer end."""
     steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)
     shades: NDArray[np.uint8] = np.array(palette, dtype=np.uint8)[steps.astype(int)]
     return shades
@@ -66,7 +76,9 @@ def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
     lines = []
     for top in range(0, len(colour), 2):
         line = ""
-        for (upper, *lower), taxels in groupby(zip(*colour[top : top + 2].tolist(), strict=True)):
+        for (upper, *lower), taxels in groupby(
+            zip(*colour[top : top + 2].tolist(), strict=True)
+        ):
             background = f"48;5;{lower[0]}" if lower else "49"
             line += f"\x1b[38;5;{upper};{background}m" + "▀" * wide * len(list(taxels))
         lines.append(line + PLAIN)
@@ -78,14 +90,18 @@ def caption(frame: Frame, regions: Sequence[Region], layout: SkinLayout) -> str:
     items = [f"{frame.t:9.2f} s"]
     for region in regions[:1]:
         scale = layout.counts_per_newton
-        force = f"{region.peak} counts" if scale is None else f"{region.peak / scale:.2f} N"
+        force = (
+            f"{region.peak} counts" if scale is None else f"{region.peak / scale:.2f} N"
+        )
         row, col = region.centroid
         taxels = counted(region.area, "taxel")
         items.append(f"{force} on {taxels} at row {row:.1f}, column {col:.1f}")
     if len(regions) != 1:
         items.append(f"{len(regions) - 1} more" if regions else "no contact")
     if frame.valid is not None and not frame.valid.all():
-        items.append(f"{int((~frame.valid).sum())} of {frame.valid.size} taxels cannot be read")
+        items.append(
+            f"{int((~frame.valid).sum())} of {frame.valid.size} taxels cannot be read"
+        )
     return "  |  ".join(items)
 
 

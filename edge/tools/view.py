@@ -1,9 +1,9 @@
 """Show the skin live in a terminal or on a web page.
 
-Draws the skin and, with --model, the latest decisions. Taxels in contact are red to white by force,
-those below the contact threshold grey, and those that cannot be read blue. Each line shows two rows
-of taxels, with row 0 at the top. q or Ctrl-C quits. With --web, a page for a browser shows the
-same, with the features of each contact over time.
+Draws the skin and, with --model, the latest decisions. Taxels in contact are red to
+white by force, those below the contact threshold grey, and those that cannot be read
+blue. Each line shows two rows of taxels, with row 0 at the top. q or Ctrl-C quits. With
+--web, a page for a browser shows the same, with the features of each contact over time.
 """
 
 import argparse
@@ -25,8 +25,8 @@ from edge.touch.layout import SkinLayout
 RATE_HZ = 10.0
 """Pictures per second."""
 FULL_NEWTONS, FULL_FACTOR = 17.0, 50
-"""White is the force above which the paper's lab no longer trusted its readings; if the scale is
-unknown, this many times the threshold."""
+"""White is the force above which the paper's lab no longer trusted its readings; if the
+scale is unknown, this many times the threshold."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
     """One picture: the skin, its caption, the decisions and the legend."""
     scale, threshold = layout.counts_per_newton, layout.threshold_counts
-    full = FULL_FACTOR * max(threshold, 1) if scale is None else round(FULL_NEWTONS * scale)
+    full = (
+        FULL_FACTOR * max(threshold, 1)
+        if scale is None
+        else round(FULL_NEWTONS * scale)
+    )
     colour, regions = terminal.skin_colours(frame, layout, full)
     columns = shutil.get_terminal_size().columns
     wide = 2 if 2 * layout.cols <= columns else 1
@@ -63,7 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
     due = -float("inf")
     with (
         reading(
-            arguments, model=model, real_time=sys.stdout.isatty(), decides=model is not None
+            arguments,
+            model=model,
+            real_time=sys.stdout.isatty(),
+            decides=model is not None,
         ) as live,
         terminal.keys(live.stop) as typed,
         terminal.drawing() if live.page is None else nullcontext(),
@@ -82,5 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
                     decisions[event.task] = decision_text(event)
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
-                print(terminal.screen(draw(frame, layout, decisions)), end="", flush=True)
+                print(
+                    terminal.screen(draw(frame, layout, decisions)), end="", flush=True
+                )
     return 0

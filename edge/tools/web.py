@@ -1,9 +1,9 @@
 """A small web server for one live page: the page asks for pictures and sends actions.
 
-It is made for a loop that must not be late. The loop leaves its latest picture with `show`, which
-never waits for a browser. Requests are answered in threads of their own, and a browser that stops
-reading is dropped. The page, its pictures and its actions need the token of the link, so that no
-other site, user or machine can see them or act.
+It is made for a loop that must not be late. The loop leaves its latest picture with
+`show`, which never waits for a browser. Requests are answered in threads of their own,
+and a browser that stops reading is dropped. The page, its pictures and its actions need
+the token of the link, so that no other site, user or machine can see them or act.
 """
 
 import json
@@ -45,7 +45,8 @@ class WebServer(ThreadingHTTPServer):
 
     Attributes:
         server_port: the port at which it listens.
-        token: without it in a request's query, nothing is served but the script and the style.
+        token: without it in a request's query, nothing is served but the script and the
+            style.
         link: the address to open in a browser, with the token.
     """
 
@@ -54,7 +55,8 @@ class WebServer(ThreadingHTTPServer):
 
         Args:
             address: HOST:PORT; port 0 takes a free one.
-            act: carries out an action of the page, one at a time; its `EdgeError` is shown there.
+            act: carries out an action of the page, one at a time; its `EdgeError` is
+                shown there.
 
         Raises:
             InputError: the address is not of that form, or cannot be listened at.
@@ -72,7 +74,10 @@ class WebServer(ThreadingHTTPServer):
         self._asked_at = -WATCHED_S
         folder = resources.files("edge.tools") / "pages"
         self.files = {
-            path: (f"text/{kind}; charset=utf-8", (folder / (path[1:] or "page.html")).read_bytes())
+            path: (
+                f"text/{kind}; charset=utf-8",
+                (folder / (path[1:] or "page.html")).read_bytes(),
+            )
             for path, kind in FILES.items()
         }
         threading.Thread(target=self.serve_forever, args=(0.1,), daemon=True).start()
@@ -91,7 +96,9 @@ class WebServer(ThreadingHTTPServer):
         self._asked_at = time.monotonic()
         if self._picture is None:
             return b""
-        return json.dumps(self._picture, allow_nan=False, separators=(",", ":")).encode()
+        return json.dumps(
+            self._picture, allow_nan=False, separators=(",", ":")
+        ).encode()
 
     def close(self) -> None:
         """Stop serving."""
@@ -103,7 +110,8 @@ class WebServer(ThreadingHTTPServer):
 
 
 def _own_address() -> str:
-    """The address at which other machines find this one; no packet is sent to learn it."""
+    """The address at which other machines find this one; no packet is sent to learn
+    it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
         probe.connect(("192.0.2.1", 9))  # reserved for documentation (RFC 5737)
         return str(probe.getsockname()[0])
@@ -153,7 +161,10 @@ class _Handler(BaseHTTPRequestHandler):
         return secrets.compare_digest(given.encode(), self.server.token.encode())
 
     def _answer(
-        self, status: HTTPStatus, contents: bytes = b"", kind: str = "text/plain; charset=utf-8"
+        self,
+        status: HTTPStatus,
+        contents: bytes = b"",
+        kind: str = "text/plain; charset=utf-8",
     ) -> None:
         self.send_response(status)
         of_contents = {"Content-Type": kind, "Content-Length": str(len(contents))}

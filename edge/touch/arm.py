@@ -1,4 +1,5 @@
-"""Forward kinematics of a joint chain: joint angles to the pose of the link with the skin."""
+"""Forward kinematics of a joint chain: joint angles to the pose of the link with the
+skin."""
 
 import math
 import os
@@ -21,11 +22,13 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: a fixed step (`origin`), then motion about or along `axis`, then a fixed step.
+    """A joint: a fixed step (`origin`), then motion about or along `axis`, then a fixed
+    step.
 
-    The step before the motion is `origin_xyz` and `origin_rpy`, as in a URDF. The step after it is
-    `translate`, as in `edge/arms/cody.toml`. Lengths are in metres, angles in radians. `limits` are
-    the lowest and highest angle of the joint, or its travel along the axis if it slides.
+    The step before the motion is `origin_xyz` and `origin_rpy`, as in a URDF. The step
+    after it is `translate`, as in `edge/arms/cody.toml`. Lengths are in metres, angles
+    in radians. `limits` are the lowest and highest angle of the joint, or its travel
+    along the axis if it slides.
     """
 
     name: str
@@ -46,7 +49,9 @@ class Chain:
     [0.00635, -0.21668, -0.55648]
     """
 
-    def __init__(self, joints: Sequence[Joint], base: str = "base", tip: str = "tip") -> None:
+    def __init__(
+        self, joints: Sequence[Joint], base: str = "base", tip: str = "tip"
+    ) -> None:
         """Make a chain of joints; a joint of the kind "fixed" takes no angle.
 
         Raises:
@@ -60,10 +65,11 @@ class Chain:
         self.names = tuple(joint.name for joint in moving)
         """The moving joints' names, in the order of the angles."""
         self.limits = tuple(joint.limits for joint in moving)
-        """(lower, upper) of each moving joint in radians, or metres if it slides; or None."""
+        """(lower, upper) of each moving joint in radians, or metres if it slides; or
+        None."""
         self._links: list[tuple[bool, Vector, tuple[float, ...]]] = []
-        """Of each moving joint: whether it slides, its axis of length 1, and the fixed step before
-        it, (12,) the first three rows of a transform."""
+        """Of each moving joint: whether it slides, its axis of length 1, and the fixed
+        step before it, (12,) the first three rows of a transform."""
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
@@ -79,11 +85,12 @@ class Chain:
     def pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of the tip in the base's frame.
 
-        Rotations follow Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2. It is computed
-        with 1 - cos(q) = 2 sin^2(q/2), which loses no digits at small angles.
+        Rotations follow Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2. It is
+        computed with 1 - cos(q) = 2 sin^2(q/2), which loses no digits at small angles.
 
         Args:
-            q: (dof,) or (..., dof) radians, or metres for a sliding joint, from base to tip.
+            q: (dof,) or (..., dof) radians, or metres for a sliding joint, from base to
+                tip.
 
         Returns:
             (4, 4) or (..., 4, 4) homogeneous transform, metres.
@@ -107,11 +114,14 @@ class Chain:
         pose = np.zeros((*angles.shape[:-1], 4, 4))
         pose[..., 3, 3] = 1.0
         of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
-        pose[..., :3, :] = np.stack(self._carried(of_each_joint, np.eye(4), np.sin), axis=-2)
+        pose[..., :3, :] = np.stack(
+            self._carried(of_each_joint, np.eye(4), np.sin), axis=-2
+        )
         return pose
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
-        """A point of the tip in the base's frame: `pose(q)` times the point, as plain floats.
+        """A point of the tip in the base's frame: `pose(q)` times the point, as plain
+        floats.
 
         It is much faster than computing the pose.
 
@@ -128,8 +138,11 @@ class Chain:
         x, y, z = self._carried(angles, (*position, 1.0), math.sin)
         return x, y, z
 
-    def _carried(self, angles: Any, position: Any, sin: Callable[[Any], Any]) -> tuple[Any, ...]:
-        """(x, y, z) in the base's frame of homogeneous coordinates (4,) in the tip's frame.
+    def _carried(
+        self, angles: Any, position: Any, sin: Callable[[Any], Any]
+    ) -> tuple[Any, ...]:
+        """(x, y, z) in the base's frame of homogeneous coordinates (4,) in the tip's
+        frame.
 
         Angles and coordinates are numbers, or arrays of equal shape.
         """
@@ -154,8 +167,14 @@ class Chain:
         joints = []
         for j in self.joints:
             optional = {key: getattr(j, key) for key in (*STEPS, "limits")}
-            given = {k: list(value) for k, value in optional.items() if value not in (ZERO, None)}
-            joints.append({"name": j.name, "axis": list(j.axis), "type": j.kind, **given})
+            given = {
+                k: list(value)
+                for k, value in optional.items()
+                if value not in (ZERO, None)
+            }
+            joints.append(
+                {"name": j.name, "axis": list(j.axis), "type": j.kind, **given}
+            )
         return {"base": self.base, "tip": self.tip, "joint": joints}
 
     @classmethod
@@ -166,7 +185,10 @@ class Chain:
             InputError: a key is unknown or missing, or a value is impossible.
         """
         table = ConfigTable(arm, where)
-        joints = [_joint_from(joint, i) for i, joint in enumerate(table.tables("joint", "joint"))]
+        joints = [
+            _joint_from(joint, i)
+            for i, joint in enumerate(table.tables("joint", "joint"))
+        ]
         base, tip = table.text("base", "base"), table.text("tip", "tip")
         table.done()
         with about(where):
@@ -189,13 +211,16 @@ class Chain:
 
     @classmethod
     def from_file(
-        cls, path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
+        cls,
+        path: str | os.PathLike[str],
+        base: str | None = None,
+        tip: str | None = None,
     ) -> Self:
         """The chain of a TOML file, or of a URDF file between two of its links.
 
         Raises:
-            InputError: as `from_toml` and `from_urdf`; or links are given for a TOML file, or a
-                link is missing for a URDF.
+            InputError: as `from_toml` and `from_urdf`; or links are given for a TOML
+                file, or a link is missing for a URDF.
         """
         if Path(path).suffix.lower() in (".urdf", ".xml"):
             if base is None or tip is None:
@@ -218,7 +243,9 @@ class Chain:
         from edge.touch.urdf import joints_between
 
         joints = joints_between(path, base, tip)
-        return cls.from_dict({"base": base, "tip": tip, "joint": joints}, where=os.fspath(path))
+        return cls.from_dict(
+            {"base": base, "tip": tip, "joint": joints}, where=os.fspath(path)
+        )
 
 
 def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
@@ -242,7 +269,9 @@ def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
 
 def _check_joint(joint: Joint) -> None:
     if joint.kind != "fixed" and not 1e-9 <= math.hypot(*joint.axis) < math.inf:
-        raise InputError(f"joint {joint.name}: its axis is zero or too long; give a direction")
+        raise InputError(
+            f"joint {joint.name}: its axis is zero or too long; give a direction"
+        )
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
         raise InputError(
             f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its upper limit "
@@ -255,7 +284,9 @@ def _rows(step: NDArray[np.float64]) -> tuple[float, ...]:
     return tuple(step[:3].ravel().tolist())
 
 
-def _moved(step: tuple[float, ...], x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any]:
+def _moved(
+    step: tuple[float, ...], x: Any, y: Any, z: Any, w: Any
+) -> tuple[Any, Any, Any]:
     """Homogeneous coordinates after a fixed step."""
     a, b, c, tx, d, e, f, ty, g, h, i, tz = step
     return (
@@ -266,7 +297,8 @@ def _moved(step: tuple[float, ...], x: Any, y: Any, z: Any, w: Any) -> tuple[Any
 
 
 def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
-    """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y, z."""
+    """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y,
+    z."""
     (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
     return np.array(
         [
@@ -281,7 +313,8 @@ def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
 def _joint_from(table: ConfigTable, index: int) -> Joint:
     name = table.text("name", f"joint {index}")
     if table.has("name"):
-        # The joints of a URDF have no order, so an error names the joint and not its number.
+        # The joints of a URDF have no order, so an error names the joint and not its
+        # number.
         table.prefix = f"joint {shown(name)}: "
     steps = {key: _vector(table, key) for key in STEPS if table.has(key)}
     limits = None

@@ -1,4 +1,5 @@
-"""One contact: its measurements frame by frame, and the series that features are made of."""
+"""One contact: its measurements frame by frame, and the series that features are made
+of."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -15,9 +16,11 @@ from edge.touch.measures import ZONE_WIDTH, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 CLOCK_ROUNDING_S = 1e-6
-"""Shorter than a frame, and longer than the rounding of a clock that counts 1e9 seconds."""
+"""Shorter than a frame, and longer than the rounding of a clock that counts 1e9
+seconds."""
 PLAIN = 4
-"""Whole numbers of every frame before those of the zones: peak, area, sums of rows, of columns."""
+"""Whole numbers of every frame before those of the zones: peak, area, sums of rows, of
+columns."""
 
 
 @dataclass(frozen=True)
@@ -28,18 +31,22 @@ class FeatureSeries:
         t: (n,) seconds from onset, increasing, the first 0.
         peak: (n,) largest count of the region; 0 without contact.
         area: (n,) taxels of the region; 0 without contact.
-        sums: (n, 2) sums of rows and columns over the region's taxels: area times centroid;
-            0 where motion was not asked for.
-        motion: (n,) distance of the centroid from its place at onset in metres, or in taxels if
-            the skin's pitch is unknown; its last value is kept without contact; NaN where the
-            arm's pose was not known; 0 where it was not asked for.
+        sums: (n, 2) sums of rows and columns over the region's taxels: area times
+            centroid; 0 where motion was not asked for.
+        motion: (n,) distance of the centroid from its place at onset in metres, or in
+            taxels if the skin's pitch is unknown; its last value is kept without
+            contact; NaN where the arm's pose was not known; 0 where it was not asked
+            for.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`), or None.
-        kernel_cells: (n, cells) likewise, of the larger cells that kernels take, or None.
-        joints: (n, dof) joint angles in radians, NaN where they were not known, or None.
+        taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`),
+            or None.
+        kernel_cells: (n, cells) likewise, of the larger cells that kernels take, or
+            None.
+        joints: (n, dof) joint angles in radians, NaN where they were not known, or
+            None.
     """
 
     t: NDArray[np.float64]
@@ -56,11 +63,13 @@ class FeatureSeries:
     joints: NDArray[np.float64] | None = None
 
     def felt(self, window_s: float) -> Self:
-        """The frames in which the contact is felt, up to the first one at the window's end.
+        """The frames in which the contact is felt, up to the first one at the window's
+        end.
 
-        A board decides with that frame, so later ones must not count. Frames in which the contact
-        has lifted off are left out, as it may go on. But once it has been away for the skin's
-        `release_s`, the contact was over when it lifted off, and these frames stay.
+        A board decides with that frame, so later ones must not count. Frames in which
+        the contact has lifted off are left out, as it may go on. But once it has been
+        away for the skin's `release_s`, the contact was over when it lifted off, and
+        these frames stay.
         """
         n = min(int(self.t.searchsorted(window_s)) + 1, self.t.size)
         felt = self.area[:n] > 0
@@ -73,7 +82,9 @@ class FeatureSeries:
 
     def _frames(self, pick: slice | NDArray[np.intp]) -> Self:
         changes: dict[str, Any] = {
-            name: value[pick] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+            name: value[pick]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
         }
         changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
         return replace(self, **changes)
@@ -82,7 +93,9 @@ class FeatureSeries:
     def integers(self) -> NDArray[np.int64]:
         """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
         cells = [c for c in (self.taxels, self.kernel_cells) if c is not None]
-        return np.column_stack([self.peak, self.area, self.sums, *self.zones.values(), *cells])
+        return np.column_stack(
+            [self.peak, self.area, self.sums, *self.zones.values(), *cells]
+        )
 
 
 class Contact:
@@ -94,7 +107,8 @@ class Contact:
         touched_s: when the region was last seen, seconds from onset.
         frames: number of frames since onset.
         layout: the skin.
-        chain: the arm that its motion is measured with; None where it is measured on the skin.
+        chain: the arm that its motion is measured with; None where it is measured on
+            the skin.
         ended: no more frames will come.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
@@ -112,11 +126,13 @@ class Contact:
         self.joints: NDArray[np.float64] | None = None
         self._measurer = measurer
         self._rows: list[dict[str, Any]] = []
-        """Of each frame, what was measured: fields of `FeatureSeries`, but `counted` (m,) for the
-        whole numbers of region and zones."""
+        """Of each frame, what was measured: fields of `FeatureSeries`, but `counted`
+        (m,) for the whole numbers of region and zones."""
         self._starts: dict[str, Vector] = {}
 
-    def add(self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float) -> None:
+    def add(
+        self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float
+    ) -> None:
         """Take in a frame.
 
         Args:
@@ -150,11 +166,16 @@ class Contact:
                 # The contact's zone comes first.
                 _, _, force, rows, cols, *_ = zones
                 centroid = rows / force, cols / force % self.layout.cols
-                row["force_motion"] = self._distance("force_motion", centroid, frame.joints)
+                row["force_motion"] = self._distance(
+                    "force_motion", centroid, frame.joints
+                )
         elif self._rows:
             row |= {name: self._rows[-1][name] for name in row.keys() - {"t"}}
         row["counted"] = np.array(plain + zones, dtype=np.int64)
-        for name, cells in (("taxels", measurer.cells), ("kernel_cells", measurer.kernel_cells)):
+        for name, cells in (
+            ("taxels", measurer.cells),
+            ("kernel_cells", measurer.kernel_cells),
+        ):
             if cells is not None:
                 row[name] = cells.read(frame)
         if measurer.joints:
@@ -173,13 +194,19 @@ class Contact:
             )
         finite = np.isfinite(frame.joints)
         if not finite.all():
-            raise InputError(f"angle {int(finite.argmin())} of a frame's joints is not finite")
+            raise InputError(
+                f"angle {int(finite.argmin())} of a frame's joints is not finite"
+            )
         return frame.joints.copy()
 
     def _distance(
-        self, name: str, centroid: tuple[float, float], joints: NDArray[np.float64] | None
+        self,
+        name: str,
+        centroid: tuple[float, float],
+        joints: NDArray[np.float64] | None,
     ) -> float:
-        """Distance from where this centroid was first seen; NaN where the pose is not known."""
+        """Distance from where this centroid was first seen; NaN where the pose is not
+        known."""
         position = self._located(centroid, joints)
         if position is None:
             self.missing_pose = True
@@ -189,7 +216,8 @@ class Contact:
     def _located(
         self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> Vector | None:
-        """Where a point of the skin lies; None where an arm's joint angles are not known."""
+        """Where a point of the skin lies; None where an arm's joint angles are not
+        known."""
         point = self.layout.position(*centroid)
         if self.chain is None:
             return point
@@ -198,8 +226,9 @@ class Contact:
     def position(self) -> Vector | None:
         """(x, y, z) where the region's centroid was last seen.
 
-        Metres (taxels where the pitch is unknown), in the frame of the arm's base; without an
-        arm in that of the link that carries the skin. None where joint angles were not known.
+        Metres (taxels where the pitch is unknown), in the frame of the arm's base;
+        without an arm in that of the link that carries the skin. None where joint
+        angles were not known.
         """
         return self._located(self.region.centroid, self.joints)
 
@@ -228,7 +257,8 @@ def released(touched_s: float, now_s: float, release_s: float) -> bool:
 
 
 def region_time(frame: Frame, region: Region | None) -> float:
-    """When the region was read: the mean over its taxels, as a frame is a rolling shutter.
+    """When the region was read: the mean over its taxels, as a frame is a rolling
+    shutter.
 
     Raises:
         InputError: a taxel of the region has a time that is not finite.

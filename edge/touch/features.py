@@ -27,8 +27,8 @@ def widths(
 ) -> tuple[int, ...]:
     """How many values of a vector each feature takes, in their order.
 
-    A course takes `samples` values, or as many as its name says, for each cell or joint. A feature
-    that is one number for the window takes 1 for each.
+    A course takes `samples` values, or as many as its name says, for each cell or
+    joint. A feature that is one number for the window takes 1 for each.
 
     Args:
         names: of the features.
@@ -40,12 +40,16 @@ def widths(
         InputError: a feature does not exist.
     """
     types = [measures.feature(name) for name in names]
-    cells = Cells(layout).count if any(f.quantity == "taxel_force" for f in types) else 0
+    cells = (
+        Cells(layout).count if any(f.quantity == "taxel_force" for f in types) else 0
+    )
     rows = [
-        joints if f.of_joints else KERNELS.get(f.quantity, cells) if f.wide else 1 for f in types
+        joints if f.of_joints else KERNELS.get(f.quantity, cells) if f.wide else 1
+        for f in types
     ]
     return tuple(
-        n if f.single else n * (f.samples or samples) for f, n in zip(types, rows, strict=True)
+        n if f.single else n * (f.samples or samples)
+        for f, n in zip(types, rows, strict=True)
     )
 
 
@@ -66,34 +70,39 @@ def feature_vector(
     >>> edge.feature_vector(series, window_s=1.2).shape
     (120,)
 
-    A course is sampled at `samples` times, or as many as its name says, uniform in the window.
-    Cells and joints follow one after another; see `widths`. Samples are interpolated linearly
-    between frames, so jitter and dropped frames do not shift them. A value that is not known in
-    some frames is interpolated between those that know it, held after the last of them, and 0
-    where no frame knows it. Such values are the centroid of an empty zone, motion without the
-    arm's pose, and everything while the contact has lifted off for less than `release_s`. Force
-    and area of a contact that has ended are 0 from its lift-off on. Frames after the first one at
-    the window's end do not count, as the board does not have them yet.
+    A course is sampled at `samples` times, or as many as its name says, uniform in the
+    window. Cells and joints follow one after another; see `widths`. Samples are
+    interpolated linearly between frames, so jitter and dropped frames do not shift
+    them. A value that is not known in some frames is interpolated between those that
+    know it, held after the last of them, and 0 where no frame knows it. Such values are
+    the centroid of an empty zone, motion without the arm's pose, and everything while
+    the contact has lifted off for less than `release_s`. Force and area of a contact
+    that has ended are 0 from its lift-off on. Frames after the first one at the
+    window's end do not count, as the board does not have them yet.
 
-    Transforms and summaries are taken of the samples. `log_` is the logarithm of the value plus a
-    floor, so that it stays finite at 0. The floor is the smallest force of a taxel in contact, one
-    taxel, or a tenth of the distance between taxels; it is 1 after another transform. A stiffness
-    is above 0 and needs no floor; where no frame knows it, its logarithm is 0 too.
+    Transforms and summaries are taken of the samples. `log_` is the logarithm of the
+    value plus a floor, so that it stays finite at 0. The floor is the smallest force of
+    a taxel in contact, one taxel, or a tenth of the distance between taxels; it is 1
+    after another transform. A stiffness is above 0 and needs no floor; where no frame
+    knows it, its logarithm is 0 too.
 
     Args:
         series: the contact.
         window_s: seconds from onset, above 0.
         samples: times per feature, at least 2.
-        features: names, see `edge.touch.measures`; the series must have been measured for them.
+        features: names, see `edge.touch.measures`; the series must have been measured
+            for them.
         tables: {feature: its table} of those that are made of kernels.
 
     Returns:
         (sum of `widths`,) float64: by default max_force in newtons (or counts),
-        contact_area in taxels, contact_motion in metres (or taxels), each at `samples` times.
+        contact_area in taxels, contact_motion in metres (or taxels), each at `samples`
+        times.
 
     Raises:
-        InputError: the window or the number of samples makes no sense, the series is empty, a
-            feature does not exist or was not measured, or its table is missing.
+        InputError: the window or the number of samples makes no sense, the series is
+            empty, a feature does not exist or was not measured, or its table is
+            missing.
         OutOfRange: a feature is too large for a float.
     """
     if not (math.isfinite(window_s) and window_s > 0.0):
@@ -108,12 +117,16 @@ def feature_vector(
     # Overflow to infinity is refused by `_Course.sampled` and by the model.
     with np.errstate(over="ignore"):
         return np.concatenate(
-            [course.block(tuple(group), samples) for _, group in groupby(types, key=_kind)]
+            [
+                course.block(tuple(group), samples)
+                for _, group in groupby(types, key=_kind)
+            ]
         )
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
-    """Features of equal kind are the rows of one array; each wide feature is its own kind."""
+    """Features of equal kind are the rows of one array; each wide feature is its own
+    kind."""
     name = feature.name if feature.wide else ""
     return name, feature.samples, feature.transforms, feature.summary
 
@@ -127,7 +140,9 @@ class _Course:
         self._series, self._window_s, self._tables = series, window_s, tables
         layout = series.layout
         self._scale = layout.counts_per_newton or 1.0
-        self._zones = {name: _quantities(sums, layout) for name, sums in series.zones.items()}
+        self._zones = {
+            name: _quantities(sums, layout) for name, sums in series.zones.items()
+        }
         self._force_floor = (layout.threshold_counts + 1) / self._scale
         self._length_floor = MOTION_FLOOR * layout.pitch[0]
 
@@ -151,15 +166,20 @@ class _Course:
                 values = np.copysign(np.sqrt(np.abs(values)), values)
             else:
                 # The cells or joints of one feature share one largest value.
-                largest = np.abs(values).max(axis=None if first.wide else 1, keepdims=True)
-                values = np.divide(values, largest, out=np.zeros_like(values), where=largest > 0.0)
+                largest = np.abs(values).max(
+                    axis=None if first.wide else 1, keepdims=True
+                )
+                values = np.divide(
+                    values, largest, out=np.zeros_like(values), where=largest > 0.0
+                )
             floors = np.ones_like(floors)
         if first.summary == "rate":
             values = np.gradient(values, step, axis=1)
         elif first.summary == "mean":
             values = values.mean(axis=1)
         elif first.summary == "deviation":
-            # Powers of two change no digit, and keep the squares within the range of floats.
+            # Powers of two change no digit, and keep the squares within the range of
+            # floats.
             power = np.frexp(np.abs(values).max(axis=1, keepdims=True))[1]
             values = np.ldexp(np.ldexp(values, -power).std(axis=1), power[:, 0])
         elif first.summary == "roughness":
@@ -169,7 +189,8 @@ class _Course:
     def _sampled(
         self, group: tuple[Feature, ...], times: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(rows, times) features of one value a frame, or the cells or joints of one feature."""
+        """(rows, times) features of one value a frame, or the cells or joints of one
+        feature."""
         first, t = group[0], self._series.t
         if first.wide:
             wide = self._series.joints if first.of_joints else self._series.taxels
@@ -222,10 +243,14 @@ class _Course:
         return values
 
 
-def kernel_channels(series: FeatureSeries, window_s: float, name: str) -> NDArray[np.int64]:
-    """(channels, `edge.touch.kernels.SAMPLES`) numbers to which a feature's kernels are applied.
+def kernel_channels(
+    series: FeatureSeries, window_s: float, name: str
+) -> NDArray[np.int64]:
+    """(channels, `edge.touch.kernels.SAMPLES`) numbers to which a feature's kernels are
+    applied.
 
-    The last value before each time is held, and nothing is interpolated, so all are whole numbers.
+    The last value before each time is held, and nothing is interpolated, so all are
+    whole numbers.
 
     Args:
         series: the contact, as `FeatureSeries.felt` gives it.
@@ -241,7 +266,10 @@ def kernel_channels(series: FeatureSeries, window_s: float, name: str) -> NDArra
         rows = np.column_stack(list(series.zones.values())) if measured else None
     if rows is None:
         raise _not_measured(measures.feature(name))
-    times = np.arange(kernels.SAMPLES) * (window_s / (kernels.SAMPLES - 1)) + CLOCK_ROUNDING_S
+    times = (
+        np.arange(kernels.SAMPLES) * (window_s / (kernels.SAMPLES - 1))
+        + CLOCK_ROUNDING_S
+    )
     return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)
 
 
@@ -253,7 +281,9 @@ def channels_of(name: str, layout: SkinLayout) -> int:
 
 
 def _not_measured(feature: Feature) -> InputError:
-    return InputError(f"{feature.name} was not measured; name it where contacts are followed")
+    return InputError(
+        f"{feature.name} was not measured; name it where contacts are followed"
+    )
 
 
 def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:
@@ -271,8 +301,8 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
         # A contact that crosses the seam goes on; it does not jump to the other end.
         turn = layout.cols
         around[touched] = np.unwrap(around[touched] % turn, period=turn)
-    # Variances and the covariance are whole numbers times force squared, so nothing cancels.
-    # Products beyond 64 bits, of large skins, take Python's integers.
+    # Variances and the covariance are whole numbers times force squared, so nothing
+    # cancels. Products beyond 64 bits, of large skins, take Python's integers.
     bound = int(sums.max(initial=0)) * int(force.max(initial=0))
     exact = sums if bound < 1 << 62 else sums.astype(object)
     _, _, f, r, c, rr, rc, cc = exact.T
@@ -282,11 +312,13 @@ def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArra
         for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
     )
     larger = 0.5 * (rows + cols + np.hypot(rows - cols, 2.0 * slant))
-    # The smaller eigenvalue is the determinant over the larger one: the difference of the
-    # eigenvalues' terms would cancel. For a perfect line, rounding leaves less than 2^-25 of the
-    # skin's larger side.
+    # The smaller eigenvalue is the determinant over the larger one: the difference of
+    # the eigenvalues' terms would cancel. For a perfect line, rounding leaves less than
+    # 2^-25 of the skin's larger side.
     determinant = np.maximum(rows * cols - slant * slant, 0.0)
-    smaller = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger > 0)
+    smaller = np.divide(
+        determinant, larger, out=np.zeros_like(larger), where=larger > 0
+    )
     return {
         "max_force": peak / scale,
         "force": force / scale,
@@ -307,8 +339,8 @@ def _resample(
 ) -> NDArray[np.float64]:
     """Values (..., n) at the increasing times `t`, interpolated to `times`.
 
-    They never overshoot their neighbours. The fraction of a step is computed before it multiplies a
-    difference of values, as a slope over a very short step could overflow.
+    They never overshoot their neighbours. The fraction of a step is computed before it
+    multiplies a difference of values, as a slope over a very short step could overflow.
     """
     after = np.clip(t.searchsorted(times, side="right"), 1, t.size - 1)
     before = np.maximum(after - 1, 0)

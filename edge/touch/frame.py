@@ -20,6 +20,7 @@ class Frame:
     valid: NDArray[np.bool_] | None = None
     """(rows, cols), which taxels could be read; None where all could."""
     times: NDArray[np.float64] | None = None
-    """(rows, cols), when each taxel was read, in seconds; None where all were read at `t`."""
+    """(rows, cols), when each taxel was read, in seconds; None where all were read at
+    `t`."""
     joints: NDArray[np.float64] | None = None
     """(dof,) radians at `t`; None where unknown."""

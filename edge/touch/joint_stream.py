@@ -1,11 +1,12 @@
 """Joint angles from another program: JSON lines with their own time, by stdin or UDP.
 
-A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one angle per
-joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its angles are then put in
-the arm's order, and those of other joints are ignored. The sender's clock need not be ours. The
-quickest tenth of the recent lines gives the offset between the two clocks, and a line that took
-longer is older by the difference. With a line whose time goes back, everything begins anew: the
-sender's clock was set, or the sender was started again.
+A line is `{"t": 12.345, "q": [0.1, -0.2, ...]}`: seconds on the sender's clock, and one
+angle per joint in radians. A line may name its joints, `"names": ["elbow", ...]`; its
+angles are then put in the arm's order, and those of other joints are ignored. The
+sender's clock need not be ours. The quickest tenth of the recent lines gives the offset
+between the two clocks, and a line that took longer is older by the difference. With a
+line whose time goes back, everything begins anew: the sender's clock was set, or the
+sender was started again.
 """
 
 import logging
@@ -36,15 +37,17 @@ OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
 LONGEST_LINE = 65536
 MOST_LINES, MOST_BYTES = 64, 65536
-"""Lines and bytes taken in a frame, so that a flood does not stop the loop. Of more lines the
-newest are taken: two senders at 1 kHz give 20 lines in a frame."""
+"""Lines and bytes taken in a frame, so that a flood does not stop the loop. Of more
+lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
 RECENT = 64
 """Lines that give the clocks' offset."""
 SILENT_S = 1.0
-"""After so long without a line from the chosen sender, another one may take its place."""
+"""After so long without a line from the chosen sender, another one may take its
+place."""
 
 Source = Callable[[], bytes | None]
-"""Gives the bytes that came since its last call, b"" for none, None at the end of the input."""
+"""Gives the bytes that came since its last call, b"" for none, None at the end of the
+input."""
 
 
 class Joints:
@@ -69,8 +72,8 @@ class Joints:
         Args:
             source: gives the bytes that have come; never waits.
             dof: angles that a line must have.
-            names: of the joints, in the order of the angles that `at` returns; a line's own names
-                are ignored where this is None.
+            names: of the joints, in the order of the angles that `at` returns; a line's
+                own names are ignored where this is None.
             now: the loop's clock.
         """
         self._source, self._dof, self._names, self._now = source, dof, names, now
@@ -101,8 +104,8 @@ class Joints:
         before_s, angles = self._poses[later - 1]
         after_s, next_angles = self._poses[min(later, len(self._poses) - 1)]
         if 0.0 < after_s - before_s <= 2.0 * OLDEST_S:
-            # A sender may wrap its angles at +-pi. No joint turns half round between two lines, so
-            # that the shorter way is the right one.
+            # A sender may wrap its angles at +-pi. No joint turns half round between
+            # two lines, so that the shorter way is the right one.
             turned = next_angles - angles
             turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
             return angles + (sent - before_s) / (after_s - before_s) * turned
@@ -111,7 +114,9 @@ class Joints:
     def close(self) -> None:
         """Report the lines that were not used."""
         if self.malformed:
-            LOG.warning(f"--joints: unusable lines: {self.malformed}; the last one: {self.problem}")
+            LOG.warning(
+                f"--joints: unusable lines: {self.malformed}; the last one: {self.problem}"
+            )
 
     def _take(self) -> None:
         """Parse the lines that have come."""
@@ -127,7 +132,10 @@ class Joints:
             self._rest = b""
             self._bad(f"a line is longer than {LONGEST_LINE} bytes")
         if len(lines) > MOST_LINES:
-            self._bad(f"more than {MOST_LINES} lines came in one frame", len(lines) - MOST_LINES)
+            self._bad(
+                f"more than {MOST_LINES} lines came in one frame",
+                len(lines) - MOST_LINES,
+            )
         for line in lines[-MOST_LINES:]:
             if line.strip():
                 self._line(line, arrived)
@@ -206,7 +214,9 @@ class Datagrams:
         Raises:
             InputError: the address is not of that form or cannot be bound.
         """
-        host, port = parse_address("--joints udp:", address, "udp:127.0.0.1:47401", "127.0.0.1")
+        host, port = parse_address(
+            "--joints udp:", address, "udp:127.0.0.1:47401", "127.0.0.1"
+        )
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.listener = socket.socket(family, socket.SOCK_DGRAM)
         self.listener.setblocking(False)
@@ -234,4 +244,6 @@ class Datagrams:
         """Stop listening, and report what other senders sent."""
         self.listener.close()
         if self.ignored:
-            LOG.warning(f"--joints: ignored datagrams from another sender: {self.ignored}")
+            LOG.warning(
+                f"--joints: ignored datagrams from another sender: {self.ignored}"
+            )

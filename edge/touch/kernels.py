@@ -1,10 +1,11 @@
-"""Convolution features in whole numbers: the share of a touch in which a kernel's sum is large.
+"""Convolution features in whole numbers: the share of a touch in which a kernel's sum
+is large.
 
-The kernels are those of MiniRocket (Dempster, Schmidt and Webb, 2021): nine taps, three of them of
-weight 2 and six of weight -1, at four dilations. Each is applied to the sum of a few channels of a
-touch. A feature is the share of the samples at which the result is above a bias, and biases are
-values that training touches had. Everything up to that share is a whole number below 2^21, so every
-machine finds the same bits.
+The kernels are those of MiniRocket (Dempster, Schmidt and Webb, 2021): nine taps, three
+of them of weight 2 and six of weight -1, at four dilations. Each is applied to the sum
+of a few channels of a touch. A feature is the share of the samples at which the result
+is above a bias, and biases are values that training touches had. Everything up to that
+share is a whole number below 2^21, so every machine finds the same bits.
 """
 
 from __future__ import annotations
@@ -27,16 +28,21 @@ TAPS = 9
 BITS = 14
 """Bits of a channel's values; larger values are cut off."""
 BIAS_BITS = 21
-"""Bits of a bias: 9 channels times 12, the sum of a kernel's weights, times 2^`BITS`."""
+"""Bits of a bias: 9 channels times 12, the sum of a kernel's weights, times
+2^`BITS`."""
 KERNELS = np.array(
-    [[2 if tap in heavy else -1 for tap in range(TAPS)] for heavy in combinations(range(TAPS), 3)],
+    [
+        [2 if tap in heavy else -1 for tap in range(TAPS)]
+        for heavy in combinations(range(TAPS), 3)
+    ],
     dtype=np.int32,
 )
 """(84, 9) weights."""
 DILATIONS = (1, 2, 3, 4)
 """Samples from one tap to the next."""
 BIASES = {1008: (5, 3, 2, 2), 504: (3, 1, 1, 1)}
-"""Numbers of biases that a feature may have, and how many of them a kernel has at each dilation."""
+"""Numbers of biases that a feature may have, and how many of them a kernel has at each
+dilation."""
 CONVOLUTIONS = len(DILATIONS) * len(KERNELS)
 MIXED = (1, 1, 1, 2, 2, 3, 4, 6, 9)
 """How many channels a convolution may sum up; each entry is as likely as the others."""
@@ -49,7 +55,8 @@ class KernelTable:
     """The shifts and biases that training found for the kernels of one feature.
 
     Attributes:
-        shifts: of each channel, whose values are multiplied by 2^shift and lose their fractions.
+        shifts: of each channel, whose values are multiplied by 2^shift and lose their
+            fractions.
         biases: of every kernel, in the order of `convolution_of_bias`.
     """
 
@@ -71,7 +78,8 @@ class KernelTable:
 
 @lru_cache
 def convolution_of_bias(biases: int) -> NDArray[np.int64]:
-    """(biases,) the convolution that each bias belongs to, from the number of biases."""
+    """(biases,) the convolution that each bias belongs to, from the number of
+    biases."""
     each = np.repeat(BIASES[biases], len(KERNELS))
     return np.repeat(np.arange(CONVOLUTIONS), each)
 
@@ -80,8 +88,8 @@ def convolution_of_bias(biases: int) -> NDArray[np.int64]:
 def _inside() -> NDArray[np.bool_]:
     """(convolutions, samples) whether a sample counts.
 
-    Every other kernel counts only where all its taps lie inside the window; the rest count
-    everywhere, with zeros beyond the window's ends.
+    Every other kernel counts only where all its taps lie inside the window; the rest
+    count everywhere, with zeros beyond the window's ends.
     """
     inside = np.ones((len(DILATIONS), len(KERNELS), SAMPLES), dtype=np.bool_)
     for i, dilation in enumerate(DILATIONS):
@@ -106,7 +114,8 @@ def _mixes(channels: int) -> NDArray[np.float32]:
 
 
 def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.int32]:
-    """Channels (c, samples) times powers of two, cut off at the largest number of `BITS` bits."""
+    """Channels (c, samples) times powers of two, cut off at the largest number of
+    `BITS` bits."""
     by = np.array(shifts)[:, None]
     moved = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
     return np.asarray(np.minimum(moved, (1 << BITS) - 1), dtype=np.int32)
@@ -114,7 +123,8 @@ def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.in
 
 def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
     """(convolutions, samples) results of `shifted` channels (c, samples)."""
-    # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the order.
+    # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the
+    # order.
     mixed = (_mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
     mixed = mixed.reshape(len(DILATIONS), len(KERNELS), SAMPLES)
     results = np.empty_like(mixed)

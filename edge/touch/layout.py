@@ -1,4 +1,5 @@
-"""Shape, geometry and scale of a skin: the place of a taxel in metres, a count in newtons."""
+"""Shape, geometry and scale of a skin: the place of a taxel in metres, a count in
+newtons."""
 
 import math
 from collections.abc import Mapping
@@ -13,7 +14,8 @@ from edge.config import ConfigTable
 from edge.errors import InputError, about
 
 RELEASE_S = 0.3
-"""Longer than an arm bounces off a rigid object, and shorter than the time to a second tap."""
+"""Longer than an arm bounces off a rigid object, and shorter than the time to a second
+tap."""
 LONGEST_RELEASE_S = 60.0
 MOST_LINES = 1024
 """Most rows, and most columns."""
@@ -23,8 +25,8 @@ MOST_LINES = 1024
 class SkinLayout:
     """A skin of `rows` x `cols` taxels, flat or on a cylinder about the link's z axis.
 
-    A flat skin lies in the link's x-y plane: columns along x, rows along y. On a cylinder
-    (`radius_m` given) rows go along z and columns around.
+    A flat skin lies in the link's x-y plane: columns along x, rows along y. On a
+    cylinder (`radius_m` given) rows go along z and columns around.
     """
 
     rows: int
@@ -32,10 +34,12 @@ class SkinLayout:
     wraps: bool = False
     """The last column touches the first."""
     pitch_m: float | tuple[float, float] | None = None
-    """Distance between taxel centres, or (along rows, along columns); None if unknown."""
+    """Distance between taxel centres, or (along rows, along columns); None if
+    unknown."""
     radius_m: float | None = None
     row0_z_m: float = 0.0
-    """z of row 0 on a cylinder; z falls by the row pitch with each row (elbow to wrist)."""
+    """z of row 0 on a cylinder; z falls by the row pitch with each row (elbow to
+    wrist)."""
     column_angles_deg: tuple[float, ...] | None = None
     """Angle of each column about z, from x, on a cylinder; None: even steps from 0."""
     counts_per_newton: float | None = None
@@ -43,7 +47,8 @@ class SkinLayout:
     threshold_counts: int = 0
     """A taxel with more counts is in contact (paper, section III-B)."""
     onset_counts: int | None = None
-    """A contact begins when its region's peak exceeds this; None: `threshold_counts`."""
+    """A contact begins when its region's peak exceeds this; None:
+    `threshold_counts`."""
     dead: tuple[int, ...] = ()
     """Flat indices (row * cols + col) of taxels that can never be read."""
     release_s: float = RELEASE_S
@@ -51,7 +56,9 @@ class SkinLayout:
 
     def __post_init__(self) -> None:
         if any(not 0 <= i < self.rows * self.cols for i in self.dead):
-            raise InputError(f"skin: dead has a taxel that is not 0 to {self.rows * self.cols - 1}")
+            raise InputError(
+                f"skin: dead has a taxel that is not 0 to {self.rows * self.cols - 1}"
+            )
         if self.radius_m is not None and self.pitch_m is None:
             raise InputError("skin: radius_m needs pitch_m, the distance between rows")
         if self.onset < self.threshold_counts:
@@ -89,15 +96,21 @@ class SkinLayout:
 
     @property
     def pitch(self) -> tuple[float, float]:
-        """Distance between taxels along the rows and along the columns; 1 if unknown."""
-        return self.pitch_m if isinstance(self.pitch_m, tuple) else (self.pitch_m or 1.0,) * 2
+        """Distance between taxels along the rows and along the columns; 1 if
+        unknown."""
+        return (
+            self.pitch_m
+            if isinstance(self.pitch_m, tuple)
+            else (self.pitch_m or 1.0,) * 2
+        )
 
     def position(self, row: float, col: float) -> tuple[float, float, float]:
         """(x, y, z) of a point of the surface in the link's frame.
 
         Args:
             row: 0 to rows - 1, or between two rows.
-            col: 0 to cols, or between two columns; on a skin that wraps, cols is column 0 again.
+            col: 0 to cols, or between two columns; on a skin that wraps, cols is column
+                0 again.
 
         Returns:
             Metres, or taxels if the pitch is unknown.
@@ -113,7 +126,8 @@ class SkinLayout:
         )
 
     def _angle(self, col: float) -> float:
-        """Angle in radians of a place between columns, which lies on the shorter arc."""
+        """Angle in radians of a place between columns, which lies on the shorter
+        arc."""
         if self.column_angles_deg is None:
             return 2.0 * math.pi * col / self.cols
         column = math.floor(col)
@@ -125,8 +139,13 @@ class SkinLayout:
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        given = {name: value for name, value in values.items() if value not in (None, ())}
-        return {k: list(value) if isinstance(value, tuple) else value for k, value in given.items()}
+        given = {
+            name: value for name, value in values.items() if value not in (None, ())
+        }
+        return {
+            k: list(value) if isinstance(value, tuple) else value
+            for k, value in given.items()
+        }
 
     @classmethod
     def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> Self:
@@ -137,7 +156,8 @@ class SkinLayout:
         """
         table = ConfigTable(skin, where, "skin.")
         values: dict[str, Any] = {
-            name: table.whole(name, allowed=range(1, MOST_LINES + 1)) for name in ("rows", "cols")
+            name: table.whole(name, allowed=range(1, MOST_LINES + 1))
+            for name in ("rows", "cols")
         }
         for name in ("threshold_counts", "onset_counts"):
             if table.has(name):
@@ -153,7 +173,9 @@ class SkinLayout:
         elif table.has("pitch_m"):
             values["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
         if table.has("column_angles_deg"):
-            values["column_angles_deg"] = table.numbers("column_angles_deg", values["cols"])
+            values["column_angles_deg"] = table.numbers(
+                "column_angles_deg", values["cols"]
+            )
         values["dead"] = table.wholes("dead", ())
         with about(where):
             layout = cls(**values)
@@ -161,9 +183,11 @@ class SkinLayout:
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
-    """The device's layout with the model's thresholds, converted to the device's counts.
+    """The device's layout with the model's thresholds, converted to the device's
+    counts.
 
-    The dead taxels are those of the model. Any other taxel that the device cannot read is missing.
+    The dead taxels are those of the model. Any other taxel that the device cannot read
+    is missing.
 
     Raises:
         InputError: the device's skin has another shape or other units than the model's.
@@ -174,7 +198,9 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         for skin in (device, model)
     )
     if of_device != of_model:
-        raise InputError(f"this skin has {of_device}, but the model was made for {of_model}")
+        raise InputError(
+            f"this skin has {of_device}, but the model was made for {of_model}"
+        )
     # Both scales are known or neither is, as the units are equal.
     ratio = (device.counts_per_newton or 1.0) / (model.counts_per_newton or 1.0)
     return replace(

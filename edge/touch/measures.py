@@ -1,16 +1,16 @@
 """Features of a contact by name, and the whole numbers that each frame gives for them.
 
-A feature's name is a zone and a quantity, such as `skin_force` or `left_width`; the paper's three
-features keep their own names. Transforms stand before the name (`log_`, `sqrt_`, `relative_`; the
-one next to the name is applied first). A summary of its course stands after it (`_rate`, `_mean`,
-`_deviation`, `_roughness`): `sqrt_left_force`, `relative_skin_force_rate`,
-`sqrt_taxel_force_mean`. `@10` at the end takes the feature at ten times of the window, whatever the
-model's number of samples.
+A feature's name is a zone and a quantity, such as `skin_force` or `left_width`; the
+paper's three features keep their own names. Transforms stand before the name (`log_`,
+`sqrt_`, `relative_`; the one next to the name is applied first). A summary of its
+course stands after it (`_rate`, `_mean`, `_deviation`, `_roughness`):
+`sqrt_left_force`, `relative_skin_force_rate`, `sqrt_taxel_force_mean`. `@10` at the end
+takes the feature at ten times of the window, whatever the model's number of samples.
 
-Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and `right` the
-active taxels in the first and second half of the columns (the two pads of a hand, the two sides of
-a forearm). Centroids and spreads are weighted by force. Only zones that some feature needs are
-measured.
+Zones: `contact` is the region that is followed, `skin` all active taxels, `left` and
+`right` the active taxels in the first and second half of the columns (the two pads of a
+hand, the two sides of a forearm). Centroids and spreads are weighted by force. Only
+zones that some feature needs are measured.
 """
 
 import math
@@ -35,10 +35,10 @@ QUANTITIES = tuple(
     "max_force force area pressure along around spread_along spread_around slant length "
     "width".split()
 )
-"""Of a zone: its taxels' largest force and the sum of their forces; their number; force over area;
-the row and column of the centroid, followed across the seam; the standard deviations of rows and
-columns, and their covariance, an orientation without an angle that jumps; the standard deviations
-along the longer and the shorter principal axis."""
+"""Of a zone: its taxels' largest force and the sum of their forces; their number; force
+over area; the row and column of the centroid, followed across the seam; the standard
+deviations of rows and columns, and their covariance, an orientation without an angle
+that jumps; the standard deviations along the longer and the shorter principal axis."""
 ALONE = {
     "max_force": ("contact", "max_force"),
     "contact_motion": ("contact", "motion"),
@@ -52,20 +52,23 @@ ALONE = {
 }
 """Names that are not a zone and a quantity."""
 KERNELS = {"taxel_kernels": 1008, "zone_kernels": 504}
-"""Quantities that kernels make (`edge.touch.kernels`), and how many values each has. They are
-applied to the skin's cells, at most `KERNEL_CELLS`, and to the whole numbers of all zones."""
+"""Quantities that kernels make (`edge.touch.kernels`), and how many values each has.
+They are applied to the skin's cells, at most `KERNEL_CELLS`, and to the whole numbers
+of all zones."""
 WIDE = ("taxel_force", *KERNELS, "joint_change", "joint_angle")
-"""Quantities of many values: one for each cell of the skin (`Cells`), kernel or joint."""
+"""Quantities of many values: one for each cell of the skin (`Cells`), kernel or
+joint."""
 SIGNED = ("around", "slant", "joint_change", "joint_angle")
 """Quantities that may be negative, and so have no logarithm."""
 
 TRANSFORMS = ("log", "sqrt", "relative")
 """Transforms of a feature's value: the logarithm of the value plus a floor (see
-`edge.touch.features`), the square root with the value's sign, and the value over its largest
-magnitude within the window."""
+`edge.touch.features`), the square root with the value's sign, and the value over its
+largest magnitude within the window."""
 SUMMARIES = ("rate", "mean", "deviation", "roughness")
-"""Summaries of a feature's course. The rate is a course itself, of the change a second. The others
-are one number for the window: mean, standard deviation, mean step from sample to sample."""
+"""Summaries of a feature's course. The rate is a course itself, of the change a second.
+The others are one number for the window: mean, standard deviation, mean step from
+sample to sample."""
 _NAME = re.compile(
     rf"((?:(?:{'|'.join(TRANSFORMS)})_)*)(.+?)(?:_({'|'.join(SUMMARIES)}))?(?:@(\d+))?"
 )
@@ -75,8 +78,8 @@ MOST_CELLS = 256
 KERNEL_CELLS = 32
 """The most cells that kernels take."""
 ZONE_WIDTH = 8
-"""Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the sums of
-counts times row, column, row squared, row times column, column squared."""
+"""Whole numbers of a zone, in this order: largest count, taxels, sum of counts, and the
+sums of counts times row, column, row squared, row times column, column squared."""
 
 
 @dataclass(frozen=True)
@@ -151,17 +154,25 @@ def feature(name: str) -> Feature:
         import difflib  # a slow board starts sooner without it
 
         nearest = difflib.get_close_matches(base, names(), 3) or names()[:3]
-        raise InputError(f"there is no feature {name!r}; the nearest are {', '.join(nearest)}")
+        raise InputError(
+            f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"
+        )
     if len(set(transforms)) < len(transforms):
-        raise InputError(f"the feature {name!r} applies one transform twice; once is enough")
+        raise InputError(
+            f"the feature {name!r} applies one transform twice; once is enough"
+        )
     if "log" in transforms and quantity in SIGNED:
         raise InputError(
             f"the feature {name!r} may be negative and has no logarithm; take sqrt_{base}"
         )
     if quantity in KERNELS and base != name:
-        raise InputError(f"{base} takes no transform, summary or number of times, as in {name!r}")
+        raise InputError(
+            f"{base} takes no transform, summary or number of times, as in {name!r}"
+        )
     if times and not 2 <= int(times) <= MOST_SAMPLES:
-        raise InputError(f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times")
+        raise InputError(
+            f"the feature {name!r} must be taken at 2 to {MOST_SAMPLES} times"
+        )
     return Feature(name, zone, quantity, transforms, summary, int(times or 0))
 
 
@@ -182,9 +193,10 @@ def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
 class Cells:
     """The cells of a skin: its taxels, or square blocks of them where there are many.
 
-    A cell's value is the sum of all its counts, those below the threshold included; taxels that
-    could not be read are left out. The side of a block is the smallest power of two that leaves at
-    most `most` of them. Blocks without a living taxel are no cells.
+    A cell's value is the sum of all its counts, those below the threshold included;
+    taxels that could not be read are left out. The side of a block is the smallest
+    power of two that leaves at most `most` of them. Blocks without a living taxel are
+    no cells.
 
     Attributes:
         side: taxels along a block's side; 1 where every taxel is a cell.
@@ -221,19 +233,26 @@ class Measurer:
         zones: the zones measured, in the order of `ZONES`.
         cells: the skin's cells where a feature needs them, else None.
         kernel_cells: the larger cells that kernels take, likewise.
-        joints: number of joint angles kept of each frame; 0 where no feature needs them.
+        joints: number of joint angles kept of each frame; 0 where no feature needs
+            them.
     """
 
-    def __init__(self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0) -> None:
+    def __init__(
+        self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0
+    ) -> None:
         types = features(wanted)
         quantities = {f.quantity for f in types}
         self.layout = layout
         self.motion = "motion" in quantities
         self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
         self.cells = Cells(layout) if "taxel_force" in quantities else None
-        self.kernel_cells = Cells(layout, KERNEL_CELLS) if "taxel_kernels" in quantities else None
+        self.kernel_cells = (
+            Cells(layout, KERNEL_CELLS) if "taxel_kernels" in quantities else None
+        )
         self.joints = joints if any(f.of_joints for f in types) else 0
-        self.zones = tuple(zone for zone in ZONES if any(zone in f.zones for f in types))
+        self.zones = tuple(
+            zone for zone in ZONES if any(zone in f.zones for f in types)
+        )
         half = layout.cols // 2
         self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
         rows, cols = np.arange(layout.rows), np.arange(layout.cols)
@@ -256,7 +275,9 @@ class Measurer:
             half = self._halves.get(zone, slice(None))
             mask = contact.mask if zone == "contact" else active.mask
             counts = (active.counts * mask)[:, half]
-            lines = self._rows @ counts  # of each column: counts, times row, times row squared
+            lines = (
+                self._rows @ counts
+            )  # of each column: counts, times row, times row squared
             closed = self.layout.wraps and zone not in self._halves
             cut = best_cut(lines[0].tolist()) if closed else 0
             (force, cols, cols_cols), (rows, rows_cols, _), (rows_rows, *_) = (

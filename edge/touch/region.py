@@ -1,9 +1,9 @@
 """Contact regions of a frame: threshold, connected components, the largest one.
 
-The active taxels of a frame are the bits of one Python integer, so neighbours are shifts, sets are
-ands and ors, and areas are population counts. A row takes cols + 1 bits: its last bit is always
-clear and keeps a shift or a carry from running into the next row. Every result is an integer and
-the same on every machine.
+The active taxels of a frame are the bits of one Python integer, so neighbours are
+shifts, sets are ands and ors, and areas are population counts. A row takes cols + 1
+bits: its last bit is always clear and keeps a shift or a carry from running into the
+next row. Every result is an integer and the same on every machine.
 """
 
 from collections.abc import Sequence
@@ -76,9 +76,9 @@ class Grid:
             if grown == region:
                 return region
             region = grown
-        # A large or winding region: each round now fills runs of taxels in the four directions
-        # (to higher columns by the carry of an addition), and a step of one taxel crosses the
-        # seam.
+        # A large or winding region: each round now fills runs of taxels in the four
+        # directions (to higher columns by the carry of an addition), and a step of one
+        # taxel crosses the seam.
         left = _doublings(within, 1, self.cols, down=False)
         down = _doublings(within, self.stride, self.rows, down=True)
         up = _doublings(within, self.stride, self.rows, down=False)
@@ -102,8 +102,9 @@ class Grid:
     def col_sum(self, bits: int) -> int:
         """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
 
-        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set that spans
-        less than half a turn has the mean of its unrolled columns, wherever the seam lies.
+        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set
+        that spans less than half a turn has the mean of its unrolled columns, wherever
+        the seam lies.
         """
         total = _sum_of_planes(self._col_planes, bits)
         if not self.wraps or not all(bits & outside for outside in self._outside_half):
@@ -117,8 +118,8 @@ class Grid:
 def best_cut(weights: Sequence[int]) -> int:
     """The column at which to cut a circle so that the weights' variance is least.
 
-    Columns below the cut count as one turn higher. The mean of the columns so counted is the
-    intrinsic mean of the circle. Of equally good cuts the lowest is taken.
+    Columns below the cut count as one turn higher. The mean of the columns so counted
+    is the intrinsic mean of the circle. Of equally good cuts the lowest is taken.
 
     Args:
         weights: of each column, whole numbers.
@@ -138,12 +139,16 @@ def best_cut(weights: Sequence[int]) -> int:
 
 
 def _sum_of_planes(planes: Sequence[int], bits: int) -> int:
-    """Sum of a coordinate over `bits`, whose plane n holds the taxels with bit n of it set."""
+    """Sum of a coordinate over `bits`, whose plane n holds the taxels with bit n of it
+    set."""
     return sum((bits & plane).bit_count() << n for n, plane in enumerate(planes))
 
 
-def _doublings(within: int, step: int, count: int, *, down: bool) -> list[tuple[int, int]]:
-    """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and Stone)."""
+def _doublings(
+    within: int, step: int, count: int, *, down: bool
+) -> list[tuple[int, int]]:
+    """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and
+    Stone)."""
     rounds: list[tuple[int, int]] = []
     shift, free = step, within
     while shift < step * count and free:
@@ -179,7 +184,8 @@ class Region:
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """(row, col) of the mean of the taxels; col is on the circle where the skin wraps."""
+        """(row, col) of the mean of the taxels; col is on the circle where the skin
+        wraps."""
         rows, cols = self.sums
         return rows / self.area, cols / self.area
 
@@ -195,7 +201,8 @@ class Region:
         return row * self._grid.cols + col
 
     def touches(self, other: Self) -> bool:
-        """Whether a taxel of this region is next to, or the same as, one of the other's."""
+        """Whether a taxel of this region is next to, or the same as, one of the
+        other's."""
         return bool((self.bits | self._grid.neighbours(self.bits)) & other.bits)
 
     def __repr__(self) -> str:
@@ -229,8 +236,12 @@ class ActiveTaxels:
             raise InputError(
                 f"counts must be whole numbers (rows, cols), not {counts.dtype} {counts.shape}"
             )
-        if valid is not None and (valid.shape != counts.shape or valid.dtype != np.bool_):
-            raise InputError(f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}")
+        if valid is not None and (
+            valid.shape != counts.shape or valid.dtype != np.bool_
+        ):
+            raise InputError(
+                f"valid must be bool {counts.shape}, not {valid.dtype} {valid.shape}"
+            )
         rows, cols = counts.shape
         self.counts = counts
         self._grid = grid(rows, cols, wraps)
@@ -263,28 +274,38 @@ class ActiveTaxels:
     @cached_property
     def regions(self) -> list[Region]:
         """All regions, as `find_regions` returns them."""
-        alone = map(self._grid.bit, np.flatnonzero(self._grid.unpack(self._lone)).tolist())
+        alone = map(
+            self._grid.bit, np.flatnonzero(self._grid.unpack(self._lone)).tolist()
+        )
         regions = map(self._region, [*self._connected, *alone])
-        return sorted(regions, key=lambda region: (-region.area, -region.peak, region.index))
+        return sorted(
+            regions, key=lambda region: (-region.area, -region.peak, region.index)
+        )
 
     def largest(self, previous: Region | None = None) -> Region | None:
         """The largest region, as `largest_region` returns it."""
         if not self.bits:
             return None
-        # The region with the frame's peak is nearly always larger than all others together.
+        # The region with the frame's peak is nearly always larger than all others
+        # together.
         index = int(self.counts.argmax())
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, int(self.counts.item(index)))
         before = 0 if previous is None else previous.bits
         if not self._connected:
-            # A flickering skin may have nothing but lone taxels, a hundred and more of them.
+            # A flickering skin may have nothing but lone taxels, a hundred and more of
+            # them.
             lone = np.flatnonzero(self._grid.unpack(self._lone & before or self._lone))
             index = int(lone[self.counts.reshape(-1)[lone].argmax()])
-            return Region(self._grid, self._grid.bit(index), int(self.counts.item(index)))
+            return Region(
+                self._grid, self._grid.bit(index), int(self.counts.item(index))
+            )
         area = max(map(int.bit_count, self._connected))
         tied = [self._region(c) for c in self._connected if c.bit_count() == area]
-        return min(tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index))
+        return min(
+            tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index)
+        )
 
     def _region(self, bits: int) -> Region:
         return Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
@@ -312,8 +333,8 @@ def find_regions(
         wraps: the last column touches the first.
 
     Returns:
-        Regions of taxels that share an edge. The largest area comes first, then the higher peak,
-        then the lower index.
+        Regions of taxels that share an edge. The largest area comes first, then the
+        higher peak, then the lower index.
     """
     return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps).regions
 
@@ -326,7 +347,8 @@ def largest_region(
     wraps: bool = True,
     previous: Region | None = None,
 ) -> Region | None:
-    """The region of the largest area (paper, section III-B), or None where no taxel is active.
+    """The region of the largest area (paper, section III-B), or None where no taxel is
+    active.
 
     >>> import edge, numpy as np
     >>> counts = np.zeros((4, 6), np.uint16)
@@ -334,7 +356,8 @@ def largest_region(
     >>> edge.largest_region(counts, 100)
     Region(area=3, peak=300, centroid=(1.00, 3.00))
 
-    Equal areas go to the larger overlap with `previous` (the region followed so far), then to
-    the higher peak, then to the lower index. The other arguments are those of `find_regions`.
+    Equal areas go to the larger overlap with `previous` (the region followed so far),
+    then to the higher peak, then to the lower index. The other arguments are those of
+    `find_regions`.
     """
     return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps).largest(previous)

@@ -10,12 +10,14 @@ QUIET_S = 0.1
 MARGIN = 2.0
 """Ratio of the threshold to the noise."""
 ONSET = 1.5
-"""Ratio of the onset to the threshold, so that a force that fluctuates is one contact."""
+"""Ratio of the onset to the threshold, so that a force that fluctuates is one
+contact."""
 HIGHEST = 65534
 
 
 def noise(t: NDArray[np.float64], frames: NDArray[np.uint16]) -> int:
-    """The largest count in the first `QUIET_S`; of slow recordings this is one frame."""
+    """The largest count in the first `QUIET_S`; of slow recordings this is one
+    frame."""
     return int(frames[t < t[0] + QUIET_S].max(initial=0))
 
 
@@ -28,7 +30,8 @@ def above(level: float, margin: float = MARGIN) -> tuple[int, int]:
 def doubt(
     t: NDArray[np.float64], frames: NDArray[np.uint16], skin: dict[str, Any], onset: int
 ) -> str | None:
-    """Why a recording's thresholds (`skin`, and the `onset` of them) may not suit it, or None."""
+    """Why a recording's thresholds (`skin`, and the `onset` of them) may not suit it,
+    or None."""
     if "threshold_counts" not in skin:
         problem = "its skin has no threshold_counts, so any count above 0 is a contact"
     elif frames[0].max(initial=0) > onset:
@@ -37,5 +40,9 @@ def doubt(
         return None
     threshold, begin = above(noise(t, frames))
     if begin >= frames.max(initial=0):
-        return f"{problem}; record from before the touch, and give thresholds in meta.skin"
-    return f"{problem}; threshold_counts = {threshold} and onset_counts = {begin} would do"
+        return (
+            f"{problem}; record from before the touch, and give thresholds in meta.skin"
+        )
+    return (
+        f"{problem}; threshold_counts = {threshold} and onset_counts = {begin} would do"
+    )

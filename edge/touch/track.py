@@ -5,33 +5,41 @@ from collections.abc import Iterable, Sequence
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.contact import CLOCK_ROUNDING_S, Contact, FeatureSeries, region_time, released
+from edge.touch.contact import (
+    CLOCK_ROUNDING_S,
+    Contact,
+    FeatureSeries,
+    region_time,
+    released,
+)
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import PAPER, Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 MAX_CONTACTS = 8
-"""Contacts followed at once where every region counts. The limit keeps a flickering skin from
-stalling the loop."""
+"""Contacts followed at once where every region counts. The limit keeps a flickering
+skin from stalling the loop."""
 DEBOUNCE = 2
-"""Frames in a row whose peak is above the skin's onset count before a contact is confirmed. The
-first of them is its onset."""
+"""Frames in a row whose peak is above the skin's onset count before a contact is
+confirmed. The first of them is its onset."""
 
 
 class ContactTracker:
     """Finds contacts in a stream of frames and follows them.
 
-    With `max_contacts` of 1, the contact is the largest region of each frame, wherever it lies
-    (paper, section III-B). With more, every region is a contact of its own. A region continues the
-    contact that it shares most taxels with, or else one that it touches. Where two contacts grow
-    into one region, the older one keeps it and the other ends. Where a region splits, the larger
-    share continues the contact and the other share begins a new one.
+    With `max_contacts` of 1, the contact is the largest region of each frame, wherever
+    it lies (paper, section III-B). With more, every region is a contact of its own. A
+    region continues the contact that it shares most taxels with, or else one that it
+    touches. Where two contacts grow into one region, the older one keeps it and the
+    other ends. Where a region splits, the larger share continues the contact and the
+    other share begins a new one.
 
-    A contact begins with the first of `debounce` frames in a row whose region has a peak above
-    the skin's onset count. It ends when no taxel of it has been above the threshold for the skin's
-    `release_s`. With two thresholds, a force that hovers at one of them stays one contact. With the
-    time, an arm that bounces off a rigid thing and comes back makes one contact.
+    A contact begins with the first of `debounce` frames in a row whose region has a
+    peak above the skin's onset count. It ends when no taxel of it has been above the
+    threshold for the skin's `release_s`. With two thresholds, a force that hovers at
+    one of them stays one contact. With the time, an arm that bounces off a rigid thing
+    and comes back makes one contact.
 
     Attributes:
         layout: the skin, with its thresholds.
@@ -55,16 +63,18 @@ class ContactTracker:
 
         Args:
             layout: the skin, with its thresholds.
-            debounce: frames in a row that confirm a contact; training and the board use the same.
-            chain: with it, motion is measured in the base's frame from each frame's joint
-                angles; without, on the skin.
-            horizon_s: seconds from onset after which a contact's series takes in no more.
-            features: names of the features that the series is for (see `edge.touch.measures`);
-                nothing else is measured.
+            debounce: frames in a row that confirm a contact; training and the board use
+                the same.
+            chain: with it, motion is measured in the base's frame from each frame's
+                joint angles; without, on the skin.
+            horizon_s: seconds from onset after which a contact's series takes in no
+                more.
+            features: names of the features that the series is for (see
+                `edge.touch.measures`); nothing else is measured.
             joints: joint angles of a frame, where a feature is made of them.
             max_contacts: how many are followed at once, the largest first.
-            motion_on_skin: measure motion on the skin for a contact whose first frame has no
-                joint angles; else its motion is unknown in frames without them.
+            motion_on_skin: measure motion on the skin for a contact whose first frame
+                has no joint angles; else its motion is unknown in frames without them.
 
         Raises:
             InputError: a feature does not exist, or `max_contacts` is below 1.
@@ -84,16 +94,19 @@ class ContactTracker:
         """Take in a frame.
 
         Returns:
-            The confirmed contacts that this frame belongs to, oldest first. A contact that ends
-            with this frame is among them, with `ended` True.
+            The confirmed contacts that this frame belongs to, oldest first. A contact
+            that ends with this frame is among them, with `ended` True.
 
         Raises:
-            InputError: the frame's shape is not the skin's, its time goes back, or a time or
-                joint angle is not finite.
+            InputError: the frame's shape is not the skin's, its time goes back, or a
+                time or joint angle is not finite.
         """
         self._check(frame)
         active = ActiveTaxels(
-            frame.counts, self.layout.threshold_counts, valid=frame.valid, wraps=self.layout.wraps
+            frame.counts,
+            self.layout.threshold_counts,
+            valid=frame.valid,
+            wraps=self.layout.wraps,
         )
         contacts = list(self._contacts)
         if self._max_contacts > 1:
@@ -104,13 +117,17 @@ class ContactTracker:
             regions = [] if largest is None else [largest]
             shares = dict.fromkeys(range(len(contacts)), 0) if regions else {}
         self.region = regions[0] if regions else None
-        of_contacts = [regions[shares[i]] if i in shares else None for i in range(len(contacts))]
+        of_contacts = [
+            regions[shares[i]] if i in shares else None for i in range(len(contacts))
+        ]
         for j, region in enumerate(regions):
             begins = j not in shares.values() and region.peak > self.layout.onset
             if begins and len(contacts) < self._max_contacts:
                 on_skin = self._motion_on_skin and frame.joints is None
                 chain = None if on_skin else self._chain
-                contacts.append(Contact(region_time(frame, region), region, self._measurer, chain))
+                contacts.append(
+                    Contact(region_time(frame, region), region, self._measurer, chain)
+                )
                 of_contacts.append(region)
         for contact, of_contact in zip(contacts, of_contacts, strict=True):
             self._follow(contact, frame, active, of_contact)
@@ -118,7 +135,11 @@ class ContactTracker:
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _follow(
-        self, contact: Contact, frame: Frame, active: ActiveTaxels, region: Region | None
+        self,
+        contact: Contact,
+        frame: Frame,
+        active: ActiveTaxels,
+        region: Region | None,
     ) -> None:
         """Take a frame into a contact, and end it where it is over."""
         age_s = max(region_time(frame, region) - contact.onset_s, 0.0)
@@ -152,7 +173,8 @@ class ContactTracker:
 
 
 def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
-    """{contact: region} by the most taxels in common, then the older, then the larger region."""
+    """{contact: region} by the most taxels in common, then the older, then the larger
+    region."""
     pairs = []
     for i, contact in enumerate(contacts):
         for j, region in enumerate(regions):
@@ -181,6 +203,8 @@ def first_contact(
         contacts = tracker.push(frame)
         if first is None and contacts:
             first = contacts[0]
-        if first is not None and (first.ended or frame.t - first.onset_s >= tracker.horizon_s):
+        if first is not None and (
+            first.ended or frame.t - first.onset_s >= tracker.horizon_s
+        ):
             break
     return None if first is None else (first.onset_s, first.series())

@@ -8,28 +8,42 @@ from edge.errors import InputError
 from edge.files import parsing, read_bytes
 
 
-def joints_between(path: str | os.PathLike[str], base: str, tip: str) -> list[dict[str, Any]]:
-    """The joints from link `base` to link `tip`, as tables for `edge.touch.arm.Chain.from_dict`.
+def joints_between(
+    path: str | os.PathLike[str], base: str, tip: str
+) -> list[dict[str, Any]]:
+    """The joints from link `base` to link `tip`, as tables for
+    `edge.touch.arm.Chain.from_dict`.
 
     Raises:
-        InputError: the file cannot be read, or no chain leads from `base` to another link `tip`.
+        InputError: the file cannot be read, or no chain leads from `base` to another
+            link `tip`.
     """
     if base == tip:
-        raise InputError(f"{path}: link {tip!r} is both base and tip; name the arm's two ends")
+        raise InputError(
+            f"{path}: link {tip!r} is both base and tip; name the arm's two ends"
+        )
     with parsing(os.fspath(path), "a URDF file"):
         root = ElementTree.fromstring(read_bytes(path))
     if root.tag != "robot":
-        raise InputError(f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>")
+        raise InputError(
+            f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>"
+        )
     links = [link.get("name") for link in root.findall("link")]
     for name in (base, tip):
         if name not in links:
-            raise InputError(f"{path}: no link {name!r}; it has {', '.join(map(str, links))}")
-    parents = {_link(path, element, "child"): element for element in root.findall("joint")}
+            raise InputError(
+                f"{path}: no link {name!r}; it has {', '.join(map(str, links))}"
+            )
+    parents = {
+        _link(path, element, "child"): element for element in root.findall("joint")
+    }
     joints: list[dict[str, Any]] = []
     link = tip
     while link != base:
         if link not in parents:
-            raise InputError(f"{path}: no chain of joints leads from {base!r} to {tip!r}")
+            raise InputError(
+                f"{path}: no chain of joints leads from {base!r} to {tip!r}"
+            )
         element = parents.pop(link)  # taken out, so that a loop of links ends
         joints.append(_joint(path, element))
         link = _link(path, element, "parent")
@@ -40,11 +54,15 @@ def _link(path: str | os.PathLike[str], element: ElementTree.Element, tag: str) 
     child = element.find(tag)
     link = None if child is None else child.get("link")
     if link is None:
-        raise InputError(f"{path}: joint {element.get('name')!r} has no <{tag} link=...>")
+        raise InputError(
+            f"{path}: joint {element.get('name')!r} has no <{tag} link=...>"
+        )
     return link
 
 
-def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[str, Any]:
+def _joint(
+    path: str | os.PathLike[str], element: ElementTree.Element
+) -> dict[str, Any]:
     name = str(element.get("name"))
     kind = str(element.get("type", ""))
     mimic = element.find("mimic")
@@ -63,7 +81,9 @@ def _joint(path: str | os.PathLike[str], element: ElementTree.Element) -> dict[s
         ):
             child = element.find(tag)
             if child is not None and attribute in child.attrib:
-                joint[key] = [float(number) for number in child.attrib[attribute].split()]
+                joint[key] = [
+                    float(number) for number in child.attrib[attribute].split()
+                ]
         if limit is not None and kind in ("revolute", "prismatic"):
             joint["limits"] = [float(limit.get(end, "0")) for end in ("lower", "upper")]
     return joint

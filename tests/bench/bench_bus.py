@@ -1,7 +1,7 @@
 """Time of the software on top of the wire.
 
-An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls return at once, so
-that only the software takes time.
+An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls return
+at once, so that only the software takes time.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from tests.edge.bus.shim import build as shim
 
 ROOT = Path(__file__).parents[2]
 WIRE_S = (12 * 255 + 3 * 20) / 400_000
-"""The shortest time of a frame over three buses: 12 chips and 3 channels on the longest."""
+"""The shortest time of a frame over three buses: 12 chips and 3 channels on the
+longest."""
 
 
 def measure() -> float:
-    """Seconds of one full frame over three buses, one after another: processor time of all
-    threads in the best round, without the share of other programs."""
+    """Seconds of one full frame over three buses, one after another: processor time of
+    all threads in the best round, without the share of other programs."""
     with Skin.open(calibrated(skinfile.load(skinfile.shipped("cody")))) as skin:
         skin.read()
 
@@ -33,7 +34,10 @@ def measure() -> float:
                 reader.read(reader.slots)
             skin._assemble(skin.clock.now())
 
-        return min(timeit.repeat(frame, timer=time.process_time, repeat=60, number=20)) / 20
+        return (
+            min(timeit.repeat(frame, timer=time.process_time, repeat=60, number=20))
+            / 20
+        )
 
 
 def bench_overhead_of_software(note, tmp_path):

@@ -1,4 +1,5 @@
-"""One decision from a feature vector, against the default conversion and scikit-learn."""
+"""One decision from a feature vector, against the default conversion and
+scikit-learn."""
 
 from dataclasses import replace
 from functools import partial
@@ -20,12 +21,15 @@ from export import graph
 from train.pipeline import Choice, ContactClassifier
 
 TARGETS = {140: (10, 20), 1000: (50, 15), 10000: (100, 4)}
-"""{training rows: times that skl2onnx's graph takes as long, and scikit-learn's pipeline}."""
+"""{training rows: times that skl2onnx's graph takes as long, and scikit-learn's
+pipeline}."""
 K = 2
 
 
 def exported(X, y, components, path):
-    fitted = ContactClassifier({"object": Choice("IV", components, K)}).fit(X, {"object": y})
+    fitted = ContactClassifier({"object": Choice("IV", components, K)}).fit(
+        X, {"object": y}
+    )
     task = Task(tuple(map(str, fitted.classes_["object"])), K, components, "IV", 0.5)
     info = replace(Model(MODEL).info, tasks={"object": task}, rows=len(X), trials=())
     path.write_bytes(graph.to_onnx(fitted, info))
@@ -57,7 +61,12 @@ def bench_decision(rows, components, against, tmp_path):
     with threadpool_limits(1):
         rivals = {"skl2onnx's own graph": partial(theirs.run, None, single)}
         against(ours, rivals, most=dict.fromkeys(rivals, of_graph), calls=calls)
-        rivals = {"scikit-learn, from vector to label": partial(usual.predict, vector[None])}
+        rivals = {
+            "scikit-learn, from vector to label": partial(usual.predict, vector[None])
+        }
         against(
-            partial(model.decide, vector), rivals, most=dict.fromkeys(rivals, of_fit), calls=calls
+            partial(model.decide, vector),
+            rivals,
+            most=dict.fromkeys(rivals, of_fit),
+            calls=calls,
         )

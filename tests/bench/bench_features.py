@@ -28,5 +28,9 @@ def bench_features(against, note, name):
 
     followed_s = against(follow, {}, calls=1) / len(frames)
     vector_s = against(lambda: feature_vector(series, WINDOW_S, features=features), {})
-    note(f"a 10 ms frame, at {followed_s * 1e6:.0f} us", followed_s / 0.010, "at most 0.02")
+    note(
+        f"a 10 ms frame, at {followed_s * 1e6:.0f} us",
+        followed_s / 0.010,
+        "at most 0.02",
+    )
     note("a vector, beside a millisecond", vector_s * 1e3, "below 1")

@@ -51,10 +51,14 @@ def opencv(frame):
 RIVALS = {"scipy + numpy": scipy_numpy, "OpenCV": opencv}
 
 
-@pytest.mark.parametrize("name", [*TOUCHES, "full", "checkerboard", "serpentine", "empty"])
+@pytest.mark.parametrize(
+    "name", [*TOUCHES, "full", "checkerboard", "serpentine", "empty"]
+)
 def bench_region(name, against):
     frame = widest(name) if name in TOUCHES else SHAPES[name]
     areas = {(method(frame) or [0])[0] for method in (ours, *RIVALS.values())}
     assert len(areas) == 1
     rivals = {rival: partial(method, frame) for rival, method in RIVALS.items()}
-    against(partial(ours, frame), rivals, most=MOST if name in TOUCHES else {}, calls=50)
+    against(
+        partial(ours, frame), rivals, most=MOST if name in TOUCHES else {}, calls=50
+    )

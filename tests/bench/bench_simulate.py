@@ -1,9 +1,9 @@
 """Trials a second of the simulator and of MuJoCo, in processor time of the same run.
 
-Trials have all effects that they call for, and end with recordings that are not written. MuJoCo
-steps a forearm with as many taxels against a fixed, a movable or a soft box, which has far less
-physics. Both trials last 2 s and more, with frames of 384 taxels at 100 Hz. `python -m train
-simulate --explain` prints the cost of each effect.
+Trials have all effects that they call for, and end with recordings that are not
+written. MuJoCo steps a forearm with as many taxels against a fixed, a movable or a soft
+box, which has far less physics. Both trials last 2 s and more, with frames of 384
+taxels at 100 Hz. `python -m train simulate --explain` prints the cost of each effect.
 """
 
 from pathlib import Path
@@ -23,7 +23,8 @@ PEERS = {
 }
 """{box: (stiffness of its contact, its joint)}."""
 FASTER = {"cody18": 1.5, "household": 2.0}
-"""{scene: how many times MuJoCo's trials a second}: more where more trials run side by side."""
+"""{scene: how many times MuJoCo's trials a second}: more where more trials run side by
+side."""
 
 
 FOREARM = Template(Path(__file__).with_name("forearm.xml").read_text())
@@ -31,7 +32,9 @@ FOREARM = Template(Path(__file__).with_name("forearm.xml").read_text())
 
 def mujoco_trial(solref, joint):
     """A function that runs a trial of the forearm against a box in MuJoCo."""
-    model = mujoco.MjModel.from_xml_string(FOREARM.substitute(solref=solref, joint=joint))
+    model = mujoco.MjModel.from_xml_string(
+        FOREARM.substitute(solref=solref, joint=joint)
+    )
     assert model.nsensor == 384
 
     def trial():
@@ -54,7 +57,9 @@ def bench_simulate(against, note, name):
     peers = {kind: mujoco_trial(*peer) for kind, peer in PEERS.items()}
 
     def ours():
-        assert sum(1 for batch in batches for _ in simulate_trials(scene, batch)) == len(trials)
+        assert sum(
+            1 for batch in batches for _ in simulate_trials(scene, batch)
+        ) == len(trials)
 
     def theirs():
         for kind in kinds:

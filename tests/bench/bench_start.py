@@ -29,17 +29,25 @@ print(model.predict(X[:1]))
 
 
 def bench_cold_start(against, tmp_path):
-    """The rival fits as many vectors of the paper's features as the paper has trials."""
+    """The rival fits as many vectors of the paper's features as the paper has
+    trials."""
     arrays = tmp_path / "xy.npz"
-    np.savez(arrays, X=np.random.default_rng(0).normal(size=(140, 120)), y=np.arange(140) % 18)
-    # Unbuffered, so that a line arrives as soon as it is printed; with compiled files, as an
-    # installed package has them.
+    np.savez(
+        arrays,
+        X=np.random.default_rng(0).normal(size=(140, 120)),
+        y=np.arange(140) % 18,
+    )
+    # Unbuffered, so that a line arrives as soon as it is printed; with compiled files,
+    # as an installed package has them.
     environment = os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": ""}
 
     def start(sign, *arguments):
         def until_decided():
             with subprocess.Popen(
-                [sys.executable, *arguments], cwd=ROOT, stdout=subprocess.PIPE, env=environment
+                [sys.executable, *arguments],
+                cwd=ROOT,
+                stdout=subprocess.PIPE,
+                env=environment,
             ) as process:
                 decided = any(sign in line for line in process.stdout)
                 process.kill()

@@ -1,8 +1,8 @@
 """Speed as a ratio: each round times the rivals and then ours.
 
-A benchmark calls `against(ours, {"rival": callable}, ...)`. Alternating rounds and processor time
-keep the ratio fair on a machine whose speed drifts and that other programs share; the ratio is the
-median over the rounds, printed beside its target.
+A benchmark calls `against(ours, {"rival": callable}, ...)`. Alternating rounds and
+processor time keep the ratio fair on a machine whose speed drifts and that other
+programs share; the ratio is the median over the rounds, printed beside its target.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import pytest
 
 @pytest.fixture
 def note(request, capsys):
-    """Prints the rival, the ratio, its bound, and seconds of ours and theirs as microseconds."""
+    """Prints the rival, the ratio, its bound, and seconds of ours and theirs as
+    microseconds."""
     name = request.node.name.removeprefix("bench_")
 
     def add(rival, ratio, bound, *seconds):
@@ -31,8 +32,9 @@ def note(request, capsys):
 def against(note):
     """Times ours beside its rivals; returns seconds of ours.
 
-    Each of the rounds has so many calls. `most` is {rival: largest allowed ours / rival}; `timer`
-    counts processor time of all threads, unless other processes are timed.
+    Each of the rounds has so many calls. `most` is {rival: largest allowed ours /
+    rival}; `timer` counts processor time of all threads, unless other processes are
+    timed.
     """
 
     def run(ours, rivals, *, most=None, calls=20, rounds=25, timer=time.process_time):
@@ -40,7 +42,10 @@ def against(note):
         for function in functions:
             function()
         seconds = [
-            [timeit.timeit(function, number=calls, timer=timer) / calls for function in functions]
+            [
+                timeit.timeit(function, number=calls, timer=timer) / calls
+                for function in functions
+            ]
             for _ in range(rounds)
         ]
         mine = statistics.median(row[-1] for row in seconds)

@@ -20,20 +20,21 @@ SHEAR_N_M, SHEAR_NS_M = 1e4, 15.0
 
 
 def beneath_n_m(modulus_pa: float) -> float:
-    """Stiffness of the layer beneath one taxel, finer than its net: 2 E times the net's pitch."""
+    """Stiffness of the layer beneath one taxel, finer than its net: 2 E times the net's
+    pitch."""
     return 2.0 * modulus_pa * NET_M
 
 
 def layer_xml(
     height_m: float, breadth_m: float, modulus_pa: float, thick_m: float
 ) -> tuple[str, str]:
-    """An elastic layer: a net of sprung knots, and both the springs between neighbours (together a
-    Pasternak foundation) and the face stretched over the net.
+    """An elastic layer: a net of sprung knots, and both the springs between neighbours
+    (together a Pasternak foundation) and the face stretched over the net.
 
-    The face is smooth and its net as fine as the skin. Flat blocks would triple the highest load of
-    a taxel, because a single pad bears each block. Compared with finite elements of an elastic
-    block (8 kPa, 0.1 m thick, the arm upright or askew by 17 degrees), the net's depth, area and
-    highest load are within 15 %.
+    The face is smooth and its net as fine as the skin. Flat blocks would triple the
+    highest load of a taxel, because a single pad bears each block. Compared with finite
+    elements of an elastic block (8 kPa, 0.1 m thick, the arm upright or askew by 17
+    degrees), the net's depth, area and highest load are within 15 %.
     """
     high, wide = min(height_m, 0.20), min(breadth_m, 0.15)
     rows, cols = round(high / NET_M), round(wide / NET_M)
@@ -46,8 +47,13 @@ def layer_xml(
     for (r, c), n in np.ndenumerate(number):
         # A knot on the rim stands for half of a cell, or at a corner for a quarter.
         of_row, of_col = 0.5 if r in (0, rows) else 1.0, 0.5 if c in (0, cols) else 1.0
-        y, z, share = (c - cols / 2) * dy, ABOVE_FLOOR_M + (r - rows / 2) * dz, of_row * of_col
-        # A body with a face may have no damped joint, so the face hangs on a second body.
+        y, z, share = (
+            (c - cols / 2) * dy,
+            ABOVE_FLOOR_M + (r - rows / 2) * dz,
+            of_row * of_col,
+        )
+        # A body with a face may have no damped joint, so the face hangs on a second
+        # body.
         knots += (
             f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" stiffness="{k * share}" '
             f'damping="{0.06 * k * share + 0.02}" range="0 {thick_m * 0.9}"/><inertial pos="0 0 0" '
@@ -77,15 +83,19 @@ def layer_xml(
 
 
 class Rub:
-    """Coulomb friction between skin and layer, on the stretch of the skin along the forearm.
+    """Coulomb friction between skin and layer, on the stretch of the skin along the
+    forearm.
 
-    Friction at each pad would jam instead. The knots under the pads yield in one direction only, so
-    pads on the two sides of a dent would lean against each other and bear loads of no real net.
+    Friction at each pad would jam instead. The knots under the pads yield in one
+    direction only, so pads on the two sides of a dent would lean against each other and
+    bear loads of no real net.
     """
 
     def __init__(self, model: Any, friction: float) -> None:
         self.model, self.friction, self.stretch = model, friction, 0.0
-        self.pads = [i for i in range(model.nbody) if model.body(i).name.startswith("pad")]
+        self.pads = [
+            i for i in range(model.nbody) if model.body(i).name.startswith("pad")
+        ]
         self.arm, self.thing = model.body_parentid[self.pads[0]], model.body("thing").id
 
     def hold(self, data: Any, loads: NDArray[np.float64]) -> None:
@@ -97,16 +107,27 @@ class Rub:
             return
         point = loads @ data.xpos[self.pads] / loads.sum()
         along = data.xmat[self.arm].reshape(3, 3)[:, 2]
-        slips = along @ (self._speed(data, self.arm, point) - self._speed(data, self.thing, point))
+        slips = along @ (
+            self._speed(data, self.arm, point) - self._speed(data, self.thing, point)
+        )
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
         pull = min(max(pull, -most), most)
-        stretch, longest = self.stretch + slips * self.model.opt.timestep, most / SHEAR_N_M
+        stretch, longest = (
+            self.stretch + slips * self.model.opt.timestep,
+            most / SHEAR_N_M,
+        )
         self.stretch = min(max(stretch, -longest), longest)
         for body, force in ((self.arm, -pull * along), (self.thing, pull * along)):
-            mujoco.mj_applyFT(self.model, data, force, np.zeros(3), point, body, data.qfrc_applied)
+            mujoco.mj_applyFT(
+                self.model, data, force, np.zeros(3), point, body, data.qfrc_applied
+            )
 
-    def _speed(self, data: Any, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _speed(
+        self, data: Any, body: int, point: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """(3,) m/s of a point of a body."""
         spatial = np.zeros(6)
-        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, spatial, 0)
+        mujoco.mj_objectVelocity(
+            self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, spatial, 0
+        )
         return np.asarray(spatial[3:] + np.cross(spatial[:3], point - data.xpos[body]))

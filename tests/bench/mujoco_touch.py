@@ -1,9 +1,11 @@
-"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and a thing.
+"""Touches in another physics engine, MuJoCo: an arm, its skin of sprung pads, and a
+thing.
 
-The arm is Cody's chain with its masses on gravity-compensated links, driven by an impedance
-controller. Each taxel that can meet the thing is a pad on a spring along its normal, and reads
-the spring's force. The thing stands on a floor under gravity, or is clamped. A soft thing has an
-elastic layer (`mujoco_layer`); a plant is a set of hinged stems.
+The arm is Cody's chain with its masses on gravity-compensated links, driven by an
+impedance controller. Each taxel that can meet the thing is a pad on a spring along its
+normal, and reads the spring's force. The thing stands on a floor under gravity, or is
+clamped. A soft thing has an elastic layer (`mujoco_layer`); a plant is a set of hinged
+stems.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ FACING_DEG = 76.0
 PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
 """A pad's radius around the forearm; its mass; its damping divided by its stiffness."""
 RIGID = "-1e6 -2e3"
-"""Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the mass."""
+"""Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the
+mass."""
 RIGID_KINDS = ("box", "drum", "drawer", "door")
 HALF_M = 0.08
 """Half the length of a thing's foot along the push, and at least half its breadth."""
@@ -53,9 +56,11 @@ class Thing:
         kind: box, drum, drawer, door, foam, cushion, bale, cloth, limb or plant.
         mass_kg, floor, skin: its mass, and its friction on the floor and on the skin.
         height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
-        below_m: how far a rigid face reaches below the middle of the contact (default: the floor).
+        below_m: how far a rigid face reaches below the middle of the contact (default:
+            the floor).
         modulus_pa, thick_m: of a soft layer.
-        stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the contact.
+        stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the
+            contact.
         seed: of a plant's shape.
         joint: MuJoCo's joint between a movable thing and the room.
     """
@@ -113,10 +118,13 @@ class Touch:
 
     @property
     def pad_n_m(self) -> float:
-        """Stiffness of a pad, in series with the layer beneath it where there is a layer."""
+        """Stiffness of a pad, in series with the layer beneath it where there is a
+        layer."""
         if not self.thing.layered:
             return self.taxel_n_m
-        return 1.0 / (1.0 / self.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(self.thing.modulus_pa))
+        return 1.0 / (
+            1.0 / self.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(self.thing.modulus_pa)
+        )
 
     @property
     def rate_rad_s(self) -> NDArray[np.float64]:
@@ -126,7 +134,11 @@ class Touch:
     @property
     def lag_rad(self) -> NDArray[np.float64]:
         """(dof,) by which each joint trails its equilibrium point in free motion."""
-        seconds = np.array(CODY_DAMPING) / np.array(CODY_STIFFNESS) / math.sqrt(self.stiffness)
+        seconds = (
+            np.array(CODY_DAMPING)
+            / np.array(CODY_STIFFNESS)
+            / math.sqrt(self.stiffness)
+        )
         return seconds * self.rate_rad_s
 
 
@@ -189,7 +201,10 @@ def upper_xml(thing: Thing) -> tuple[str, str]:
     half, across = (thing.below_m + thing.height_m / 2) / 2, thing.breadth_m / 2
     deep, shape = HALF_M, f'type="box" size="{HALF_M} {across} {half}"'
     if thing.kind == "drum":
-        deep, shape = across + HALF_M, f'type="cylinder" size="{across + HALF_M} {half}"'
+        deep, shape = (
+            across + HALF_M,
+            f'type="cylinder" size="{across + HALF_M} {half}"',
+        )
     place = f'pos="{deep} 0 {ABOVE_FLOOR_M + thing.height_m / 2 - half}"'
     return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
@@ -201,7 +216,10 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     thing, k = touch.thing, touch.pad_n_m
     start, rate = np.radians(START_DEG) + np.array(touch.start_rad), touch.rate_rad_s
     first = start - touch.lag_rad
-    pose, later = ARM.pose(first + rate * LEAD_S), ARM.pose(first + rate * (LEAD_S + 0.01))
+    pose, later = (
+        ARM.pose(first + rate * LEAD_S),
+        ARM.pose(first + rate * (LEAD_S + 0.01)),
+    )
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
     speed = (later @ on)[:3] - point
@@ -219,9 +237,17 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     slope, g = touch.slope_rad, 9.81
     gravity = joined((*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope)))
     words = {**vars(thing), "x": x, "y": y, "floor_m": z - ABOVE_FLOOR_M}
-    words |= {"pad_n_m": k, "pad_loss": PAD_LOSS_S * k, "pad_kg": PAD_KG, "gravity": gravity}
+    words |= {
+        "pad_n_m": k,
+        "pad_loss": PAD_LOSS_S * k,
+        "pad_kg": PAD_KG,
+        "gravity": gravity,
+    }
     words |= {"contact": RIGID, "dimensions": 3, "turn_rad": heading + touch.yaw_rad}
-    words |= {"foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}", "foot_x": HALF_M}
+    words |= {
+        "foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}",
+        "foot_x": HALF_M,
+    }
     words |= {"foot_kg": thing.mass_kg * 0.8, "motors": "".join(motors)}
     words |= {"arm": arm, "upper": upper, "layer": layer}
     if touch.fixed:
@@ -232,12 +258,14 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
 
 
-def simulate(touch: Touch) -> tuple[Recording, NDArray[np.float64], NDArray[np.float64]]:
+def simulate(
+    touch: Touch,
+) -> tuple[Recording, NDArray[np.float64], NDArray[np.float64]]:
     """One touch, as the board would have recorded it.
 
     Returns:
-        The recording; (n,) newtons that the pads bear; (n,) metres that the thing has moved at the
-        height of the contact. The skin cannot see the last two.
+        The recording; (n,) newtons that the pads bear; (n,) metres that the thing has
+        moved at the height of the contact. The skin cannot see the last two.
     """
     model, start, where = model_of(touch)
     thing, rate, dof = touch.thing, touch.rate_rad_s, ARM.dof

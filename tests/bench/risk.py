@@ -1,19 +1,20 @@
 """`make risk`: how often a promise is broken, over many simulated data sets.
 
-Trials of fresh seeds are simulated, the trials of several data sets in a batch. Each data set is
-drawn from them and fitted as a quick export would fit it, with the choice of features, projection
-and neighbours. Its promises are judged on all trials that were not drawn: these have streams of
-their own, as those of another seed have.
+Trials of fresh seeds are simulated, the trials of several data sets in a batch. Each
+data set is drawn from them and fitted as a quick export would fit it, with the choice
+of features, projection and neighbours. Its promises are judged on all trials that were
+not drawn: these have streams of their own, as those of another seed have.
 
-A certified error may be exceeded in one data set of ten (`train.rules.RISK`), counted over all
-sets, also those whose request was refused. Of the few sets that certify an error close to the
-lowest that the trials can reach, more than a tenth exceed it, because only lucky sets certify it.
-The row "the smallest" counts the smallest error that each set certifies. A set is late where it
-decides `LATE_S` later on average than promised.
+A certified error may be exceeded in one data set of ten (`train.rules.RISK`), counted
+over all sets, also those whose request was refused. Of the few sets that certify an
+error close to the lowest that the trials can reach, more than a tenth exceed it,
+because only lucky sets certify it. The row "the smallest" counts the smallest error
+that each set certifies. A set is late where it decides `LATE_S` later on average than
+promised.
 
-A point of the front (`make export FRONT=`) is a choice at a window, with an interval of its nested
-accuracy. The row "export" has the interval that an export at the full window prints. The accuracy
-on other trials may lie outside it in one data set of twenty.
+A point of the front (`make export FRONT=`) is a choice at a window, with an interval of
+its nested accuracy. The row "export" has the interval that an export at the full window
+prints. The accuracy on other trials may lie outside it in one data set of twenty.
 """
 
 from __future__ import annotations
@@ -54,12 +55,14 @@ OUTSIDE = 0.05
 """Share of the data sets whose accuracy may lie outside the interval of the front."""
 SHOWN = (*NAMES, "export")
 SEEDS, COUNT = 5, 20
-"""Batches, each of a seed of its own; trials of each object and condition in a batch."""
+"""Batches, each of a seed of its own; trials of each object and condition in a
+batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnSet(DataSet):
-    """A data set of trials drawn from a pool, whose vectors are measured once for all sets.
+    """A data set of trials drawn from a pool, whose vectors are measured once for all
+    sets.
 
     Attributes:
         rows: (n,) of its trials in the pool.
@@ -83,25 +86,36 @@ class DrawnSet(DataSet):
     ) -> NDArray[np.float64]:
         """(windows, m, features * samples) vectors of some rows of the pool."""
         columns = np.concatenate([self.columns[name] for name in names])
-        return np.stack([self.pool[POINTS_S.index(w)][rows[:, None], columns] for w in windows_s])
+        return np.stack(
+            [self.pool[POINTS_S.index(w)][rows[:, None], columns] for w in windows_s]
+        )
 
     def features(
-        self, window_s: float = WINDOW_S, samples: int = SAMPLES, names: Sequence[str] | None = None
+        self,
+        window_s: float = WINDOW_S,
+        samples: int = SAMPLES,
+        names: Sequence[str] | None = None,
     ) -> NDArray[np.float64]:
         """(n, features * samples) vectors at one of `POINTS_S`."""
-        return self.vectors([window_s], self.rows, self.names if names is None else names)[0]
+        return self.vectors(
+            [window_s], self.rows, self.names if names is None else names
+        )[0]
 
 
 def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
     """A batch's trials without their frames, and their vectors (windows, n, p)."""
-    names = [name for each in candidates({}, joints=True, quick=True) for name in each.sets]
+    names = [
+        name for each in candidates({}, joints=True, quick=True) for name in each.sets
+    ]
     with tempfile.TemporaryDirectory() as folder:
         write(replace(scenes.load(SCENE, count=COUNT), seed=seed), folder)
         dataset = load_trials([folder], features=expand(names), horizon_s=POINTS_S[-1])
     trials = []
     for trial in dataset.trials:
         full = trial.recording
-        ends = replace(full, t=full.t[[0, -1]], frames=full.frames[[0, -1]], joints=None)
+        ends = replace(
+            full, t=full.t[[0, -1]], frames=full.frames[[0, -1]], joints=None
+        )
         trials.append(replace(trial, recording=ends))
     X = np.stack([dataset.features(window) for window in POINTS_S])
     return replace(dataset, trials=tuple(trials)), X
@@ -117,25 +131,31 @@ def judged(
         labels: (tasks, trials) of the pool.
 
     Returns:
-        (tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean seconds,
-        NaN where the request is refused; the first request is the smallest error that is
-        certified. (tasks, `SHOWN`, 5) window, accuracy, its interval and the realised accuracy of
-        each point of the front.
+        (tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean
+        seconds, NaN where the request is refused; the first request is the smallest
+        error that is certified. (tasks, `SHOWN`, 5) window, accuracy, its interval and
+        the realised accuracy of each point of the front.
     """
     others, y = drawn.others(labels)
     points: dict[float, dict[str, Chosen]] = {}
     right: dict[float, dict[str, float]] = {}
     for window in POINTS_S:
         decided = POINTS_S if window == WINDOW_S else ()
-        fitted = fit(drawn, window_s=window, decision_points_s=decided, quick=True, jobs=1)
+        fitted = fit(
+            drawn, window_s=window, decision_points_s=decided, quick=True, jobs=1
+        )
         vectors = drawn.vectors([window], others, fitted.dataset.names)
         answered = answers([fitted.classifier], vectors)
         points[window] = fitted.chosen
-        right[window] = {task: float((answered[task][0][0] == y[task]).mean()) for task in y}
+        right[window] = {
+            task: float((answered[task][0][0] == y[task]).mean()) for task in y
+        }
     model, seconds = fitted.sequential, np.array(POINTS_S)
     assert model is not None
     outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
-    _, _, courses = model.judged(drawn.vectors(POINTS_S, others, fitted.dataset.names), y)
+    _, _, courses = model.judged(
+        drawn.vectors(POINTS_S, others, fitted.dataset.names), y
+    )
     for task, out in zip(y, outcomes, strict=True):
         stopping = model.stopping_[task]
         for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
@@ -149,14 +169,19 @@ def judged(
         full = front.of({WINDOW_S: points[WINDOW_S]}, task).points
         for point in (*map(front.pick, NAMES), *full):
             realised = right[point.window_s][task]
-            fronts.append((point.window_s, point.accuracy, point.low, point.high, realised))
+            fronts.append(
+                (point.window_s, point.accuracy, point.low, point.high, realised)
+            )
     return outcomes, np.array(fronts).reshape(len(y), len(SHOWN), 5)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate, fit, count; 1 where a promise is broken more often than chance explains."""
+    """Simulate, fit, count; 1 where a promise is broken more often than chance
+    explains."""
 
-    def work(function: Callable[..., Any], cases: Sequence[Any], what: str) -> list[Any]:
+    def work(
+        function: Callable[..., Any], cases: Sequence[Any], what: str
+    ) -> list[Any]:
         done = Parallel(n_jobs=arguments.jobs, return_as="generator")(
             delayed(function)(*case) for case in cases
         )
@@ -164,25 +189,35 @@ def run(arguments: argparse.Namespace) -> int:
 
     seeds = np.random.SeedSequence(arguments.seed).generate_state(SEEDS).tolist()
     batches = work(simulated, [(seed,) for seed in seeds], "batches of trials")
-    trials = np.array([trial for dataset, _ in batches for trial in dataset.trials], dtype=object)
+    trials = np.array(
+        [trial for dataset, _ in batches for trial in dataset.trials], dtype=object
+    )
     X, first = np.concatenate([x for _, x in batches], axis=1), batches[0][0]
     y = np.array([[trial.labels[task] for trial in trials] for task in first.tasks])
     rng = np.random.default_rng(arguments.seed)
     ends = np.cumsum(first.widths())
-    columns = dict(zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
+    columns = dict(
+        zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True)
+    )
     cases = []
     for _ in range(arguments.sets):
         rows = np.sort(rng.permutation(len(trials))[: arguments.trials])
         drawn = {**vars(first), "trials": tuple(trials[rows])}
         cases.append((DrawnSet(**drawn, rows=rows, pool=X, columns=columns), y))
-    outcomes, fronts = map(np.array, zip(*work(judged, cases, "data sets"), strict=True))
+    outcomes, fronts = map(
+        np.array, zip(*work(judged, cases, "data sets"), strict=True)
+    )
     return int(report(first.tasks, outcomes, fronts) > 0)
 
 
-def report(tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[np.float64]) -> int:
+def report(
+    tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[np.float64]
+) -> int:
     """Print what `judged` gave; how many promises are broken too often."""
     sets, failed = len(outcomes), 0
-    print("| task | asked | certified | of all sets, above | wrong | promised | realised | late |")
+    print(
+        "| task | asked | certified | of all sets, above | wrong | promised | realised | late |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     names = ("the smallest", *(f"{error:g}" for error in ERRORS))
     for task, of_task in zip(tasks, outcomes.swapaxes(0, 1), strict=True):
@@ -197,12 +232,17 @@ def report(tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[
                 means = f"{wrong:.1%} | {promised_s:.2f} | {mean_s:.2f}"
             certified = f"{len(able)} of {sets} | {above} ({above / sets:.1%})"
             print(f"| {task} | {asked} | {certified} | {means} | {late} |")
-    print("\n| task | front | window, s | shown | realised | below the interval | above |")
+    print(
+        "\n| task | front | window, s | shown | realised | below the interval | above |"
+    )
     print("|---|---|---|---|---|---|---|")
     for task, of_task in zip(tasks, fronts.swapaxes(0, 1), strict=True):
         for name, rows in zip(SHOWN, of_task.swapaxes(0, 1), strict=True):
             window, accuracy, _, _, realised = rows.mean(axis=0)
-            below, above = (rows[:, 4] < rows[:, 2]).sum(), (rows[:, 4] > rows[:, 3]).sum()
+            below, above = (
+                (rows[:, 4] < rows[:, 2]).sum(),
+                (rows[:, 4] > rows[:, 3]).sum(),
+            )
             failed += below + above > binom.ppf(0.99, len(rows), OUTSIDE)
             shares = f"{accuracy:.1%} | {realised:.1%} | {below} | {above}"
             print(f"| {task} | {name} | {window:.2f} | {shares} |")
@@ -213,8 +253,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     top = argparse.ArgumentParser(prog="tests.bench.risk", description=__doc__)
     count = within(int, 1, 1e5)
-    top.add_argument("--sets", type=count, default=140, help="data sets drawn (%(default)s)")
-    top.add_argument("--trials", type=count, default=140, help="trials of each (%(default)s)")
+    top.add_argument(
+        "--sets", type=count, default=140, help="data sets drawn (%(default)s)"
+    )
+    top.add_argument(
+        "--trials", type=count, default=140, help="trials of each (%(default)s)"
+    )
     top.add_argument("--seed", type=int, default=0)
     top.add_argument("--jobs", type=count, default=2, help="processes (%(default)s)")
     top.set_defaults(run=run)

@@ -1,11 +1,12 @@
 """The loop in virtual time, for hours: memory and descriptors must stay flat.
 
-`python -m bench.soak` reads Cody's skin over the fake, timed by the bits on the wire, with 0.1 %
-of all transactions failing, decides on each contact with the model that comes with the program,
-writes events, map and datagrams as `edge-classify run` does, and prints memory, descriptors,
-schedule and lost lines. The exit status is 1 where memory has grown after the first tenth of the
-time, a descriptor or a line was lost, or a tick left out. A virtual minute at 100 Hz takes about
-nine seconds of one core; a day at 15 Hz takes about an hour.
+`python -m bench.soak` reads Cody's skin over the fake, timed by the bits on the wire,
+with 0.1 % of all transactions failing, decides on each contact with the model that
+comes with the program, writes events, map and datagrams as `edge-classify run` does,
+and prints memory, descriptors, schedule and lost lines. The exit status is 1 where
+memory has grown after the first tenth of the time, a descriptor or a line was lost, or
+a tick left out. A virtual minute at 100 Hz takes about nine seconds of one core; a day
+at 15 Hz takes about an hour.
 """
 
 from __future__ import annotations
@@ -35,14 +36,17 @@ from tests.faulty import Fault, faulty_skin
 from train.touch_map import TouchMap
 
 GROWTH_KB = 2048
-"""Allowed after the first tenth: pages that the allocator keeps, no more with more hours."""
+"""Allowed after the first tenth: pages that the allocator keeps, no more with more
+hours."""
 
 
 def main() -> int:
     """Run and print; 1 where something was not flat."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--every", type=float, default=1.0, help="minutes between two lines")
+    parser.add_argument(
+        "--every", type=float, default=1.0, help="minutes between two lines"
+    )
     parser.add_argument("--rate", type=float, default=100.0, help="frames a second")
     arguments = parser.parse_args()
     model, process = Model(demo.MODEL), psutil.Process()
@@ -54,7 +58,9 @@ def main() -> int:
     minute_frames = 60.0 * arguments.rate
     rows: list[list[float]] = []
     written = 0
-    print("| minute | frames | events | ticks left out | lines lost | descriptors | kB |")
+    print(
+        "| minute | frames | events | ticks left out | lines lost | descriptors | kB |"
+    )
     print("|---|---|---|---|---|---|---|", flush=True)
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -64,7 +70,9 @@ def main() -> int:
     ):
         listener.bind(("127.0.0.1", 0))
         place, waiting = Path(folder) / "map.jsonl", {"patient": lambda: True}
-        address = "{}:{}".format(*listener.getsockname())  # nobody reads what arrives there
+        address = "{}:{}".format(
+            *listener.getsockname()
+        )  # nobody reads what arrives there
         more = [map_writer(place, model.info, **waiting)]
         lines = Lines(out, address, more=more, **waiting)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
@@ -77,10 +85,17 @@ def main() -> int:
             lines.write(events)
             if frames % round(arguments.every * minute_frames) == 0:
                 gc.collect()
-                row = [frames / minute_frames, frames, written, loop.schedule.missed_ticks]
+                row = [
+                    frames / minute_frames,
+                    frames,
+                    written,
+                    loop.schedule.missed_ticks,
+                ]
                 row += [sum(lines.lost.values()), process.num_fds()]
                 rows.append([*row, process.memory_info().rss // 1024])
-                print(f"| {' | '.join(f'{cell:.10g}' for cell in rows[-1])} |", flush=True)
+                print(
+                    f"| {' | '.join(f'{cell:.10g}' for cell in rows[-1])} |", flush=True
+                )
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     print(f"{placed} contacts on the map")

@@ -1,17 +1,20 @@
-"""`make stopping`: deciding when sure beside fixed windows and beside others' early decisions.
+"""`make stopping`: deciding when sure beside fixed windows and beside others' early
+decisions.
 
-All decide on the same five folds; ours has the settings of an export. Extra trees decide at the
-first point at which their highest class probability passes a threshold. CALIMERA (Bilski and
-Jastrzebska, CALIMERA: a new early time series classification method, 2023) decides on the same
-features with calibrated ridge classifiers, at several prices of waiting. Columns are compared at
-the same mean time, between two thresholds or prices by interpolation. The gain is by how much
-deciding when sure errs less than the fixed window; its standard error treats the two shares as
-independent, which overstates it.
+All decide on the same five folds; ours has the settings of an export. Extra trees
+decide at the first point at which their highest class probability passes a threshold.
+CALIMERA (Bilski and Jastrzebska, CALIMERA: a new early time series classification
+method, 2023) decides on the same features with calibrated ridge classifiers, at several
+prices of waiting. Columns are compared at the same mean time, between two thresholds or
+prices by interpolation. The gain is by how much deciding when sure errs less than the
+fixed window; its standard error treats the two shares as independent, which overstates
+it.
 
-The second table has rules that choose their mean time themselves: aeon's TEASER (Schäfer and Leser,
-TEASER: early and accurate time series classification, 2020) and its threshold of the probability,
-0.85. Both ask extra trees about the paper's three features at each frame until then, every
-0.2 s. aeon teaches TEASER which answers to trust by answers to whole series.
+The second table has rules that choose their mean time themselves: aeon's TEASER
+(Schäfer and Leser, TEASER: early and accurate time series classification, 2020) and its
+threshold of the probability, 0.85. Both ask extra trees about the paper's three
+features at each frame until then, every 0.2 s. aeon teaches TEASER which answers to
+trust by answers to whole series.
 """
 
 from __future__ import annotations
@@ -22,7 +25,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from aeon.classification.early_classification import TEASER, ProbabilityThresholdEarlyClassifier
+from aeon.classification.early_classification import (
+    TEASER,
+    ProbabilityThresholdEarlyClassifier,
+)
 from aeon.classification.sklearn import SklearnClassifierWrapper
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
@@ -59,8 +65,11 @@ Curve = list[tuple[float, float]]
 
 
 def decided(stops: NDArray[np.int64], right: NDArray[np.bool_]) -> tuple[float, float]:
-    """(mean seconds, share wrong) of trials that are decided at the points `stops` (n,)."""
-    return float(SECONDS[stops].mean()), 1.0 - float(right[stops, np.arange(len(stops))].mean())
+    """(mean seconds, share wrong) of trials that are decided at the points `stops`
+    (n,)."""
+    return float(SECONDS[stops].mean()), 1.0 - float(
+        right[stops, np.arange(len(stops))].mean()
+    )
 
 
 def extra_trees(
@@ -69,23 +78,34 @@ def extra_trees(
     """Extra trees at each decision point, X (points, n, p), that decide when sure."""
     model, split = ExtraTreesClassifier(random_state=0), PredefinedSplit(folds)
     shares = np.stack(
-        [cross_val_predict(model, x, labels, cv=split, method="predict_proba") for x in X]
+        [
+            cross_val_predict(model, x, labels, cv=split, method="predict_proba")
+            for x in X
+        ]
     )
-    right, confidence = np.unique(labels)[shares.argmax(axis=2)] == labels, shares.max(axis=2)
+    right, confidence = (
+        np.unique(labels)[shares.argmax(axis=2)] == labels,
+        shares.max(axis=2),
+    )
     confidence[-1] = 1.0
-    return [decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS]
+    return [
+        decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS
+    ]
 
 
 def halts(
     known: NDArray[np.float64], new: NDArray[np.float64], waiting: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """(m,) the point at which CALIMERA decides: the first at which no later one is cheaper.
+    """(m,) the point at which CALIMERA decides: the first at which no later one is
+    cheaper.
 
-    At each point but the last a kernel ridge regression on the two highest probabilities predicts
-    how much cheaper it is to go on, from the last point to the first.
+    At each point but the last a kernel ridge regression on the two highest
+    probabilities predicts how much cheaper it is to go on, from the last point to the
+    first.
 
     Args:
-        known: (points, n, classes) probabilities of trials that no part of their model has seen.
+        known: (points, n, classes) probabilities of trials that no part of their model
+            has seen.
         new: (points, m, classes) probabilities of the trials to decide.
         waiting: (points,) price of waiting, in wrong decisions.
     """
@@ -99,8 +119,11 @@ def halts(
     return at
 
 
-def calimera(X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]) -> Curve:
-    """CALIMERA at each decision point, X (points, n, p), a row for each of `WAITING`."""
+def calimera(
+    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
+) -> Curve:
+    """CALIMERA at each decision point, X (points, n, p), a row for each of
+    `WAITING`."""
     stops = np.empty((len(WAITING), len(labels)), dtype=np.int64)
     right = np.empty(X.shape[:2], dtype=bool)
     ridge = make_pipeline(StandardScaler(), RidgeClassifier(alpha=10.0))
@@ -122,7 +145,8 @@ def calimera(X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np
 def of_aeon(
     make: Callable[..., Any], series: NDArray, labels: NDArray, folds: NDArray
 ) -> tuple[float, float]:
-    """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames * features)."""
+    """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames *
+    features)."""
     trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
     looks = SECONDS[::2]  # half as many, as TEASER is slow
     points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
@@ -139,13 +163,17 @@ def of_aeon(
 def peers(
     X: NDArray, series: NDArray, labels: NDArray, folds: NDArray
 ) -> tuple[list[Curve], dict[str, tuple[float, float]]]:
-    """The curves of extra trees and of CALIMERA on a task, and the points of aeon's rules."""
+    """The curves of extra trees and of CALIMERA on a task, and the points of aeon's
+    rules."""
     curves = [extra_trees(X, labels, folds), calimera(X, labels, folds)]
-    return curves, {name: of_aeon(make, series, labels, folds) for name, make in AEON.items()}
+    return curves, {
+        name: of_aeon(make, series, labels, folds) for name, make in AEON.items()
+    }
 
 
 def at(rows: Curve, seconds: float) -> float:
-    """The percentage wrong at a mean time, interpolated; NaN before the soonest decision."""
+    """The percentage wrong at a mean time, interpolated; NaN before the soonest
+    decision."""
     times, wrong = zip(*sorted(rows), strict=True)
     return 100.0 * float(np.interp(seconds, times, wrong, left=np.nan))
 
@@ -169,7 +197,9 @@ def run(arguments: argparse.Namespace) -> int:
     dataset = followed(read(arguments.data), NAMES, quick=arguments.quick)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
-    X = np.stack([dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S])
+    X = np.stack(
+        [dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S]
+    )
     frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
     paper, n = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES), len(folds)
     series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
@@ -178,14 +208,21 @@ def run(arguments: argparse.Namespace) -> int:
     others = Parallel(n_jobs=arguments.jobs)(
         delayed(peers)(X, series, y[task], folds) for task in compared
     )
-    print("| task | mean time, s | fixed window, % wrong | when sure | gain | trees | CALIMERA |")
+    print(
+        "| task | mean time, s | fixed window, % wrong | when sure | gain | trees | CALIMERA |"
+    )
     print("|---" * 7 + "|")
-    table = ["| task | rule | mean time, s | % wrong | when sure, at that time |", "|---" * 5 + "|"]
+    table = [
+        "| task | rule | mean time, s | % wrong | when sure, at that time |",
+        "|---" * 5 + "|",
+    ]
     for (task, ours), (curves, points) in zip(compared.items(), others, strict=True):
         fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
         sure = when_sure(ours.course)
         for seconds in DECISION_POINTS_S:
-            waited, stopped, *others_wrong = (at(way, seconds) for way in (fixed, sure, *curves))
+            waited, stopped, *others_wrong = (
+                at(way, seconds) for way in (fixed, sure, *curves)
+            )
             error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)
             gain = "-" if np.isnan(error) else f"{waited - stopped:.1f} ± {error:.1f}"
             cells = [cell(waited), cell(stopped), gain, *map(cell, others_wrong)]
@@ -206,8 +243,12 @@ def run(arguments: argparse.Namespace) -> int:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     top = argparse.ArgumentParser(prog="tests.bench.stopping", description=__doc__)
-    top.add_argument("--data", nargs="+", required=True, metavar="REC", help=".npz or folders")
-    top.add_argument("--quick", action="store_true", help="the settings of a quick export")
+    top.add_argument(
+        "--data", nargs="+", required=True, metavar="REC", help=".npz or folders"
+    )
+    top.add_argument(
+        "--quick", action="store_true", help="the settings of a quick export"
+    )
     top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
     top.set_defaults(run=run)
     return dispatch(top, argv)

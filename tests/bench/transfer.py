@@ -1,9 +1,10 @@
-"""`make transfer`: does a model trained on a simulated scene hold in another physics engine?
+"""`make transfer`: does a model trained on a simulated scene hold in another physics
+engine?
 
-MuJoCo makes trials of the paper's kind with parameters of its own (`tests/bench/mujoco_touch.py`), also
-with arms and skins of other habits and of odd things, and the model is scored on them. They are a
-test set: nothing in train/ reads them, and nothing may be tuned to one set of them; `--seed` makes
-another.
+MuJoCo makes trials of the paper's kind with parameters of its own
+(`tests/bench/mujoco_touch.py`), also with arms and skins of other habits and of odd
+things, and the model is scored on them. They are a test set: nothing in train/ reads
+them, and nothing may be tuned to one set of them; `--seed` makes another.
 """
 
 from __future__ import annotations
@@ -26,7 +27,14 @@ from edge.model.model import Model
 from edge.model.stopping import UNKNOWN
 from edge.recording import Recording, save
 from edge.tools.replay import Summary, decide
-from tests.bench.mujoco_touch import ONSET_COUNTS, PLACE_M, RATE_HZ, Thing, Touch, simulate
+from tests.bench.mujoco_touch import (
+    ONSET_COUNTS,
+    PLACE_M,
+    RATE_HZ,
+    Thing,
+    Touch,
+    simulate,
+)
 from train.progress import bar
 from train.simulate import streams
 
@@ -44,7 +52,8 @@ HABITS: dict[str, dict[str, float]] = {
 }
 """Factors of what `draw_touch` draws. The objects take turns."""
 SLIDES_M, WINDOW_S = 0.02, 1.2
-"""A movable object has moved this far by the end of the window, as in the scenes and the paper."""
+"""A movable object has moved this far by the end of the window, as in the scenes and
+the paper."""
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -53,7 +62,10 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def draw_body(
-    rng: np.random.Generator, kinds: str, mass_kg: tuple[float, float], narrowest_m: float
+    rng: np.random.Generator,
+    kinds: str,
+    mass_kg: tuple[float, float],
+    narrowest_m: float,
 ) -> Thing:
     """The properties that all things have."""
     return Thing(
@@ -103,8 +115,11 @@ def draw_odd(rng: np.random.Generator) -> Thing:
     return replace(body, **changes[body.kind])
 
 
-def draw_touch(thing: Thing, fixed: bool, rng: np.random.Generator, habit: str) -> Touch:
-    """One touch: how the object stands before the arm, how the arm begins, a habit's factors."""
+def draw_touch(
+    thing: Thing, fixed: bool, rng: np.random.Generator, habit: str
+) -> Touch:
+    """One touch: how the object stands before the arm, how the arm begins, a habit's
+    factors."""
     touch = Touch(
         thing=thing,
         fixed=fixed,
@@ -141,10 +156,11 @@ def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the trials, save them in a folder for each habit, and print how the model decides them.
+    """Make the trials, save them in a folder for each habit, and print how the model
+    decides them.
 
-    The tables have right decisions by habit and in all, contacts called unknown, and each task's
-    confusion. A contact without a decision counts as wrong.
+    The tables have right decisions by habit and in all, contacts called unknown, and
+    each task's confusion. A contact without a decision counts as wrong.
     """
     model, seed = Model(arguments.model), arguments.seed
     tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
@@ -175,10 +191,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
-    top = argparse.ArgumentParser(prog="tests.bench.transfer", description=__doc__.split("\n\n")[0])
+    top = argparse.ArgumentParser(
+        prog="tests.bench.transfer", description=__doc__.split("\n\n")[0]
+    )
     top.add_argument("--model", type=Path, required=True)
     top.add_argument("--out", type=Path, default=Path("build/transfer"))
-    top.add_argument("--trials", type=int, default=96, help="two of each object (%(default)s)")
+    top.add_argument(
+        "--trials", type=int, default=96, help="two of each object (%(default)s)"
+    )
     top.add_argument("--seed", type=int, default=1)
     top.set_defaults(run=run)
     return dispatch(top, argv)

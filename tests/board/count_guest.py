@@ -1,7 +1,8 @@
-"""The program whose instructions `count.c` counts: a recording, with marks around each frame.
+"""The program whose instructions `count.c` counts: a recording, with marks around each
+frame.
 
-Run as `python count_guest.py MODEL RECORDING` under the plugin. It prints a line for each pair of
-marks: what kind of frame it was.
+Run as `python count_guest.py MODEL RECORDING` under the plugin. It prints a line for
+each pair of marks: what kind of frame it was.
 """
 
 import os

@@ -1,4 +1,5 @@
-"""Debian packages in a folder: fetched with the machine's own apt, without installing anything."""
+"""Debian packages in a folder: fetched with the machine's own apt, without installing
+anything."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ def skipping() -> Iterator[None]:
 
 
 def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
-    """Make a folder, unless it was made by the same recipe before; a failed one is not kept."""
+    """Make a folder, unless it was made by the same recipe before; a failed one is not
+    kept."""
     stamp = target / ".made-from"
     if not (stamp.is_file() and stamp.read_text() == recipe):
         fresh = target.with_name(target.name + ".new")
@@ -46,7 +48,8 @@ def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
 
 
 def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
-    """A folder with packages and their dependencies; their installation scripts do not run.
+    """A folder with packages and their dependencies; their installation scripts do not
+    run.
 
     Raises:
         Unavailable: apt cannot fetch them.
@@ -58,7 +61,9 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
         for folder in ("lists/partial", "archives/partial"):
             (apt / folder).mkdir(parents=True)
         (apt / "status").touch()
-        (apt / "apt.conf").write_text(APT.substitute(architecture=architecture, folder=apt))
+        (apt / "apt.conf").write_text(
+            APT.substitute(architecture=architecture, folder=apt)
+        )
         hint = f"apt cannot fetch {' '.join(packages)} for {architecture}"
         get = ["env", f"APT_CONFIG={apt}/apt.conf", "apt-get", "--quiet"]
         run([*get, "update"], hint)
@@ -71,10 +76,16 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
 
 
 def program(system: Path, name: str) -> list[str]:
-    """The command of a program among unpacked packages, with their loader and libraries."""
+    """The command of a program among unpacked packages, with their loader and
+    libraries."""
     loader = next(system.glob("lib*/ld-linux*"))
     libraries = {str(path.parent) for path in system.rglob("*-linux-gnu*/lib*.so.*")}
-    return [str(loader), "--library-path", ":".join(libraries), f"{system}/usr/bin/{name}"]
+    return [
+        str(loader),
+        "--library-path",
+        ":".join(libraries),
+        f"{system}/usr/bin/{name}",
+    ]
 
 
 def run(command: Sequence[str], hint: str = "") -> str:
@@ -86,7 +97,9 @@ def run(command: Sequence[str], hint: str = "") -> str:
     try:
         done = subprocess.run(command, check=False, capture_output=True, text=True)
     except FileNotFoundError:
-        raise Unavailable(f"{command[0]} is not on this machine; use Debian or Ubuntu") from None
+        raise Unavailable(
+            f"{command[0]} is not on this machine; use Debian or Ubuntu"
+        ) from None
     if done.returncode:
         last = "; ".join((done.stderr.strip() or done.stdout.strip()).splitlines()[-2:])
         raise Unavailable(f"{hint or command[0]}: {last}")

@@ -1,9 +1,10 @@
-"""Write the demo that the wheel carries: a model, four touches new to it, and golden outputs.
+"""Write the demo that the wheel carries: a model, four touches new to it, and golden
+outputs.
 
     python tests/board/demo_data.py build/demo-data
 
-reads `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data`), and replaces
-`edge/demo/` and `tests/golden/demo.npz`.
+reads `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data`), and
+replaces `edge/demo/` and `tests/golden/demo.npz`.
 """
 
 from __future__ import annotations
@@ -21,18 +22,26 @@ from export import golden
 from train.dataset import load_trials
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-TOUCHES = ("cardboard-box-fixed", "cardboard-box-movable", "foam-block-fixed", "pillow-movable")
+TOUCHES = (
+    "cardboard-box-fixed",
+    "cardboard-box-movable",
+    "foam-block-fixed",
+    "pillow-movable",
+)
 META = ("labels", "skin", "source", "trial")
 """The model knows the arm."""
 EVERY, COUNT_STEP, ENCODER_STEPS = 4, 8, 2**13
-"""Every fourth frame takes a quarter of the bytes; features are sampled in time. Counts are
-multiples of 8, as of a coarser converter: their noise is most of the files. An encoder of 16 bits a
-turn has about so many steps a radian."""
+"""Every fourth frame takes a quarter of the bytes; features are sampled in time. Counts
+are multiples of 8, as of a coarser converter: their noise is most of the files. An
+encoder of 16 bits a turn has about so many steps a radian."""
 
 
 def main(folder: Path) -> None:
     """Write the files."""
-    demo, golden_file = CHECKOUT / "edge" / "demo", CHECKOUT / "tests" / "golden" / "demo.npz"
+    demo, golden_file = (
+        CHECKOUT / "edge" / "demo",
+        CHECKOUT / "tests" / "golden" / "demo.npz",
+    )
     (demo / "model.onnx").write_bytes((folder / "model.onnx").read_bytes())
     model = Model(demo / "model.onnx")
     for touch in TOUCHES:
@@ -40,7 +49,9 @@ def main(folder: Path) -> None:
         contact = first_series(recording, model)
         assert contact is not None, f"{touch} touches nothing"
         short = golden.trimmed(replace(recording, valid=None), contact[0], model)
-        kept = slice((len(short.t) - 1) % EVERY, None, EVERY)  # the last is past the window
+        kept = slice(
+            (len(short.t) - 1) % EVERY, None, EVERY
+        )  # the last is past the window
         arrays = {
             "t": short.t[kept] - short.t[kept][0],
             "frames": short.frames[kept] // COUNT_STEP * COUNT_STEP,

@@ -1,8 +1,8 @@
 """Tests of commands and drivers on a real kernel's /dev/i2c-N, run in the guest.
 
-`test_kernel.py` runs them. The chips of `edge.fake` stand behind the kernel. A frame of a recording
-lasts until every chip has been read once, so that the slow guest sees every frame, as a fake bus in
-virtual time does.
+`test_kernel.py` runs them. The chips of `edge.fake` stand behind the kernel. A frame of
+a recording lasts until every chip has been read once, so that the slow guest sees every
+frame, as a fake bus in virtual time does.
 """
 
 import errno
@@ -45,7 +45,8 @@ CONFIGURATION, EXPECTED = b"\x5d", b"\x24"
 
 
 class Adapter(UsbAdapter):
-    """The adapter, with time that follows the readings, and transfers that can be cut short."""
+    """The adapter, with time that follows the readings, and transfers that can be cut
+    short."""
 
     def __init__(self, file):
         self._playback, self.short = None, False
@@ -54,14 +55,18 @@ class Adapter(UsbAdapter):
         super().__init__(bus)
 
     def feel(self, recording, *, loop=False, interrupt=False):
-        """Let the chips feel a recording from its first frame on; press Ctrl-C at its end."""
+        """Let the chips feel a recording from its first frame on; press Ctrl-C at its
+        end."""
         self.bus.sleep(1.0)
         self._playback = Playback(recording, loop=loop)
         self._playback.start = self.bus.now()
-        self._interrupt_s = self.bus.now() + self._playback.ends if interrupt else math.inf
+        self._interrupt_s = (
+            self.bus.now() + self._playback.ends if interrupt else math.inf
+        )
 
     def control(self, setup, data=b""):
-        """Answer a request; the last chip's reading of a frame is followed by the next frame."""
+        """Answer a request; the last chip's reading of a frame is followed by the next
+        frame."""
         answer = super().control(setup, data)
         self._readings += len(answer) == CHIP_BYTES
         if len(answer) == CHIP_BYTES and self._readings % self._chips == 0:
@@ -91,7 +96,12 @@ class Rig:
     def record(self, frames):
         """Save frames as a recording; returns its path."""
         path, t = self.path.with_name("touch.npz"), np.arange(len(frames)) * PERIOD_S
-        meta = {"labels": {}, "skin": self.layout.to_dict(), "source": "", "trial": "touch"}
+        meta = {
+            "labels": {},
+            "skin": self.layout.to_dict(),
+            "source": "",
+            "trial": "touch",
+        }
         save(path, Recording(t, frames, meta=meta))
         return path
 
@@ -145,7 +155,13 @@ def outcome(rig, text):
     [
         ("pad", "scan", "", '"state": "running"', 2),
         ("pad", "calibrate", "--frames 20", '"noise_median": 1.', 1),
-        ("pad", "record", "--label object=box --trials 1 --length 60", '"complete": true', 1),
+        (
+            "pad",
+            "record",
+            "--label object=box --trials 1 --length 60",
+            '"complete": true',
+            1,
+        ),
         ("pad", "run", "--without-joints skin", '"event": "decision"', 3),
         ("pad", "view", "", "9 taxels", 1),
         ("cody", "scan", "", '"state": "running"', 8),
@@ -156,7 +172,11 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
     tmp_path, edge, skin, command, options, expected, times
 ):
     rig = Rig(skin, tmp_path)
-    frames, loop, interrupt = rig.touch, command == "calibrate", command in ("run", "view")
+    frames, loop, interrupt = (
+        rig.touch,
+        command == "calibrate",
+        command in ("run", "view"),
+    )
     if loop:
         frames = np.random.default_rng(5).integers(0, 4, frames[:20].shape, np.uint16)
     elif interrupt:
@@ -168,7 +188,10 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
     results = []
     with plugged(rig.adapter) as device:
         text = rig.path.read_text().replace("device = 0", f'device = "{device}"')
-        for fake in ([], ["--fake", touch, "--noise", 0, *(["--loop"] if loop else [])]):
+        for fake in (
+            [],
+            ["--fake", touch, "--noise", 0, *(["--loop"] if loop else [])],
+        ):
             rig.path.write_text(text)
             printed = edge(command, *arguments, *fake)
             assert printed.count(expected) >= times
@@ -201,16 +224,24 @@ def test_a_transfer_fails_with_its_error_and_the_next_is_carried(
     assert fetch(bus, CHIP, CONFIGURATION, 1) == EXPECTED
 
 
-def test_a_second_program_is_refused_and_other_programs_see_the_chips_and_do_no_harm(device, bus):
+def test_a_second_program_is_refused_and_other_programs_see_the_chips_and_do_no_harm(
+    device, bus
+):
     child = os.fork()
     if child == 0:
         with SMBus(device) as smbus:
             smbus.write_quick(CHIP)  # as i2cdetect asks
-            values = {smbus.read_byte_data(OTHER_CHIP, CONFIGURATION[0]) for _ in range(10)}
+            values = {
+                smbus.read_byte_data(OTHER_CHIP, CONFIGURATION[0]) for _ in range(10)
+            }
         try:
             LinuxBus(device)
         except BusBusy as error:
-            os._exit(0 if values == {EXPECTED[0]} and f"({os.getppid()})" in str(error) else 1)
+            os._exit(
+                0
+                if values == {EXPECTED[0]} and f"({os.getppid()})" in str(error)
+                else 1
+            )
         os._exit(2)
     values = {fetch(bus, CHIP, b"\x5c", 2) for _ in range(10)}
     assert os.waitpid(child, 0)[1] == 0
@@ -250,7 +281,9 @@ def test_a_skin_whose_adapter_comes_back_with_another_number_is_read_again(pad):
     """The kernel removes an adapter only once no program has its device open."""
     pressed = pad.touch[6]
     pad.adapter.feel(load(pad.record(pressed[None])))
-    pad.path.write_text(pad.path.read_text().replace("device = 0", 'device = "i2c-tiny-usb"'))
+    pad.path.write_text(
+        pad.path.read_text().replace("device = 0", 'device = "i2c-tiny-usb"')
+    )
     adapter, heard = ExitStack(), []
     before = adapter.enter_context(plugged(pad.adapter))
     with Skin.open(pad.path) as skin:

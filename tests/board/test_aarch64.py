@@ -1,9 +1,11 @@
-"""The wheel on aarch64 under qemu: the same numbers as on x86, and the instructions executed.
+"""The wheel on aarch64 under qemu: the same numbers as on x86, and the instructions
+executed.
 
-`make board-test` builds the wheel and runs this on Debian's Python, in a folder, without root. qemu
-and an arm64 Python come with the machine's own apt, and the aarch64 wheels with pip. Nothing is
-installed on the machine. The emulated Python shows whether wheels load and numbers agree; it says
-nothing about time. Without apt or a network the tests are skipped with the reason, except in CI.
+`make board-test` builds the wheel and runs this on Debian's Python, in a folder,
+without root. qemu and an arm64 Python come with the machine's own apt, and the aarch64
+wheels with pip. Nothing is installed on the machine. The emulated Python shows whether
+wheels load and numbers agree; it says nothing about time. Without apt or a network the
+tests are skipped with the reason, except in CI.
 """
 
 import csv
@@ -29,7 +31,8 @@ SYSTEM = ("python3-minimal", "libpython3-stdlib", "libstdc++6", "libgomp1")
 PACKAGES = ("numpy", "onnxruntime", "smbus2")
 PLATFORMS = ("manylinux2014", "manylinux_2_17", "manylinux_2_27", "manylinux_2_28")
 CPUINFO = CHECKOUT / "tests" / "board" / "cpuinfo"
-"""A Raspberry Pi 4's. ONNX Runtime reads it, and crashes on one of another architecture."""
+"""A Raspberry Pi 4's. ONNX Runtime reads it, and crashes on one of another
+architecture."""
 TABLE = AARCH64 / "instructions.csv"
 
 
@@ -53,21 +56,53 @@ def emulated_python(wheel: Path, counts: Path) -> list[str]:
     constraints = CHECKOUT / "constraints.txt"
 
     def install(site: Path) -> None:
-        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        kind = ["--only-binary=:all:", "--implementation=cp", "--python-version", version]
+        pip = [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+        ]
+        kind = [
+            "--only-binary=:all:",
+            "--implementation=cp",
+            "--python-version",
+            version,
+        ]
         kind += [f"--platform={platform}_aarch64" for platform in PLATFORMS]
-        command = [*pip, *kind, "-c", str(constraints), "--target", str(site), *PACKAGES]
+        command = [
+            *pip,
+            *kind,
+            "-c",
+            str(constraints),
+            "--target",
+            str(site),
+            *PACKAGES,
+        ]
         run(command, "pip cannot fetch the aarch64 wheels")
 
-    site = once(AARCH64 / "site", "\n".join([version, constraints.read_text()]), install)
+    site = once(
+        AARCH64 / "site", "\n".join([version, constraints.read_text()]), install
+    )
     shutil.rmtree(AARCH64 / "wheel", ignore_errors=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(AARCH64 / "wheel")
     plugin, source = AARCH64 / "count.so", CHECKOUT / "tests" / "board" / "count.c"
     run(["cc", "-O2", "-Wall", "-shared", "-fPIC", "-o", str(plugin), str(source)])
-    variables = (f"PYTHONPATH={AARCH64}/wheel:{site}", "PYTHONNOUSERSITE=1", "PYTHONHASHSEED=0")
+    variables = (
+        f"PYTHONPATH={AARCH64}/wheel:{site}",
+        "PYTHONNOUSERSITE=1",
+        "PYTHONHASHSEED=0",
+    )
     command = [*program(qemu, "qemu-aarch64"), "-plugin", f"{plugin},out={counts}"]
-    command += ["-cpu", CPU, "-L", str(root), *(word for v in variables for word in ("-E", v))]
+    command += [
+        "-cpu",
+        CPU,
+        "-L",
+        str(root),
+        *(word for v in variables for word in ("-E", v)),
+    ]
     run([*command, str(executable), "-c", ""], "qemu does not run here")
     return [*command, str(executable)]
 
@@ -86,7 +121,8 @@ def python(wheel, counts):
 def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_bound(
     python, exported, tmp_path
 ):
-    """In one process, as its start takes long: shipped model, the tests' model, the hard cases."""
+    """In one process, as its start takes long: shipped model, the tests' model, the
+    hard cases."""
     assert hard_golden.main(["--out", str(tmp_path)]) == 0
     golden = CHECKOUT / "tests" / "golden" / "demo.npz"
     shutil.copytree(exported, tmp_path / "tests")
@@ -95,9 +131,13 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
     shutil.copy(golden, tmp_path / "demo" / "golden.npz")
     machine, shares = elsewhere.ask(tmp_path, python)
     assert machine["machine"] == "aarch64"
-    assert {name for name, _ in shares} == {folder.name for folder in elsewhere.sets(tmp_path)}
+    assert {name for name, _ in shares} == {
+        folder.name for folder in elsewhere.sets(tmp_path)
+    }
     assert {("demo", "series counts"), ("demo", "object_label")} <= set(shares)
-    print(f"{len(shares)} quantities, at most {max(shares.values()):.2g} of their bounds")
+    print(
+        f"{len(shares)} quantities, at most {max(shares.values()):.2g} of their bounds"
+    )
     assert {key: share for key, share in shares.items() if share > 1.0} == {}
 
 
@@ -124,14 +164,22 @@ def test_the_instructions_of_each_kind_of_frame_are_counted(python, counts, tmp_
         FOLDER / "cardboard-box-movable.npz",
     ]
     printed = subprocess.check_output([*python, *program], cwd=tmp_path, text=True)
-    marks = [int(line) for line in counts.read_text().split()][:-1]  # the last marks the end
+    marks = [int(line) for line in counts.read_text().split()][
+        :-1
+    ]  # the last marks the end
     instructions: dict[str, list[int]] = {}
-    for kind, before, after in zip(printed.splitlines(), marks[::2], marks[1::2], strict=True):
+    for kind, before, after in zip(
+        printed.splitlines(), marks[::2], marks[1::2], strict=True
+    ):
         instructions.setdefault(kind, []).append(after - before)
     medians = {kind: statistics.median(each) for kind, each in instructions.items()}
     with TABLE.open("w", newline="") as file:
-        rows = [(k, len(v), min(v), medians[k], max(v)) for k, v in instructions.items()]
-        csv.writer(file).writerows([("frame", "n", "lowest", "median", "highest"), *rows])
+        rows = [
+            (k, len(v), min(v), medians[k], max(v)) for k, v in instructions.items()
+        ]
+        csv.writer(file).writerows(
+            [("frame", "n", "lowest", "median", "highest"), *rows]
+        )
     print(f"aarch64 instructions ({TABLE.relative_to(CHECKOUT)})\n{TABLE.read_text()}")
     assert 0 < medians["frame without contact"] < medians["frame in contact"]
     assert medians["frame in contact"] < medians["frame that decides"]

@@ -1,9 +1,10 @@
 """The commands and drivers under a real Linux kernel's /dev/i2c-N, over modelled chips.
 
 `make kernel-test` runs this: it boots a Debian kernel under QEMU, without KVM, and runs
-`kernel_guest.py` there. The kernel and QEMU are unpacked into `build/kernel`; nothing is installed.
-The guest's root is this machine's own, read-only over 9p, with a writable /run. Where the packages
-cannot be had (no apt, no network) the test is skipped with the reason, but not in CI.
+`kernel_guest.py` there. The kernel and QEMU are unpacked into `build/kernel`; nothing
+is installed. The guest's root is this machine's own, read-only over 9p, with a writable
+/run. Where the packages cannot be had (no apt, no network) the test is skipped with the
+reason, but not in CI.
 """
 
 import os
@@ -45,12 +46,13 @@ SLOWED = {
     "release_s = 0.3 ": "release_s = 0.001 ",
     '"/dev/i2c-3"': "0",
 }
-"""An emulated machine reads some ten chips in a tenth of a second; and a contact that ends with the
-first frame without it ends in the same frame at any rate."""
+"""An emulated machine reads some ten chips in a tenth of a second; and a contact that
+ends with the first frame without it ends in the same frame at any rate."""
 
 
 def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
-    """The exit status of a command that runs as root, and everything that the guest printed.
+    """The exit status of a command that runs as root, and everything that the guest
+    printed.
 
     The guest boots, runs the command and powers off.
 
@@ -59,7 +61,9 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
         RuntimeError: the guest did not reach its end.
     """
     if platform.machine() != "x86_64":
-        raise Unavailable("the kernel of the test runs programs of x86-64 machines alone")
+        raise Unavailable(
+            "the kernel of the test runs programs of x86-64 machines alone"
+        )
     system = unpacked(FOLDER / "system", "amd64", PACKAGES)
     kernel, initrd = next((system / "boot").glob("vmlinuz-*")), _initrd(system, command)
     qemu = ["timeout", str(LONGEST_S), *program(system, "qemu-system-x86_64")]
@@ -74,7 +78,9 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
     )
     printed, ended, rest = done.stdout.decode(errors="replace").rpartition(ENDED)
     if not ended:
-        raise RuntimeError(f"the guest did not reach its end:\n{rest}\n{done.stderr.decode()}")
+        raise RuntimeError(
+            f"the guest did not reach its end:\n{rest}\n{done.stderr.decode()}"
+        )
     return int(rest.split()[0]), printed
 
 
@@ -86,7 +92,9 @@ def _initrd(system: Path, command: Sequence[str]) -> Path:
         (root / name).mkdir(parents=True)
     busybox = shutil.copy(system / "bin" / "busybox", root / "bin")
     for name in names:
-        shutil.copy(next((system / "lib" / "modules").rglob(f"{name}.ko")), root / "modules")
+        shutil.copy(
+            next((system / "lib" / "modules").rglob(f"{name}.ko")), root / "modules"
+        )
     text = (CHECKOUT / "tests" / "board" / "kernel_init.sh").read_text()
     words = {"MODULES": " ".join(names), "COMMAND": shlex.join(command), "ENDED": ENDED}
     init = root / "init"
@@ -116,7 +124,9 @@ def skins(tmp_path_factory):
     fake = f"edge fake --skin {folder}/pad.toml --out {touches}"
     export = f"export --data {touches}/touches --out {touches} --features paper --projection pca"
     for command in (fake, f"{export} --decision-points none"):
-        subprocess.run([sys.executable, "-m", *command.split()], cwd=CHECKOUT, check=True)
+        subprocess.run(
+            [sys.executable, "-m", *command.split()], cwd=CHECKOUT, check=True
+        )
     shutil.copy(touches / "model.onnx", folder / "pad.onnx")
     shutil.copy(MODEL, folder / "cody.onnx")
     return folder

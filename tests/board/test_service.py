@@ -1,4 +1,5 @@
-"""The systemd unit under a real systemd: started, watched, started again, and stopped for good.
+"""The systemd unit under a real systemd: started, watched, started again, and stopped
+for good.
 
 `make service-test` runs this as root; `service_init.sh` starts the systemd.
 """
@@ -30,17 +31,23 @@ class Machine:
 
     def __init__(self, folder):
         """Start it, with the files of a folder as those of the service."""
-        python, packages = Path(sys.executable).resolve().name, Path(numpy.__file__).parents[1]
+        python, packages = (
+            Path(sys.executable).resolve().name,
+            Path(numpy.__file__).parents[1],
+        )
         variables = {"BASE": sys.base_prefix, "PYTHON": python, "PACKAGES": packages}
         variables |= {"CHECKOUT": HERE.parent, "FOLDER": folder, "SYSTEMD": SYSTEMD}
         command = ["env", *(f"{name}={value}" for name, value in variables.items())]
-        command += "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
+        command += (
+            "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()
+        )
         command.append(str(HERE / "service_init.sh"))
         self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         (self.first,) = self.once(lambda: children.read_text().split(), len)
         self.root = Path(f"/proc/{self.first}/root")
-        # Before that, /run and its sockets are this machine's, and so is the systemd behind them.
+        # Before that, /run and its sockets are this machine's, and so is the systemd
+        # behind them.
         name = Path(f"/proc/{self.first}/comm")
         assert self.once(name.read_text, "systemd\n".__eq__) == "systemd\n"
         state = "systemctl is-active multi-user.target".split()
@@ -48,8 +55,18 @@ class Machine:
 
     def run(self, *command):
         """What a command prints there."""
-        inside = ["nsenter", "--target", self.first, "--pid", "--mount", "--uts", *command]
-        return subprocess.run(inside, capture_output=True, text=True, check=False).stdout
+        inside = [
+            "nsenter",
+            "--target",
+            self.first,
+            "--pid",
+            "--mount",
+            "--uts",
+            *command,
+        ]
+        return subprocess.run(
+            inside, capture_output=True, text=True, check=False
+        ).stdout
 
     def once(self, look, wanted, seconds=60.0):
         """The first observation that is as wanted, or else the last one."""
@@ -100,14 +117,18 @@ def started(machine):
 
 
 def test_the_unit_is_valid(machine):
-    printed = machine.run("bash", "-c", f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?")
+    printed = machine.run(
+        "bash", "-c", f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?"
+    )
     assert printed.splitlines()[-1] == "0", printed
 
 
 def test_it_is_active_once_it_reads_the_skin_as_a_user_without_rights(machine, started):
     assert (started["ActiveState"], started["NRestarts"]) == ("active", "0"), started
     assert started["StatusText"] == "reading fake /etc/edge-classify/touch.npz"
-    lines = (machine.root / "proc" / started["MainPID"] / "status").read_text().splitlines()
+    lines = (
+        (machine.root / "proc" / started["MainPID"] / "status").read_text().splitlines()
+    )
     status = dict(line.split(":\t", 1) for line in lines)
     assert int(status["Uid"].split()[0]) >= 61184  # of the range of dynamic users
     assert status["CapEff"].strip() == "0000000000000000"
@@ -129,7 +150,9 @@ def test_a_loop_that_stands_still_is_started_again(machine, started):
 def test_a_device_that_is_missing_is_tried_again(machine):
     machine.restart("--without-joints skin")
     missing = machine.wait_for(SubState="auto-restart", ExecMainStatus="3")
-    assert (missing["SubState"], missing["ExecMainStatus"]) == ("auto-restart", "3"), missing
+    assert (missing["SubState"], missing["ExecMainStatus"]) == ("auto-restart", "3"), (
+        missing
+    )
 
 
 def test_a_mistake_in_the_arguments_is_not(machine):
@@ -137,6 +160,8 @@ def test_a_mistake_in_the_arguments_is_not(machine):
     machine.wait_for(ActiveState="failed")
     time.sleep(3.0)
     mistaken = machine.shown()
-    assert (mistaken["ActiveState"], mistaken["ExecMainStatus"]) == ("failed", "2"), mistaken
+    assert (mistaken["ActiveState"], mistaken["ExecMainStatus"]) == ("failed", "2"), (
+        mistaken
+    )
     log = (machine.root / "run" / "log").read_text()
     assert "the error rate must be" in log.splitlines()[-1]

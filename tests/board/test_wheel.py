@@ -28,8 +28,18 @@ def command(wheel, tmp_path_factory):
     """Runs `edge-classify ...` from a fresh environment, in an empty folder."""
     folder = tmp_path_factory.mktemp("elsewhere")
     programs = folder / "env" / "bin"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", programs.parent], check=True)
-    pip = [sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet"]
+    subprocess.run(
+        [sys.executable, "-m", "venv", "--without-pip", programs.parent], check=True
+    )
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        programs / "python",
+        "install",
+        "--quiet",
+    ]
     subprocess.run([*pip, "-c", CHECKOUT / "constraints.txt", wheel], check=True)
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
 
@@ -47,14 +57,18 @@ def test_it_is_small(wheel):
 
 def test_it_holds_edge_alone_and_all_of_it(contents):
     inside = {name for name in contents if ".dist-info/" not in name}
-    tracked = subprocess.check_output(["git", "ls-files", "edge"], cwd=CHECKOUT, text=True)
+    tracked = subprocess.check_output(
+        ["git", "ls-files", "edge"], cwd=CHECKOUT, text=True
+    )
     assert inside == set(tracked.split())
 
 
 def test_it_names_three_dependencies_one_version_and_a_licence(contents):
     (metadata,) = (v for k, v in contents.items() if k.endswith(".dist-info/METADATA"))
     fields = Parser().parsestr(metadata.decode())
-    needed = [n.split(">")[0] for n in fields.get_all("Requires-Dist") if "extra ==" not in n]
+    needed = [
+        n.split(">")[0] for n in fields.get_all("Requires-Dist") if "extra ==" not in n
+    ]
     assert sorted(needed) == ["numpy", "onnxruntime", "smbus2"]
     assert fields["Version"] == edge.__version__
     assert fields["License-Expression"] == "BSD-3-Clause"

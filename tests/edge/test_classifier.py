@@ -1,4 +1,5 @@
-"""The classifier: events in order, decisions at the right moment, flags where they belong."""
+"""The classifier: events in order, decisions at the right moment, flags where they
+belong."""
 
 import time
 from dataclasses import replace
@@ -71,7 +72,11 @@ def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_
     model.info.tasks["object"] = replace(model.info.tasks["object"], no_contact="none")
     (said,) = Classifier(model).classify(quiet)
     assert (said.task, said.label, said.confidence) == ("object", "none", 1.0)
-    assert (said.window_s, said.onset_s, said.flags) == (0.0, quiet.t[-1], ("no_contact",))
+    assert (said.window_s, said.onset_s, said.flags) == (
+        0.0,
+        quiet.t[-1],
+        ("no_contact",),
+    )
     lacking = replace(quiet, valid=np.arange(384).reshape(16, 24) > 0)
     (said,) = Classifier(model).classify(lacking)
     assert said.flags == ("no_contact", "missing_taxels")
@@ -80,7 +85,11 @@ def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_
     weak[30, 4, 5] = (model.info.layout.threshold_counts + model.info.layout.onset) // 2
     (said,) = Classifier(model).classify(replace(quiet, frames=weak))
     assert said.flags == ("no_contact", "near_contact")
-    assert said.to_dict()["strongest"] == round(weak.max() / model.info.layout.onset, 3) < 1.0
+    assert (
+        said.to_dict()["strongest"]
+        == round(weak.max() / model.info.layout.onset, 3)
+        < 1.0
+    )
     decided = [event for _, event in watch(model, touch) if isinstance(event, Decided)]
     assert [event.task for event in decided] == ["category", "object"]
     assert all(event.label != "none" for event in decided)
@@ -97,9 +106,15 @@ def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
     assert [event.flags for event in decided] == [("skin_motion",)] * 2
 
 
-def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(model, make_touch):
+def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(
+    model, make_touch
+):
     events = watch(model, make_touch(kind="soft", seed=3))
-    assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (1.4, Decided), (1.4, Decided)]
+    assert [(t, type(e)) for t, e in events] == [
+        (0.21, Onset),
+        (1.4, Decided),
+        (1.4, Decided),
+    ]
     decided = events[1][1]
     assert decided.task == "category"
     assert decided.label == "soft-fixed"
@@ -125,7 +140,9 @@ def without_a_pose(touch):
         (without_a_pose, ("missing_pose",)),
     ],
 )  # fmt: skip
-def test_a_new_touch_is_flagged_only_where_something_is_missing(model, make_touch, change, flags):
+def test_a_new_touch_is_flagged_only_where_something_is_missing(
+    model, make_touch, change, flags
+):
     events = [e for _, e in watch(model, change(make_touch(kind="soft", seed=99)))]
     assert [e.flags for e in events if isinstance(e, Decided)] == [flags] * 2
 
@@ -139,23 +156,35 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     strong = replace(recording, meta={**recording.meta, "skin": skin})
     decided = [e for e in Classifier(model).classify(strong) if isinstance(e, Decided)]
     assert [e.flags for e in decided] == [("out_of_range",)] * 2
-    assert [(bool(e.label), bool(e.decision)) for e in decided] == [(labelled, labelled)] * 2
+    assert [(bool(e.label), bool(e.decision)) for e in decided] == [
+        (labelled, labelled)
+    ] * 2
 
 
-def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(exported, make_touch, monkeypatch):
+def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
+    exported, make_touch, monkeypatch
+):
     broken = Model(exported / "model.onnx")
     monkeypatch.setattr(broken, "_session", None)
     with pytest.raises(InputError, match="cannot be run .*; copy or export it again"):
         list(Classifier(broken).classify(make_touch()))
 
 
-def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(model, make_touch):
+def test_a_stream_that_ends_inside_the_window_is_decided_at_its_end_and_flagged(
+    model, make_touch
+):
     events = watch(model, make_touch(seconds=0.5))
-    assert [(t, type(e)) for t, e in events] == [(0.21, Onset), (None, Decided), (None, Decided)]
+    assert [(t, type(e)) for t, e in events] == [
+        (0.21, Onset),
+        (None, Decided),
+        (None, Decided),
+    ]
     assert "short" in events[1][1].flags
 
 
-def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(model, make_touch):
+def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
+    model, make_touch
+):
     touch = make_touch(seconds=0.5)
     events = watch(model, in_a_row(touch, touch, rest=40))
     kinds = [type(e) for _, e in events]
@@ -188,6 +217,8 @@ def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm)
         Classifier(model, replace(forearm, cols=23))
     with pytest.raises(InputError, match="here: has no joint angles"):
         require_joints(model, None, "here")
-    with pytest.raises(InputError, match="here: has 3 joint angles, but the model needs 5"):
+    with pytest.raises(
+        InputError, match="here: has 3 joint angles, but the model needs 5"
+    ):
         require_joints(model, 3, "here")
     require_joints(model, 5, "here")

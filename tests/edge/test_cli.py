@@ -74,7 +74,9 @@ def test_quiet_leaves_errors(flag, said, capsys, monkeypatch):
     monkeypatch.setattr("edge.commands.check.run", run)
     top = cli.parser(["check"])
     assert cli.dispatch(top, ["check", flag, "skin.toml"]) == 0
-    assert capsys.readouterr().err == "".join(f"edge-classify: {word}\n" for word in said)
+    assert capsys.readouterr().err == "".join(
+        f"edge-classify: {word}\n" for word in said
+    )
     assert logging.getLogger("edge").handlers == []
 
 
@@ -94,12 +96,16 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
 
 
 @pytest.mark.parametrize(("error", "status"), [(InputError, 2), (BusMissing, 3)])
-def test_bad_input_is_one_sentence_and_exit_2_and_a_device_exit_3(capsys, error, status):
+def test_bad_input_is_one_sentence_and_exit_2_and_a_device_exit_3(
+    capsys, error, status
+):
     assert cli.dispatch(top(raising(error("a: not there"))), []) == status
     assert capsys.readouterr().err == "edge-classify: a: not there\n"
 
 
-def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(capsys, monkeypatch):
+def test_ctrl_c_is_exit_130_and_quiet_also_while_the_program_is_loaded(
+    capsys, monkeypatch
+):
     assert cli.dispatch(top(raising(KeyboardInterrupt())), []) == 130
     monkeypatch.setattr(cli, "import_module", raising(KeyboardInterrupt()))
     monkeypatch.setattr("sys.argv", ["edge-classify", "check", "skin.toml"])
@@ -122,7 +128,8 @@ def test_an_error_of_the_program_is_not_hidden():
 
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_a_stream_that_was_closed_before_the_start_is_no_traceback(closed, tmp_path):
-    """Nor does a file that is opened later take its descriptor, and get what is printed."""
+    """Nor does a file that is opened later take its descriptor, and get what is
+    printed."""
     log = tmp_path / "log"
     command = f"{sys.executable} -m edge check {skinfile.shipped()} {closed}"
     redirected = f"({command}) > {log}.out 2> {log}.err; echo $? > {log}.status"

@@ -1,4 +1,5 @@
-"""The clock of the board never goes back, and a moment that has passed is not waited for."""
+"""The clock of the board never goes back, and a moment that has passed is not waited
+for."""
 
 import time
 
@@ -16,6 +17,8 @@ def test_it_returns_no_sooner_than_it_was_asked_to():
 
 def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):
     clock = SystemClock()
-    monkeypatch.setattr(time, "sleep", lambda seconds: pytest.fail(f"slept {seconds} s"))
+    monkeypatch.setattr(
+        time, "sleep", lambda seconds: pytest.fail(f"slept {seconds} s")
+    )
     clock.sleep_until(clock.now() - 1.0)
     clock.sleep_until(clock.now())

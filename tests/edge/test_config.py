@@ -1,10 +1,19 @@
-"""One way to say what is wrong with a value: the sentence names file, key, wish and value."""
+"""One way to say what is wrong with a value: the sentence names file, key, wish and
+value."""
 
 import json
 
 import pytest
 
-from edge.config import ConfigTable, json_file, parse_json, parse_toml, read_json, read_toml, shown
+from edge.config import (
+    ConfigTable,
+    json_file,
+    parse_json,
+    parse_toml,
+    read_json,
+    read_toml,
+    shown,
+)
 from edge.errors import InputError
 
 HUGE, BEYOND_FLOATS = 10**5000, 10**400
@@ -12,7 +21,11 @@ HUGE, BEYOND_FLOATS = 10**5000, 10**400
 
 def said(check):
     with pytest.raises(InputError) as caught:
-        check(ConfigTable({"a": "x", "n": 7, "h": HUGE, "f": BEYOND_FLOATS}, "my.toml", "read."))
+        check(
+            ConfigTable(
+                {"a": "x", "n": 7, "h": HUGE, "f": BEYOND_FLOATS}, "my.toml", "read."
+            )
+        )
     return str(caught.value)
 
 
@@ -21,15 +34,30 @@ def said(check):
     [
         (lambda t: t.whole("a"), "my.toml: read.a must be a whole number from 0 to"),
         (lambda t: t.whole("n", allowed=(1, 2)), "read.n must be one of 1, 2, not 7"),
-        (lambda t: t.whole("n", allowed=range(0x70, 0x78), form="#04x"), "must be 0x70 to 0x77"),
+        (
+            lambda t: t.whole("n", allowed=range(0x70, 0x78), form="#04x"),
+            "must be 0x70 to 0x77",
+        ),
         (lambda t: t.whole("z"), "my.toml: read.z is missing"),
-        (lambda t: t.whole("h", allowed=range(9)), "0 to 8, not a number of thousands of digits"),
+        (
+            lambda t: t.whole("h", allowed=range(9)),
+            "0 to 8, not a number of thousands of digits",
+        ),
         (lambda t: t.number("a"), "read.a must be a finite number, not 'x'"),
-        (lambda t: t.number("n", low=8), "read.n must be a number of at least 8, not 7"),
-        (lambda t: t.number("n", low=7, open_low=True), "must be a number above 7, not 7"),
+        (
+            lambda t: t.number("n", low=8),
+            "read.n must be a number of at least 8, not 7",
+        ),
+        (
+            lambda t: t.number("n", low=7, open_low=True),
+            "must be a number above 7, not 7",
+        ),
         (lambda t: t.number("n", low=0, high=5), "must be a number from 0 to 5, not 7"),
         (lambda t: t.number("f"), "read.f must be a finite number, not 1000000"),
-        (lambda t: t.number("h"), "must be a finite number, not a number of thousands of digits"),
+        (
+            lambda t: t.number("h"),
+            "must be a finite number, not a number of thousands of digits",
+        ),
         (lambda t: t.flag("n"), "read.n must be true or false, not 7"),
         (lambda t: t.text("n"), "read.n must be text, not 7"),
         (lambda t: t.choice("a", ("b", "c")), "read.a must be one of b, c, not 'x'"),
@@ -38,7 +66,10 @@ def said(check):
         (lambda t: t.texts("n"), "read.n must be a list of texts"),
         (lambda t: t.pair("n"), "read.n must be [row, col], not 7"),
         (lambda t: t.table("n"), "my.toml: read.n must be a table, not 7"),
-        (lambda t: ConfigTable(7, "a.npz: meta.arm"), "a.npz: meta.arm must be a table, not 7"),
+        (
+            lambda t: ConfigTable(7, "a.npz: meta.arm"),
+            "a.npz: meta.arm must be a table, not 7",
+        ),
         (lambda t: t.tables("n", "bus"), "read.n must be a list of tables, not 7"),
         (lambda t: (t.whole("n"), t.done()), "unknown key read.a; allowed: n"),
     ],
@@ -49,7 +80,11 @@ def test_each_mistake_is_one_sentence(check, sentence):
 
 def test_what_is_right_is_taken_as_it_is():
     table = ConfigTable({"n": 1, "t": "x", "l": [1, 2.5], "null": None}, "f")
-    assert (table.number("n"), table.text("t"), table.numbers("l")) == (1.0, "x", (1.0, 2.5))
+    assert (table.number("n"), table.text("t"), table.numbers("l")) == (
+        1.0,
+        "x",
+        (1.0, 2.5),
+    )
     assert table.whole("null", 3) == 3  # JSON's null is as good as none
     table.done()
 
@@ -57,7 +92,9 @@ def test_what_is_right_is_taken_as_it_is():
 def test_a_table_in_a_list_is_called_by_its_number():
     (bus,) = ConfigTable({"bus": [{"device": 1}]}, "f").tables("bus", "bus")
     bus.has("clock")
-    with pytest.raises(InputError, match="f: bus 0: unknown key device; allowed: clock"):
+    with pytest.raises(
+        InputError, match="f: bus 0: unknown key device; allowed: clock"
+    ):
         bus.done()
 
 
@@ -86,7 +123,9 @@ def test_json_is_read_with_its_own_name_and_mend(tmp_path):
     path.write_text(json.dumps({"a": 1}))
     assert read_json(path) == {"a": 1}
     with (
-        pytest.raises(InputError, match=r"not a board file: 'stages' is missing; bench again"),
+        pytest.raises(
+            InputError, match=r"not a board file: 'stages' is missing; bench again"
+        ),
         json_file(path, "a board file", "bench again") as found,
     ):
         found["stages"]

@@ -8,12 +8,33 @@ from edge.events import Decided, Release, json_line
 
 def test_an_event_is_what_a_line_of_json_says():
     decided = Decided(
-        "t", "a", 0.5, 1.2, 0.25, 0.3, ("unsure",), error=0.1, stopped_by="window", contact=2
+        "t",
+        "a",
+        0.5,
+        1.2,
+        0.25,
+        0.3,
+        ("unsure",),
+        error=0.1,
+        stopped_by="window",
+        contact=2,
     )
-    said = {"task": "t", "label": "a", "confidence": 0.5, "flags": ["unsure"], "place": None}
+    said = {
+        "task": "t",
+        "label": "a",
+        "confidence": 0.5,
+        "flags": ["unsure"],
+        "place": None,
+    }
     times = {"onset_s": 0.25, "window_s": 1.2, "latency_ms": 0.3}
     early = {"error": 0.1, "stopped_by": "window"}
-    assert decided.to_dict() == {"event": "decision", "contact": 2, **said, **times, **early}
+    assert decided.to_dict() == {
+        "event": "decision",
+        "contact": 2,
+        **said,
+        **times,
+        **early,
+    }
     release = {"event": "release", "contact": 2, "onset_s": 0.25, "release_s": 2.5}
     assert Release(0.25, 2.5, contact=2).to_dict() == release
 

@@ -1,4 +1,5 @@
-"""Files at their edge: only regular ones are read, and those that are written are whole."""
+"""Files at their edge: only regular ones are read, and those that are written are
+whole."""
 
 import os
 
@@ -42,7 +43,9 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path):
     with (tmp_path / "large").open("wb") as file:
         file.truncate(1 << 40)  # takes no room
     with (
-        pytest.raises(InputError, match="1099511627776 bytes; a file of this kind has at most 100"),
+        pytest.raises(
+            InputError, match="1099511627776 bytes; a file of this kind has at most 100"
+        ),
         open_regular(tmp_path / "large", 100),
     ):
         raise AssertionError
@@ -53,11 +56,21 @@ class Strange(BaseException):
 
 
 @pytest.mark.parametrize(
-    "error", [ValueError("bad"), KeyError("k"), OverflowError(), MemoryError(), RecursionError()]
+    "error",
+    [
+        ValueError("bad"),
+        KeyError("k"),
+        OverflowError(),
+        MemoryError(),
+        RecursionError(),
+    ],
 )
 def test_whatever_a_parser_raises_becomes_a_sentence(error):
     sentence = "^file: not a log: .+; log again$"
-    with pytest.raises(InputError, match=sentence), parsing("file", "a log", "; log again"):
+    with (
+        pytest.raises(InputError, match=sentence),
+        parsing("file", "a log", "; log again"),
+    ):
         raise error
 
 
@@ -80,7 +93,10 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
 
 def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
     path = tmp_path / "a"
-    with pytest.raises(NameTaken, match="exists already"), write_whole(path, overwrite=False) as f:  # noqa: PT012
+    with (
+        pytest.raises(NameTaken, match="exists already"),
+        write_whole(path, overwrite=False) as f,
+    ):  # noqa: PT012
         f.write(b"mine")
         path.write_text("theirs")
     assert (path.read_text(), os.listdir(tmp_path)) == ("theirs", ["a"])
@@ -104,7 +120,9 @@ def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeyp
     order = []
     fsync, replace = os.fsync, os.replace
     monkeypatch.setattr(os, "fsync", lambda fd: order.append("fsync") or fsync(fd))
-    monkeypatch.setattr(os, "replace", lambda *names: order.append("name") or replace(*names))
+    monkeypatch.setattr(
+        os, "replace", lambda *names: order.append("name") or replace(*names)
+    )
     with write_whole(tmp_path / "a") as file:
         file.write(b"x")
     assert order == ["fsync", "name", "fsync"]
@@ -134,7 +152,10 @@ def test_a_file_has_the_rights_that_the_user_gives_to_new_ones(tmp_path):
 def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
     (tmp_path / "file").write_text("")
     check_writable(tmp_path / "new" / "folder")
-    reasons = {tmp_path / "file" / "folder": "Not a directory", "a\0b": "embedded null byte"}
+    reasons = {
+        tmp_path / "file" / "folder": "Not a directory",
+        "a\0b": "embedded null byte",
+    }
     for folder, reason in {**reasons, "/proc/none": "No such file"}.items():
         with pytest.raises(InputError, match=f"cannot be written: {reason}"):
             check_writable(folder)
@@ -142,7 +163,11 @@ def test_a_folder_that_cannot_be_written_is_known_beforehand(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "why"),
-    [("fifo", "it is not a regular file"), ("folder", "it is not"), ("a\0b", "a null character")],
+    [
+        ("fifo", "it is not a regular file"),
+        ("folder", "it is not"),
+        ("a\0b", "a null character"),
+    ],
 )
 def test_what_is_no_regular_file_is_not_replaced_by_one(tmp_path, name, why):
     os.mkfifo(tmp_path / "fifo")

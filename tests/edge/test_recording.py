@@ -24,7 +24,9 @@ def test_what_is_saved_is_loaded(make_touch, tmp_path):
     recording = make_touch()
     valid = np.ones(recording.frames.shape, dtype=bool)
     valid[3, 4, 5] = False
-    full = Recording(recording.t, recording.frames, recording.joints, valid, recording.meta)
+    full = Recording(
+        recording.t, recording.frames, recording.joints, valid, recording.meta
+    )
     save(tmp_path / "a.npz", full)
     back = load(tmp_path / "a.npz")
     for name in ("t", "frames", "joints", "valid"):
@@ -42,7 +44,9 @@ def test_named_joints_are_given_in_the_order_asked_for(make_touch):
     picked = recording.for_joints(["shoulder", "elbow"], "a.npz")
     np.testing.assert_array_equal(picked.joints, recording.joints[:, [2, 1]])
     assert picked.joint_names == ("shoulder", "elbow")
-    with pytest.raises(InputError, match=r"a.npz: no angle of the arm's joint wrist; there are w"):
+    with pytest.raises(
+        InputError, match=r"a.npz: no angle of the arm's joint wrist; there are w"
+    ):
         recording.for_joints(["wrist", "elbow"], "a.npz")
     assert touch.for_joints(["a", "b"]) is touch
 
@@ -70,12 +74,18 @@ def named(*joints):
 
 WRONG = {
     "no t": (lambda a: {k: v for k, v in a.items() if k != "t"}, "t is missing"),
-    "no frames": (lambda a: {k: v for k, v in a.items() if k != "frames"}, "frames is missing"),
+    "no frames": (
+        lambda a: {k: v for k, v in a.items() if k != "frames"},
+        "frames is missing",
+    ),
     "fractions": (
         change(frames=np.full((180, 16, 24), 1.5)),
         r"frames are float64 up to 1.5, with fractions.*scale=10000\), with the same scale for all",
     ),
-    "large frames": (change(frames=np.full((180, 16, 24), 70000)), r"up to 70000;.*scale=0.1\)"),
+    "large frames": (
+        change(frames=np.full((180, 16, 24), 70000)),
+        r"up to 70000;.*scale=0.1\)",
+    ),
     "negative frames": (
         change(frames=np.full((180, 16, 24), -3)),
         "go down to -3, but counts are above baseline: subtract the frame before touch, then use",
@@ -84,7 +94,10 @@ WRONG = {
         change(frames=np.full((180, 16, 24), np.nan)),
         "mark the taxels in `valid`",
     ),
-    "complex frames": (change(frames=np.ones((180, 16, 24), complex)), "frames must be uint16"),
+    "complex frames": (
+        change(frames=np.ones((180, 16, 24), complex)),
+        "frames must be uint16",
+    ),
     "rows below 0": (
         change(
             frames=np.ones((180, 384), np.uint16),
@@ -92,41 +105,85 @@ WRONG = {
         ),
         'give their "rows" and "cols"',
     ),
-    "rows unknown": (change(frames=np.ones((180, 384), np.uint16)), 'give their "rows" and "cols"'),
-    "no frame": (lambda a: {**a, "frames": a["frames"][:0], "t": a["t"][:0]}, "frames are empty"),
+    "rows unknown": (
+        change(frames=np.ones((180, 384), np.uint16)),
+        'give their "rows" and "cols"',
+    ),
+    "no frame": (
+        lambda a: {**a, "frames": a["frames"][:0], "t": a["t"][:0]},
+        "frames are empty",
+    ),
     "short t": (lambda a: {**a, "t": a["t"][1:]}, r"t must be float64 \(180,\)"),
     "whole t": (lambda a: {**a, "t": a["t"].astype(int)}, "t must be float64"),
     "t goes back": (
         lambda a: {**a, "t": np.append(a["t"][1:], 0.0)},
         "time goes back at frame 179",
     ),
-    "t not finite": (lambda a: {**a, "t": a["t"] * np.nan}, "t of frame 0 is not finite"),
+    "t not finite": (
+        lambda a: {**a, "t": a["t"] * np.nan},
+        "t of frame 0 is not finite",
+    ),
     "joints not finite": (
-        lambda a: {**a, "joints": np.where(np.arange(180)[:, None] == 7, np.inf, a["joints"])},
+        lambda a: {
+            **a,
+            "joints": np.where(np.arange(180)[:, None] == 7, np.inf, a["joints"]),
+        },
         "joint angle of frame 7 is not finite",
     ),
-    "few joints": (lambda a: {**a, "joints": a["joints"][1:]}, "joints must be float64"),
+    "few joints": (
+        lambda a: {**a, "joints": a["joints"][1:]},
+        "joints must be float64",
+    ),
     "no joint": (
         lambda a: {**a, "joints": a["joints"][:, :0]},
         r"joints must be float64 \(180, 1\)",
     ),
-    "valid of another shape": (change(valid=np.ones((2, 2), bool)), "valid must be bool"),
+    "valid of another shape": (
+        change(valid=np.ones((2, 2), bool)),
+        "valid must be bool",
+    ),
     "meta no text": (change(meta=np.array(3)), "meta must be one JSON text"),
     "meta no JSON": (change(meta=np.array("{")), "meta: not JSON"),
     "meta no object": (change(meta=np.array("[1]")), "meta must be a JSON object"),
-    "meta with NaN": (change(meta=np.array('{"a": NaN}')), "the number NaN is not finite"),
-    "labels no text": (change(meta=np.array('{"labels": {"a": true}}')), "meta.labels must map"),
-    "few joint names": (named("a"), "number of meta.joint_names is 1, of joint angles 5"),
-    "a joint name twice": (named(*"abcda"), "meta.joint_names must be a list of different names"),
-    "joint names no text": (named(1, 2, 3, 4, 5), "meta.joint_names must be a list of different"),
-    "another skin": (change(meta=np.array('{"skin": {"rows": 3}}')), "frames are 16 x 24"),
-    "no scale": (change(meta=np.array('{"skin": {"counts_per_newton": -1}}')), "above 0"),
-    "objects": (change(meta=np.array([None], dtype=object)), "Object arrays cannot be loaded"),
+    "meta with NaN": (
+        change(meta=np.array('{"a": NaN}')),
+        "the number NaN is not finite",
+    ),
+    "labels no text": (
+        change(meta=np.array('{"labels": {"a": true}}')),
+        "meta.labels must map",
+    ),
+    "few joint names": (
+        named("a"),
+        "number of meta.joint_names is 1, of joint angles 5",
+    ),
+    "a joint name twice": (
+        named(*"abcda"),
+        "meta.joint_names must be a list of different names",
+    ),
+    "joint names no text": (
+        named(1, 2, 3, 4, 5),
+        "meta.joint_names must be a list of different",
+    ),
+    "another skin": (
+        change(meta=np.array('{"skin": {"rows": 3}}')),
+        "frames are 16 x 24",
+    ),
+    "no scale": (
+        change(meta=np.array('{"skin": {"counts_per_newton": -1}}')),
+        "above 0",
+    ),
+    "objects": (
+        change(meta=np.array([None], dtype=object)),
+        "Object arrays cannot be loaded",
+    ),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(case, make_touch, tmp_path):
+def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(
+    case, make_touch, tmp_path
+):
     damage, sentence = WRONG[case]
     path = tmp_path / "wrong.npz"
     np.savez(path, **damage(arrays_of(make_touch())))
@@ -143,11 +200,19 @@ def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path
     given = Recording(np.array([0.0, 0.5], np.float32), counts.astype(kind), meta=meta)
     save(tmp_path / "a.npz", given)
     back = load(tmp_path / "a.npz")
-    assert (back.frames.dtype, back.t.dtype) == (np.dtype(np.uint16), np.dtype(np.float64))
+    assert (back.frames.dtype, back.t.dtype) == (
+        np.dtype(np.uint16),
+        np.dtype(np.float64),
+    )
     assert (back.frames == counts.reshape(2, 3, 4)).all()
     assert back.labels == {"object": "3"}
     text = json.dumps({"labels": {"object": 3}, "skin": {"rows": 3, "cols": 4}})
-    np.savez(tmp_path / "b.npz", t=np.array([0.0, 0.5]), frames=counts.astype(kind), meta=text)
+    np.savez(
+        tmp_path / "b.npz",
+        t=np.array([0.0, 0.5]),
+        frames=counts.astype(kind),
+        meta=text,
+    )
     assert (load(tmp_path / "b.npz").frames == back.frames).all()
     assert load(tmp_path / "b.npz").labels == back.labels
 
@@ -168,7 +233,10 @@ def test_other_units_are_scaled_by_the_factor_that_is_given_and_kept(tmp_path):
     ("factor", "said"),
     [
         (1.0, ""),
-        (1e3, "has a median of 0.1 frames a second; t is in seconds, and these may be in millisec"),
+        (
+            1e3,
+            "has a median of 0.1 frames a second; t is in seconds, and these may be in millisec",
+        ),
         (1e9, "these may be in nanoseconds"),
         (1e-3, "has a median of 100000 frames a second; t is in seconds"),
         (0.0, "t is in seconds"),
@@ -198,7 +266,11 @@ def test_a_name_too_long_to_be_looked_up_is_left_to_the_reader(tmp_path):
 
 def test_a_header_that_claims_more_than_the_file_holds_takes_no_memory(tmp_path):
     path = tmp_path / "huge.npz"
-    for kind, shape in (("<u2", (10**9, 16, 24)), ("<u2", (1 << 30,)), ("<U500000000", (1,))):
+    for kind, shape in (
+        ("<u2", (10**9, 16, 24)),
+        ("<u2", (1 << 30,)),
+        ("<U500000000", (1,)),
+    ):
         header = io.BytesIO()
         claim = {"descr": kind, "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, claim)
@@ -213,5 +285,7 @@ def test_a_header_that_claims_more_than_the_file_holds_takes_no_memory(tmp_path)
 def test_arrays_that_unpack_to_more_than_the_limit_are_refused(tmp_path):
     path = tmp_path / "bomb.npz"
     np.savez_compressed(path, frames=np.zeros(LARGEST_BYTES, np.uint8))
-    with pytest.raises(InputError, match="claims arrays of more than 134217728 bytes; split it"):
+    with pytest.raises(
+        InputError, match="claims arrays of more than 134217728 bytes; split it"
+    ):
         load(path)

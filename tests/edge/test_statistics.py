@@ -1,4 +1,5 @@
-"""Wilson's interval: its ends are the roots of a quadratic, held against whole fractions."""
+"""Wilson's interval: its ends are the roots of a quadratic, held against whole
+fractions."""
 
 from fractions import Fraction
 
@@ -8,7 +9,9 @@ from scipy.stats import norm
 from edge.statistics import wilson
 
 
-@pytest.mark.parametrize(("right", "total"), [(0, 1), (1, 1), (7, 10), (139, 140), (8 / 2.5, 56)])
+@pytest.mark.parametrize(
+    ("right", "total"), [(0, 1), (1, 1), (7, 10), (139, 140), (8 / 2.5, 56)]
+)
 def test_the_ends_are_the_roots_of_the_score_equation_within_rounding(right, total):
     z, n = Fraction(norm.ppf(0.975)), Fraction(total)
     p = Fraction(right) / n

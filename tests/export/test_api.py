@@ -20,14 +20,20 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
     assert all(check.passed for check in verify(model, tmp_path / "golden.npz"))
     assert model.info.tasks["object"].projection == "pca"
     assert model.info.tasks["object"].left_out == "trial"
-    assert model.info.tasks["object"].accuracy == fitted.chosen["object"].accuracy.accuracy
+    assert (
+        model.info.tasks["object"].accuracy == fitted.chosen["object"].accuracy.accuracy
+    )
 
 
-def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(fitted, recordings, tmp_path):
+def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(
+    fitted, recordings, tmp_path
+):
     path = tmp_path / "model.onnx"
     export.save(path, fitted, "pads")
     model = Model(path)
-    assert model.info.trials == tuple(f"{kind}_{i}" for kind in ("hard", "soft") for i in range(8))
+    assert model.info.trials == tuple(
+        f"{kind}_{i}" for kind in ("hard", "soft") for i in range(8)
+    )
     assert model.named == f"pads {hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
     decided = list(Classifier(model).classify(load(recordings / "soft_3.npz")))[1]
     assert decided.nearest[0] == "soft_3"
@@ -59,7 +65,9 @@ def test_each_candidate_has_a_price(fitted):
 def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     fitted = train.fit(str(recordings), features=["paper", "contact"], jobs=1, k=1)
     own = {
-        "category": replace(fitted.chosen["category"].choice, features=("log_max_force@5",)),
+        "category": replace(
+            fitted.chosen["category"].choice, features=("log_max_force@5",)
+        ),
         "object": fitted.chosen["object"].choice,
     }
     names, widths = fitted.dataset.names, fitted.dataset.widths(fitted.samples)

@@ -1,4 +1,5 @@
-"""Time, size and labels of a model in other number formats, on the committed golden model."""
+"""Time, size and labels of a model in other number formats, on the committed golden
+model."""
 
 import json
 from pathlib import Path
@@ -23,19 +24,27 @@ def rows(monkeypatch):
 
 
 def test_each_format_has_its_price_and_the_shipped_one_no_other_label(rows):
-    assert [row["format"].split()[0] for row in rows] == ["whole", "float64,", "float32", "int8"]
+    assert [row["format"].split()[0] for row in rows] == [
+        "whole",
+        "float64,",
+        "float32",
+        "int8",
+    ]
     assert all(tuple(row) == FORMAT and row["decision us"] > 0.0 for row in rows)
     assert rows[0]["other labels %"] == rows[0]["other distances alone %"] == 0.0
 
 
-@pytest.mark.parametrize("file", ["golden/golden.npz", "../edge/demo/pillow-movable.npz"])
+@pytest.mark.parametrize(
+    "file", ["golden/golden.npz", "../edge/demo/pillow-movable.npz"]
+)
 def test_a_golden_file_of_another_model_is_named(file):
     with pytest.raises(InputError, match=r"has no vectors of \d+ features"):
         arithmetic.compare(MODEL, GOLDEN.parent / file)
 
 
 def test_labels_that_differ_are_counted(monkeypatch):
-    """A copy that answers every second vector otherwise has half of the labels wrong."""
+    """A copy that answers every second vector otherwise has half of the labels
+    wrong."""
     monkeypatch.setattr(arithmetic, "in_int8", lambda model, folder: model)
     shipped = np.zeros((2, 8), np.int64)
     answers = iter([shipped, shipped, shipped + np.arange(8) % 2, shipped + 1])
@@ -59,7 +68,9 @@ def test_the_copy_that_rounds_nothing_has_all_other_operators():
 def test_the_copy_in_float32_has_no_float64_left():
     copy = arithmetic.in_float32(onnx.load(GOLDEN / "model.onnx"))
 
-    assert all(tensor.data_type != onnx.TensorProto.DOUBLE for tensor in copy.graph.initializer)
+    assert all(
+        tensor.data_type != onnx.TensorProto.DOUBLE for tensor in copy.graph.initializer
+    )
     onnx.checker.check_model(copy, full_check=True)
 
 

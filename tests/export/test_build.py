@@ -26,8 +26,12 @@ class Names:
         tensor.name = name
         self.initial.append(tensor)
 
-    def add_node(self, operator, inputs, outputs, op_version=None, name=None, **attributes):
-        self.nodes.append(helper.make_node(operator, inputs, outputs, name=name, **attributes))
+    def add_node(
+        self, operator, inputs, outputs, op_version=None, name=None, **attributes
+    ):
+        self.nodes.append(
+            helper.make_node(operator, inputs, outputs, name=name, **attributes)
+        )
 
 
 @pytest.fixture
@@ -44,7 +48,9 @@ def graph():
         opset = [helper.make_opsetid("", OPSET)]
         model = helper.make_model(made, opset_imports=opset, ir_version=8)
         onnx.checker.check_model(model)
-        return onnxruntime.InferenceSession(model.SerializeToString()).run([output], {"x": x})[0]
+        return onnxruntime.InferenceSession(model.SerializeToString()).run(
+            [output], {"x": x}
+        )[0]
 
     return Builder(names, names), names, run
 
@@ -53,7 +59,16 @@ def test_equal_constants_are_stored_once(graph):
     build, names, _ = graph
     assert build.constant(2.0) == build.constant(2.0)
     assert build.ints(1, 2) == build.ints(1, 2)
-    assert len({build.constant(2.0), build.constant([2.0]), build.constant(2.0, np.float32)}) == 3
+    assert (
+        len(
+            {
+                build.constant(2.0),
+                build.constant([2.0]),
+                build.constant(2.0, np.float32),
+            }
+        )
+        == 3
+    )
     assert build.constant(0.0) != build.constant(-0.0)
     assert len(names.initial) == 5 + 1
 
@@ -61,7 +76,9 @@ def test_equal_constants_are_stored_once(graph):
 @pytest.mark.parametrize("scaling", ["none", "III"])
 def test_the_graph_projects_to_the_whole_numbers_of_the_estimator(graph, scaling):
     build, _, run = graph
-    X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(-3, 3).repeat(20)
+    X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(
+        -3, 3
+    ).repeat(20)
     p = Projection(scaling, 7).fit(X)
     z = run(project(build, "x", [p])[0], X)
     assert (z == np.rint(z)).all()
@@ -88,7 +105,9 @@ def test_what_was_cut_off_a_nan_is_no_number(graph):
     assert np.isnan(run(build.clipped("x", [4.0])[1], np.array([[np.nan, 1.0]]))).all()
 
 
-def test_constants_of_several_decision_points_are_stored_in_float32_where_it_holds_them(graph):
+def test_constants_of_several_decision_points_are_stored_in_float32_where_it_holds_them(
+    graph,
+):
     build, names, _ = graph
     build.decision_point = build.constant(1, np.int64)
     kinds = {TensorProto.FLOAT: 2.0**24, TensorProto.DOUBLE: 2.0**24 + 1.0}

@@ -1,4 +1,5 @@
-"""The graph's distances to each label, and the board's stopping, against the estimators."""
+"""The graph's distances to each label, and the board's stopping, against the
+estimators."""
 
 import itertools
 from dataclasses import replace
@@ -55,7 +56,8 @@ def decided(model, recording, error):
 
 
 def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
-    """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there are."""
+    """Labels of 100, 30 and 2 trials: a twentieth, the nearest three, and both there
+    are."""
     rng = np.random.default_rng(0)
     labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
     width = early.info.samples * len(FEATURES)
@@ -85,14 +87,18 @@ def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, fo
 def test_the_board_stops_where_the_rule_does(early, make_touch, error):
     rule = stopping_rules(early, error)["category"]
     for seed in (50, 51, 52):
-        decision = decided(early, make_touch(kind="soft", seed=seed), error)["category"].to_dict()
+        decision = decided(early, make_touch(kind="soft", seed=seed), error)[
+            "category"
+        ].to_dict()
         assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
         assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
         assert decision["error"] == error
         assert 0.0 <= decision["confidence"] <= 1.0
 
 
-def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(early, make_touch, error):
+def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
+    early, make_touch, error
+):
     events = decided(early, make_touch(kind="soft", seed=50, seconds=0.25), error)
     assert list(events) == list(early.info.tasks)
     assert all("short" in event.flags for event in events.values())
@@ -105,7 +111,10 @@ def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule
     waits = replace(early.info.stopping["category"], rules=(rule,))
     monkeypatch.setitem(early.info.stopping, "category", waits)
     category = decided(early, make_touch(seed=50), error)["category"]
-    assert (category.window_s, category.stopped_by) == (early.decision_points_s[1], "window")
+    assert (category.window_s, category.stopped_by) == (
+        early.decision_points_s[1],
+        "window",
+    )
 
 
 def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch, error):
@@ -122,29 +131,41 @@ def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is
 ):
     for task, stopping in early.info.stopping.items():
         hasty = replace(stopping.rules[0], confidence=0.0)
-        monkeypatch.setitem(early.info.stopping, task, replace(stopping, rules=(hasty,)))
+        monkeypatch.setitem(
+            early.info.stopping, task, replace(stopping, rules=(hasty,))
+        )
     known = make_touch(kind="hard", seed=50)
-    strange = replace(known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535))
+    strange = replace(
+        known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535)
+    )
     error = max(stopping.smallest_error for stopping in early.info.stopping.values())
     met, unmet, waited = (
         decided(early, touch, asked)
         for touch, asked in ((known, error), (strange, error), (strange, None))
     )
-    at = [{event.window_s for event in events.values()} for events in (met, unmet, waited)]
+    at = [
+        {event.window_s for event in events.values()} for events in (met, unmet, waited)
+    ]
     assert at == [{0.3}, {1.2}, {1.2}]
     assert early.info.novelty.task == "object"
-    assert all("unknown" in event.flags for event in (*unmet.values(), *waited.values()))
+    assert all(
+        "unknown" in event.flags for event in (*unmet.values(), *waited.values())
+    )
     assert not any("unknown" in event.flags for event in met.values())
     assert unmet["object"].label == "unknown" != waited["object"].label
     assert unmet["category"].label == "rigid-fixed"
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
-    with pytest.raises(InputError, match="cannot be certified; category: the smallest error that"):
+    with pytest.raises(
+        InputError, match="cannot be certified; category: the smallest error that"
+    ):
         Classifier(early, error=0.001)
 
 
-def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early, folder):
+def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(
+    early, folder
+):
     """At every level of optimisation: the default is no constant to be folded."""
     X = load_trials([folder / "data"]).features(early.info.window_s)
     expected = early.run(X)
@@ -158,10 +179,15 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(early,
 
 
 def pressed(make_touch, seeds):
-    """Touches of an object; their category is of its softness and of how hard they are pressed."""
+    """Touches of an object; their category is of its softness and of how hard they are
+    pressed."""
     for kind, press, seed in itertools.product(("hard", "soft"), (4, 5), seeds):
         given = make_touch(kind=kind, seed=seed)
-        labels = {"softness": kind, "mobility": f"by {press}", "category": f"{kind}-by {press}"}
+        labels = {
+            "softness": kind,
+            "mobility": f"by {press}",
+            "category": f"{kind}-by {press}",
+        }
         meta = {**given.meta, "labels": {**labels, "object": f"{kind} {seed % 2}"}}
         frames = (given.frames * (press / 4)).astype(np.uint16)
         yield replace(given, frames=frames, meta=meta)
@@ -173,7 +199,11 @@ def agreeing(make_touch, tmp_path_factory):
     for i, recording in enumerate(pressed(make_touch, range(8))):
         save(folder / f"{i:02d}.npz", recording)
     fitted = train.fit(
-        folder, features=["paper"], decision_points_s=(0.3, 0.6, 1.2), quick=True, jobs=1
+        folder,
+        features=["paper"],
+        decision_points_s=(0.3, 0.6, 1.2),
+        quick=True,
+        jobs=1,
     )
     save_model(folder / "model.onnx", fitted)
     return fitted, Model(folder / "model.onnx")
@@ -192,7 +222,9 @@ def test_no_decision_contradicts_another(agreeing, make_touch, asked):
         assert category.window_s == max(part.window_s for part in parts)
 
 
-def test_the_board_decides_as_the_trials_that_certified_its_rules_were(agreeing, make_touch):
+def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
+    agreeing, make_touch
+):
     fitted, model = agreeing
     recordings = list(pressed(make_touch, range(60, 65)))
     vectors = [
@@ -219,8 +251,9 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
 ):
     """Two tasks; two labels of the further trials are new.
 
-    Without new labels, each trial has a label for one task, and the tasks are of one space. With
-    them, no more than the two trials of `d` vote, and one task takes one of the features.
+    Without new labels, each trial has a label for one task, and the tasks are of one
+    space. With them, no more than the two trials of `d` vote, and one task takes one of
+    the features.
     """
     rng = np.random.default_rng(1)
     y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
@@ -228,7 +261,9 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
     X, more, queries = (rng.normal(size=(3, n, width)) for n in (45, 3, 9))
     of_u = ("contact_area",) if new else FEATURES
     choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1, features=of_u)}
-    sequential, before = fitted_model(tmp_path / "model.onnx", early.info, choices, X, y)
+    sequential, before = fitted_model(
+        tmp_path / "model.onnx", early.info, choices, X, y
+    )
     labels = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
     data = taught(before, ["one", "two", "three"], more, labels, new_labels=new)
     counted = {"t": [1], "u": [0, 2]}
@@ -249,7 +284,9 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
             further = [classes.index(labels[i][task]) for i in known]
             point.labels_[task] = np.array([*point.labels_[task], *further])
             point.classes_[task] = np.array(classes)
-        point.projections_ = {own: point.projections_[own] for own in point.spaces_.values()}
+        point.projections_ = {
+            own: point.projections_[own] for own in point.spaces_.values()
+        }
     (tmp_path / "taught.onnx").write_bytes(data)
     model = Model(tmp_path / "taught.onnx")
     described = replace(before.info, rows=48, tasks=model.info.tasks)
@@ -266,7 +303,11 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
     assert (golden["vectors"][-3:] == more[-1]).all()
     assert (model.info.rows, model.info.taught) == (48, 3)
     assert {t: (e.labels[2:], e.k) for t, e in model.info.tasks.items()} == (
-        {"t": (("c", "d"), 2), "u": (("z",), 1)} if new else {"t": (("c",), 3), "u": ((), 1)}
+        {"t": (("c", "d"), 2), "u": (("z",), 1)}
+        if new
+        else {"t": (("c",), 3), "u": ((), 1)}
     )
-    with pytest.raises(InputError, match=r"taught 3 trials after its error rates were certified"):
+    with pytest.raises(
+        InputError, match=r"taught 3 trials after its error rates were certified"
+    ):
         stopping_rules(model, 0.2)

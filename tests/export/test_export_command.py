@@ -13,15 +13,25 @@ from tests.conftest import PAPER, export
 
 def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, capsys):
     (tmp_path / "file").touch()
-    assert main(["--data", str(tmp_path / "missing"), "--out", str(tmp_path / "file")]) == 2
-    assert capsys.readouterr().err == f"export: {tmp_path}/file: cannot be written: File exists\n"
+    assert (
+        main(["--data", str(tmp_path / "missing"), "--out", str(tmp_path / "file")])
+        == 2
+    )
+    assert (
+        capsys.readouterr().err
+        == f"export: {tmp_path}/file: cannot be written: File exists\n"
+    )
 
 
 def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     export(tmp_path, "--data", recordings, "--quick")
     out = capsys.readouterr()
     lines = out.err.splitlines()
-    rows = [line for line in lines if line.startswith(("paper ", "contact joints ", "moments "))]
+    rows = [
+        line
+        for line in lines
+        if line.startswith(("paper ", "contact joints ", "moments "))
+    ]
     assert [row[:21].split() for row in rows] == [
         ["paper", "pca"],
         ["contact", "joints", "lda"],
@@ -29,13 +39,18 @@ def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     ]
     assert sum(row.count("*") for row in rows) == 2  # one a task
     answers = [line for line in lines if line.startswith(("category:", "object:"))]
-    assert all("of 16 trials are classified correctly (95 % interval " in line for line in answers)
+    assert all(
+        "of 16 trials are classified correctly (95 % interval " in line
+        for line in answers
+    )
     low, high = wilson(6.4, 6.4)
     shown = f"(95 % interval {100 * low:.0f} to {100 * high:.0f})"
     assert shown in answers[0]
     info = Model(tmp_path / "model.onnx").info
     assert f"{info.tasks['category'].accuracy:.1%}" in answers[0]
-    assert set(info.features) == {f for task in info.tasks.values() for f in task.features}
+    assert set(info.features) == {
+        f for task in info.tasks.values() for f in task.features
+    }
     assert out.out.splitlines()[1].endswith("golden.npz")
 
 
@@ -46,8 +61,29 @@ def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
-    fixed = ("--scaling", "II", "--components", 3, "--k", 2, "--window", 0.8, "--threshold", 120)
-    export(tmp_path, "--data", recordings, "--tasks", "object", "--name", "pads", *fixed, *PAPER)
+    fixed = (
+        "--scaling",
+        "II",
+        "--components",
+        3,
+        "--k",
+        2,
+        "--window",
+        0.8,
+        "--threshold",
+        120,
+    )
+    export(
+        tmp_path,
+        "--data",
+        recordings,
+        "--tasks",
+        "object",
+        "--name",
+        "pads",
+        *fixed,
+        *PAPER,
+    )
     info = Model(tmp_path / "model.onnx").info
     assert (info.name, list(info.tasks)) == ("pads", ["object"])
     task = info.tasks["object"]
@@ -63,11 +99,26 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
         (["--threshold", "200", "--onset", "100"], "onset_counts 100 is below"),
         (["--tasks", "colour"], "label 'colour'; all have category, object"),
         (["--data", "."], ".: no .npz recording in this folder"),
-        (["--features", "skin_farce"], "no feature 'skin_farce'; the nearest are skin_force"),
-        (["--decision-points", "0.3,x"], "--decision-points must be like 0.2:1.2:0.1 or"),
-        (["--decision-points", "0:0.6:0.3"], "(seconds above 0) or none, not '0:0.6:0.3'"),
-        (["--decision-points", "0.9:0.6:0.3"], "(seconds above 0) or none, not '0.9:0.6:0.3'"),
-        (["--front", "fast"], "build/tradeoff/front.json: cannot be read: No such file"),
+        (
+            ["--features", "skin_farce"],
+            "no feature 'skin_farce'; the nearest are skin_force",
+        ),
+        (
+            ["--decision-points", "0.3,x"],
+            "--decision-points must be like 0.2:1.2:0.1 or",
+        ),
+        (
+            ["--decision-points", "0:0.6:0.3"],
+            "(seconds above 0) or none, not '0:0.6:0.3'",
+        ),
+        (
+            ["--decision-points", "0.9:0.6:0.3"],
+            "(seconds above 0) or none, not '0.9:0.6:0.3'",
+        ),
+        (
+            ["--front", "fast"],
+            "build/tradeoff/front.json: cannot be read: No such file",
+        ),
     ],
 )
 def test_options_that_make_no_sense_are_one_sentence(
@@ -120,7 +171,9 @@ def test_a_number_outside_its_range_is_refused(option, value, sentence, capsys):
 
 
 def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, capsys):
-    few = [recordings / f"{kind}_{i}.npz" for kind in ("hard", "soft") for i in range(3)]
+    few = [
+        recordings / f"{kind}_{i}.npz" for kind in ("hard", "soft") for i in range(3)
+    ]
     export(tmp_path, "--data", *few, "--components", 20, *PAPER)
     err = capsys.readouterr().err
     assert "span 5 components, 15 fewer than asked for" in err

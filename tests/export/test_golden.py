@@ -34,7 +34,9 @@ def test_trimming_keeps_every_frame_that_the_window_uses(exported, data):
         assert part.valid.shape == part.frames.shape
 
 
-def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_finite(exported):
+def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_finite(
+    exported,
+):
     golden = np.load(exported / "golden.npz")
     trials, vectors = len(golden["onset_s"]), golden["vectors"]
     assert len(golden["start"]) == trials + 1 == 17

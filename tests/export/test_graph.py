@@ -1,4 +1,5 @@
-"""The ONNX graph against Python's whole numbers, the estimators and ONNX's own reference."""
+"""The ONNX graph against Python's whole numbers, the estimators and ONNX's own
+reference."""
 
 from dataclasses import replace
 
@@ -40,23 +41,34 @@ def export(tmp_path):
 
 
 def engines(data, outputs):
-    """Functions that run a model file and return these outputs, by name of the engine."""
+    """Functions that run a model file and return these outputs, by name of the
+    engine."""
     runtime = session(data)
     return {
         "ONNX Runtime": lambda X: runtime.run(outputs, {"features": X}),
-        "onnx.reference": lambda X: ReferenceEvaluator(data).run(outputs, {"features": X}),
+        "onnx.reference": lambda X: ReferenceEvaluator(data).run(
+            outputs, {"features": X}
+        ),
     }
 
 
 def differences(fitted, answers, queries):
-    """Names of the graph's outputs that are not the estimators' answers, bit for bit."""
+    """Names of the graph's outputs that are not the estimators' answers, bit for
+    bit."""
     wrong = []
     for task in fitted.choices:
         distances, rows = fitted.neighbours(task, queries)
-        named = fitted.labels_[task][fitted.nearest(task, fitted.squares(task, queries))]
+        named = fitted.labels_[task][
+            fitted.nearest(task, fitted.squares(task, queries))
+        ]
         winners = vote(named)
         shares = np.eye(len(fitted.classes_[task]))[named].mean(axis=1)
-        expected = {"neighbours": rows, "label": winners, "scores": shares, "distances": distances}
+        expected = {
+            "neighbours": rows,
+            "label": winners,
+            "scores": shares,
+            "distances": distances,
+        }
         wrong += [
             f"{task}_{part}"
             for part, values in expected.items()
@@ -76,12 +88,15 @@ def test_a_task_that_some_trials_lack_names_its_neighbours_by_their_rows(export)
 
 
 def hard_set(kind, draw):
-    """(X, queries) with 24 columns of a kind that is hard for arithmetic that rounds."""
+    """(X, queries) with 24 columns of a kind that is hard for arithmetic that
+    rounds."""
     n = int(draw.integers(4, 40))
     X = draw.normal(size=(n, 24)) * 10.0 ** draw.uniform(-6, 6)
     queries = draw.normal(size=(8, 24)) * np.abs(X).max()
     if kind == "lattice":
-        X = draw.integers(-2, 3, (n, 3)) @ draw.integers(-1, 2, (3, 24)).astype(np.float64)
+        X = draw.integers(-2, 3, (n, 3)) @ draw.integers(-1, 2, (3, 24)).astype(
+            np.float64
+        )
         queries = np.concatenate([X[:4], (X[:4] + X[-4:]) / 2.0])
     elif kind == "duplicates":
         X = X[draw.integers(0, max(n // 3, 1), n)]
@@ -97,13 +112,18 @@ def hard_set(kind, draw):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    kind=st.sampled_from(["plain", "lattice", "duplicates", "offset", "outlier", "far"]),
+    kind=st.sampled_from(
+        ["plain", "lattice", "duplicates", "offset", "outlier", "far"]
+    ),
     projection=st.sampled_from(["pca", "lda"]),
     scaling=st.sampled_from(["none", "III", "IV"]),
     seed=st.integers(0, 10**6),
 )
-def test_every_number_of_the_graph_is_that_of_whole_numbers(kind, projection, scaling, seed):
-    """Coordinates, squared distances, neighbours and labels, by two engines and by training."""
+def test_every_number_of_the_graph_is_that_of_whole_numbers(
+    kind, projection, scaling, seed
+):
+    """Coordinates, squared distances, neighbours and labels, by two engines and by
+    training."""
     X, queries = hard_set(kind, np.random.default_rng(seed))
     k = min(len(X), 5)
     fitted = fit(X, {"t": Choice(scaling, 6, k, projection)}, labels=4)
@@ -118,7 +138,8 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(kind, projection, sc
     assert (fitted.rows_[space][:, :c] / p.grid_.unit).tolist() == rows.tolist()
     outputs = [z_name, "t_distances", "t_neighbours", "t_label"]
     answers = {
-        name: run(queries) for name, run in engines(proto.SerializeToString(), outputs).items()
+        name: run(queries)
+        for name, run in engines(proto.SerializeToString(), outputs).items()
     }
     for z, distances, neighbours, label in answers.values():
         assert z[:, :c].tolist() == points.tolist()
@@ -138,7 +159,9 @@ def test_an_ulp_more_in_every_feature_changes_no_bit(export):
     X, queries = features(60), features(300, seed=1)
     _, model = export(X, {"t": Choice("IV", 6, 5)})
     answers, moved = model.run(queries), model.run(np.nextafter(queries, np.inf))
-    assert [name for name in answers if answers[name].tobytes() != moved[name].tobytes()] == []
+    assert [
+        name for name in answers if answers[name].tobytes() != moved[name].tobytes()
+    ] == []
 
 
 def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
@@ -154,7 +177,10 @@ def test_every_task_of_a_sequential_model_obeys_the_estimators(tmp_path):
 
 @pytest.mark.parametrize(
     "choice",
-    [*(Choice(s, 7, 3) for s in SCALINGS), *(Choice("IV", 3, k) for k in (1, 2, 3, 4, 7, 8, 40))],
+    [
+        *(Choice(s, 7, 3) for s in SCALINGS),
+        *(Choice("IV", 3, k) for k in (1, 2, 3, 4, 7, 8, 40)),
+    ],
 )
 def test_every_scaling_and_number_of_voters_agree_down_to_the_last_tie(export, choice):
     X = features(40)
@@ -186,8 +212,8 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
 
 
 def test_features_within_the_training_set_are_in_range_and_far_ones_are_not(export):
-    """Cut off at 4 to 8 times the largest difference, and at coordinates of twice the longest
-    row: the graph says by how much, over all spaces."""
+    """Cut off at 4 to 8 times the largest difference, and at coordinates of twice the
+    longest row: the graph says by how much, over all spaces."""
     X = features(60)
     _, model = export(X, {"t": Choice("IV", 6, 3), "u": Choice("none", 6, 3)})
     middle = X.mean(axis=0)
@@ -209,4 +235,6 @@ def test_vectors_that_are_not_finite_have_no_label_and_spoil_no_other(export, k)
     answer = model.run(queries)
     assert (answer["t_label"][[1, 2, 3, 4]] == -1).all()
     assert not answer["t_scores"][[1, 2, 3, 4]].any()
-    assert (answer["t_label"][[0, 5, 6, 7]] == model.run(X[[0, 5, 6, 7]])["t_label"]).all()
+    assert (
+        answer["t_label"][[0, 5, 6, 7]] == model.run(X[[0, 5, 6, 7]])["t_label"]
+    ).all()

@@ -1,6 +1,8 @@
-"""Damage valid files: their bytes, words of a text, arrays of an archive, pieces of a model.
+"""Damage valid files: their bytes, words of a text, arrays of an archive, pieces of a
+model.
 
-Each function takes a valid file and a `Random` of hypothesis, which can so shrink the damage.
+Each function takes a valid file and a `Random` of hypothesis, which can so shrink the
+damage.
 """
 
 import io
@@ -18,17 +20,94 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 
 WORDS = (
-    *("0", "-0", "-1", "1", "2", "255", "65535", "65536", "2147483648", "9223372036854775808"),
-    *("1e400", "-1e400", "1e308", "1e-308", "5e-324", "nan", "NaN", "inf", "Infinity", "-inf"),
-    *("9" * 400, "9" * 5000, "0x10", "1_000", "true", "null", "''", '""', "[]", "{}", "[[]]"),
-    *("[" * 3000, "{" * 3000, '{"a":' * 2000, "]" * 50, "\x00", "\n", "\r", "\x85", "\u2028"),
-    *("\x1b[31m", "\x1b]0;x\x07", "\x9b2J", "\u202e", "\ufeff", "\ud800", '"\\ud800"', "é", "𝄞"),
-    *("../../etc/passwd", "/dev/zero", "%s%n", "a" * 70000, "=", ",", "\t", "1979-05-27", "#"),
+    *(
+        "0",
+        "-0",
+        "-1",
+        "1",
+        "2",
+        "255",
+        "65535",
+        "65536",
+        "2147483648",
+        "9223372036854775808",
+    ),
+    *(
+        "1e400",
+        "-1e400",
+        "1e308",
+        "1e-308",
+        "5e-324",
+        "nan",
+        "NaN",
+        "inf",
+        "Infinity",
+        "-inf",
+    ),
+    *(
+        "9" * 400,
+        "9" * 5000,
+        "0x10",
+        "1_000",
+        "true",
+        "null",
+        "''",
+        '""',
+        "[]",
+        "{}",
+        "[[]]",
+    ),
+    *(
+        "[" * 3000,
+        "{" * 3000,
+        '{"a":' * 2000,
+        "]" * 50,
+        "\x00",
+        "\n",
+        "\r",
+        "\x85",
+        "\u2028",
+    ),
+    *(
+        "\x1b[31m",
+        "\x1b]0;x\x07",
+        "\x9b2J",
+        "\u202e",
+        "\ufeff",
+        "\ud800",
+        '"\\ud800"',
+        "é",
+        "𝄞",
+    ),
+    *(
+        "../../etc/passwd",
+        "/dev/zero",
+        "%s%n",
+        "a" * 70000,
+        "=",
+        ",",
+        "\t",
+        "1979-05-27",
+        "#",
+    ),
     *('"\\u0000"', '"\\u001b[2J"', "<!DOCTYPE x>", "&a;", "<", "]]>", "2 0", "0 0 0 0"),
 )
 """Words that have broken readers before, here and elsewhere."""
 TOKENS = re.compile(r"[-+]?\d[\w.+-]*|\"(?:[^\"\\\n]|\\.)*\"|\w+|[\[\]{}()=,:<>/\n]")
-NUMBERS = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 62)
+NUMBERS = (
+    0,
+    1,
+    2,
+    0x7F,
+    0x80,
+    0xFF,
+    0x7FFF,
+    0x8000,
+    0xFFFF,
+    0x7FFFFFFF,
+    0xFFFFFFFF,
+    1 << 62,
+)
 TYPES = ("u1", "i2", ">u2", "f4", ">f8", "c16", "?", "U3", "S2", "M8[s]")
 FLOATS = (np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 1e18, -1.0)
 
@@ -50,7 +129,9 @@ def of_bytes(data: bytes, draw: Random) -> bytes:
         )
         chosen = draw.choice(new)
         out[at : at + draw.choice((0, len(chosen), span))] = chosen
-    return bytes(out[: draw.randrange(len(out) + 1)] if draw.randrange(10) == 9 else out)
+    return bytes(
+        out[: draw.randrange(len(out) + 1)] if draw.randrange(10) == 9 else out
+    )
 
 
 def of_text(data: bytes, draw: Random) -> bytes:
@@ -89,8 +170,19 @@ def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
     kind = draw.choice(TYPES) if array.dtype.kind in "buif" else "S2"
     with np.errstate(all="ignore"):
         shapes = (
-            *(changed, changed, np.zeros(3), rows.astype(kind), rows.reshape(-1), rows[None]),
-            *(rows[: draw.randrange(len(rows) + 1)], np.swapaxes(rows, 0, -1), rows[..., :0]),
+            *(
+                changed,
+                changed,
+                np.zeros(3),
+                rows.astype(kind),
+                rows.reshape(-1),
+                rows[None],
+            ),
+            *(
+                rows[: draw.randrange(len(rows) + 1)],
+                np.swapaxes(rows, 0, -1),
+                rows[..., :0],
+            ),
             np.concatenate([rows] * draw.choice((2, 20))),
         )
     return draw.choice(shapes)
@@ -118,14 +210,17 @@ def bomb() -> bytes:
 
 
 def of_npz(data: bytes, draw: Random) -> bytes:
-    """An array of the archive changed, renamed, exchanged or left out; at times the bytes."""
+    """An array of the archive changed, renamed, exchanged or left out; at times the
+    bytes."""
     if draw.randrange(5) == 4:
         return of_bytes(data, draw)
     with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
         arrays = {key: loaded[key] for key in loaded.files}
     out = io.BytesIO()
     # Stored, mostly; deflated, BZIP2, LZMA.
-    with zipfile.ZipFile(out, "w", draw.choice((0, 0, 0, 0, 0, 0, 8, 12, 14))) as archive:
+    with zipfile.ZipFile(
+        out, "w", draw.choice((0, 0, 0, 0, 0, 0, 8, 12, 14))
+    ) as archive:
         if draw.randrange(100) == 99:
             archive.writestr("more.npy", bomb(), zipfile.ZIP_DEFLATED)
         key = draw.choice(sorted(arrays))
@@ -135,14 +230,17 @@ def of_npz(data: bytes, draw: Random) -> bytes:
             array = arrays[draw.choice(sorted(arrays))]
         if way != 7:
             name = draw.choice(names) if way == 5 else f"{key}.npy"
-            archive.writestr(name, npy(of_array(array, draw) if way < 5 else array, draw))
+            archive.writestr(
+                name, npy(of_array(array, draw) if way < 5 else array, draw)
+            )
         for other, array in arrays.items():
             archive.writestr(f"{other}.npy", npy(array, draw))
     return out.getvalue()
 
 
 def of_onnx(data: bytes, draw: Random) -> bytes:
-    """Metadata, operators, attributes, edges or constants changed; at times the bytes."""
+    """Metadata, operators, attributes, edges or constants changed; at times the
+    bytes."""
     if draw.randrange(3) == 2:
         return of_bytes(data, draw)
     model = onnx.load_from_string(data)
@@ -153,7 +251,9 @@ def of_onnx(data: bytes, draw: Random) -> bytes:
         prop = draw.choice(model.metadata_props)
         prop.value = of_text(prop.value.encode(), draw).decode("utf-8", "replace")
     elif way == 4:
-        node.op_type = draw.choice(["Loop", "Exp", "Identity", *(n.op_type for n in graph.node)])
+        node.op_type = draw.choice(
+            ["Loop", "Exp", "Identity", *(n.op_type for n in graph.node)]
+        )
     elif way == 5 and node.input:
         names = [*(i.name for i in graph.initializer), "features", "", "nowhere"]
         node.input[draw.randrange(len(node.input))] = draw.choice(names)

@@ -24,7 +24,13 @@ from edge.touch.arm import Chain
 from tests.edge.touch.test_urdf import ARM
 from tests.fuzz import mutate
 from tests.train.importers.test_importers import dsa
-from tests.train.importers.test_log_importers import FRAMES, STORES, array, write_bag, write_mcap
+from tests.train.importers.test_log_importers import (
+    FRAMES,
+    STORES,
+    array,
+    write_bag,
+    write_mcap,
+)
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
 from train.touch_map import TouchMap
@@ -95,16 +101,24 @@ def importing(kind: str, *more: str) -> Callable[[Path], None]:
 
 def files(*patterns: str) -> Callable[[], list[bytes]]:
     """The files of the checkout that match."""
-    return lambda: [p.read_bytes() for pattern in patterns for p in sorted(ROOT.glob(pattern))]
+    return lambda: [
+        p.read_bytes() for pattern in patterns for p in sorted(ROOT.glob(pattern))
+    ]
 
 
 def recordings() -> list[bytes]:
-    """A few frames of two shipped recordings, the second with a mask of readable taxels."""
+    """A few frames of two shipped recordings, the second with a mask of readable
+    taxels."""
     out = []
-    for name, more in (("pillow-movable", {}), ("cardboard-box-fixed", {"valid": None})):
+    for name, more in (
+        ("pillow-movable", {}),
+        ("cardboard-box-fixed", {"valid": None}),
+    ):
         arrays = dict(np.load(DEMO / f"{name}.npz"))
         frames = len(arrays["t"])
-        arrays = {k: v[10:90] if v.shape[:1] == (frames,) else v for k, v in arrays.items()}
+        arrays = {
+            k: v[10:90] if v.shape[:1] == (frames,) else v for k, v in arrays.items()
+        }
         file = io.BytesIO()
         masks = dict.fromkeys(more, np.ones(arrays["frames"].shape[1:], bool))
         np.savez(file, **arrays, **masks)
@@ -124,7 +138,9 @@ def read_model(path: Path) -> None:
 def skins() -> list[bytes]:
     """The shipped skins, and the first of them calibrated."""
     shipped = files("edge/skins/*.toml")()
-    rows, noise = (", ".join([f"[{', '.join([x] * 24)}]"] * 16) for x in ("20000", "1.5"))
+    rows, noise = (
+        ", ".join([f"[{', '.join([x] * 24)}]"] * 16) for x in ("20000", "1.5")
+    )
     calibration = f"\n[calibration]\nbaseline = [{rows}]\nnoise = [{noise}]\n"
     return [*shipped, shipped[0] + calibration.encode()]
 
@@ -139,7 +155,13 @@ def read_chain(path: Path) -> None:
 
 HEAD = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
 TOUCH = {
-    **{"event": "decision", "task": "object", "contact": 1, "onset_s": 1.5, "label": "cup"},
+    **{
+        "event": "decision",
+        "task": "object",
+        "contact": 1,
+        "onset_s": 1.5,
+        "label": "cup",
+    },
     **{"place": [0.1, 0.2, 0.3], "confidence": 0.5, "flags": ["tie"]},
 }
 MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
@@ -168,13 +190,19 @@ def logs() -> list[bytes]:
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
     ways: tuple[dict[str, Any], ...]
     ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
-    return [made(lambda path, way=way: write_mcap(path, cdr=False, **way)) for way in ways]
+    return [
+        made(lambda path, way=way: write_mcap(path, cdr=False, **way)) for way in ways
+    ]
 
 
 def bags() -> list[bytes]:
     """A ROS 1 bag of arrays."""
     messages = [array(STORES[1], frame) for frame in FRAMES]
-    return [made(lambda path: write_bag(path.with_suffix(".bag"), 1, messages, joints=False))]
+    return [
+        made(
+            lambda path: write_bag(path.with_suffix(".bag"), 1, messages, joints=False)
+        )
+    ]
 
 
 FRAME_FILES = [

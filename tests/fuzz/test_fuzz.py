@@ -1,4 +1,5 @@
-"""A damaged file ends in an answer or in one sentence, within five seconds and little memory.
+"""A damaged file ends in an answer or in one sentence, within five seconds and little
+memory.
 
 `make fuzz` reads 5,000 files with each reader; `make test` reads a few.
 """
@@ -37,7 +38,9 @@ def limited_memory():
 def memory(key):
     """A figure of /proc/self/status in megabytes."""
     lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith(f"{key}:"))
+    return next(
+        int(line.split()[1]) / 1024 for line in lines if line.startswith(f"{key}:")
+    )
 
 
 def refusal(reader, path):
@@ -65,7 +68,8 @@ def limited_refusal(reader, path):
 
 @pytest.fixture
 def path_for(tmp_path):
-    """Makes the path of a reader's input file, with the files beside it that the reader needs."""
+    """Makes the path of a reader's input file, with the files beside it that the reader
+    needs."""
 
     def path(reader):
         reader.beside(tmp_path / "input")
@@ -121,7 +125,9 @@ BROKE = {
 
 
 @pytest.mark.parametrize(("name", "sentence"), BROKE.items(), ids=BROKE)
-def test_a_file_that_once_broke_a_reader_is_refused_with_a_sentence(name, sentence, path_for):
+def test_a_file_that_once_broke_a_reader_is_refused_with_a_sentence(
+    name, sentence, path_for
+):
     reader = BY_NAME[name.split("-")[0]]
     path = path_for(reader)
     path.write_bytes((CORPUS / name).read_bytes())

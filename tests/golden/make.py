@@ -1,8 +1,9 @@
 """`make golden`: the committed model and its golden outputs, from the demo scene.
 
-Run it when the path, the graph or the format changes on purpose, and say so in the commit: the
-test beside it exists to notice when they change otherwise. The bytes depend on the versions of the
-packages, which the model names, but not on whether numpy and OpenBLAS find AVX-512.
+Run it when the path, the graph or the format changes on purpose, and say so in the
+commit: the test beside it exists to notice when they change otherwise. The bytes depend
+on the versions of the packages, which the model names, but not on whether numpy and
+OpenBLAS find AVX-512.
 """
 
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""The edge against the committed golden outputs, made once on another day and machine."""
+"""The edge against the committed golden outputs, made once on another day and
+machine."""
 
 from pathlib import Path
 

@@ -13,14 +13,18 @@ from tests.hard_cases import margins
 from tests.hard_cases.registry import CASES
 
 COLUMNS = tuple(
-    "case, oracle, measured, bound, worst seen, where, the usual tools, margin, price".split(", ")
+    "case, oracle, measured, bound, worst seen, where, the usual tools, margin, price".split(
+        ", "
+    )
 )
 INDENT = {"initial_indent": " " * 5, "subsequent_indent": " " * 7}
 
 
 def number(value: float) -> str:
     """Short, and whole where it is whole."""
-    return str(int(value)) if value == int(value) and abs(value) < 1e6 else f"{value:.1e}"
+    return (
+        str(int(value)) if value == int(value) and abs(value) < 1e6 else f"{value:.1e}"
+    )
 
 
 def place(at: Mapping[str, Any]) -> str:
@@ -47,17 +51,28 @@ def main(argv: Sequence[str] | None = None) -> int:
         within = worst.error <= case.bound
         beyond += not within
         where = f"{place(worst.at) if worst.error else 'none'} ({worst.tried} tried)"
-        row = (case.key, case.oracle, case.unit, number(case.bound), number(worst.error), where)
+        row = (
+            case.key,
+            case.oracle,
+            case.unit,
+            number(case.bound),
+            number(worst.error),
+            where,
+        )
         rows.append((*row, case.theirs(), margins.margin(case), margins.price(case)))
         took = time.perf_counter() - began
         print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
         for name, text in zip(COLUMNS[1:], rows[-1][1:], strict=True):
             print(textwrap.fill(f"{name}: {text or '-'}", 96, **INDENT))
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows]
-    markdown = "".join("| " + " | ".join(c.replace("|", "\\|") for c in r) + " |\n" for r in lines)
+    markdown = "".join(
+        "| " + " | ".join(c.replace("|", "\\|") for c in r) + " |\n" for r in lines
+    )
     with write_whole(arguments.out / "table.md") as file:
         file.write(markdown.encode())
-    print(f"{len(rows)} cases, {beyond} beyond their bound; {arguments.out / 'table.md'}")
+    print(
+        f"{len(rows)} cases, {beyond} beyond their bound; {arguments.out / 'table.md'}"
+    )
     return 1 if beyond else 0
 
 

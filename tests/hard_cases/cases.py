@@ -38,8 +38,8 @@ class Ladder:
         parameter: its name, in words with its unit.
         values: from easy to hard.
         at: the case's parameters for a value.
-        recordings: where recordings lie on the same scale: the 856 grasps of SDH-2, and the
-            simulated `cody18`.
+        recordings: where recordings lie on the same scale: the 856 grasps of SDH-2, and
+            the simulated `cody18`.
     """
 
     parameter: str
@@ -94,7 +94,8 @@ class Case:
     examples: int = EXAMPLES
     bound: float = 0.0
 
-    # Decompositions of this size only lose by a second thread, most of all beside others.
+    # Decompositions of this size only lose by a second thread, most of all beside
+    # others.
     @threadpool_limits.wrap(limits=1)
     def worst(self) -> Worst:
         """The largest error at the hazard and in the search around it."""

@@ -1,5 +1,5 @@
-"""`python -m tests.hard_cases.elsewhere PYTHON`: hard sets' golden files, by another Python
-of another ONNX Runtime or another architecture.
+"""`python -m tests.hard_cases.elsewhere PYTHON`: hard sets' golden files, by another
+Python of another ONNX Runtime or another architecture.
 """
 
 import argparse
@@ -49,7 +49,9 @@ def ask(
     # -P: the current folder, which may be the checkout, offers no modules.
     command = [*python, "-P", "-c", GUEST, *map(str, sets(golden))]
     environment = {**os.environ, "PYTHONPATH": path}
-    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(
+        command, env=environment, stdout=subprocess.PIPE, text=True, check=True
+    )
     machine: dict[str, Any] = {}
     shares: dict[tuple[str, str], float] = {}
     name = ""
@@ -65,10 +67,13 @@ def ask(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Ask, and say which answer is farthest from its golden value; 1 beyond its bound."""
+    """Ask, and say which answer is farthest from its golden value; 1 beyond its
+    bound."""
     parser = argparse.ArgumentParser(prog="elsewhere", description=__doc__)
     parser.add_argument("--golden", type=Path, default=Path("build/hard-cases/golden"))
-    parser.add_argument("python", nargs="+", help="the command that runs the other Python")
+    parser.add_argument(
+        "python", nargs="+", help="the command that runs the other Python"
+    )
     arguments = parser.parse_args(argv)
     machine, shares = ask(arguments.golden, arguments.python, str(ROOT))
     farthest = max(shares, key=lambda key: shares[key])

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from onnx.reference import ReferenceEvaluator
 
 from tests.hard_cases.cases import SEEDS, Case, Ladder, seeded
-from tests.hard_cases.models import Array, Ours, converted, features, session, usual_pipeline
+from tests.hard_cases.models import (
+    Array,
+    Ours,
+    converted,
+    features,
+    session,
+    usual_pipeline,
+)
 from tests.hard_cases.neighbours import MANY, near_duplicates
 from train.pipeline import Choice
 
@@ -26,12 +33,17 @@ def model(n: int, kind: str) -> Ours:
 
 def queries_for(kind: str, seed: int, count: int) -> Array:
     near = kind == "near-duplicates"
-    X = near_duplicates(160, 1e-7, seed, count)[1] if near else features(count, seed + 1)
+    X = (
+        near_duplicates(160, 1e-7, seed, count)[1]
+        if near
+        else features(count, seed + 1)
+    )
     return X.astype(np.float32).astype(np.float64)
 
 
 def engine_error(engine: str, n: int, kind: str, seed: int, count: int = 40) -> float:
-    """Outputs with another bit than the board's session gives for all queries at once."""
+    """Outputs with another bit than the board's session gives for all queries at
+    once."""
     ours, X = model(n, kind), queries_for(kind, seed, count)
     expected = ours.model.run(X)
     names = list(expected)
@@ -44,22 +56,35 @@ def engine_error(engine: str, n: int, kind: str, seed: int, count: int = 40) -> 
         single = X.astype(np.float32)
         decisions = [ours.model.decide(x)["t"] for x in single]
         names = ["t_distances", "t_neighbours", "t_scores"]
-        answers = [np.array([getattr(d, name[2:]) for d in decisions]) for name in names]
+        answers = [
+            np.array([getattr(d, name[2:]) for d in decisions]) for name in names
+        ]
     else:
-        options = {"threads": 2} if engine == "two threads" else {"level": LEVELS.ORT_ENABLE_ALL}
+        options = (
+            {"threads": 2}
+            if engine == "two threads"
+            else {"level": LEVELS.ORT_ENABLE_ALL}
+        )
         answers = session(ours.data, **options).run(names, {"features": X})
     return float(
-        sum(a.tobytes() != expected[name].tobytes() for a, name in zip(answers, names, strict=True))
+        sum(
+            a.tobytes() != expected[name].tobytes()
+            for a, name in zip(answers, names, strict=True)
+        )
     )
 
 
 def engine_usual() -> str:
-    """Nearest of near-duplicates by skl2onnx and scikit-learn, in other circumstances."""
+    """Nearest of near-duplicates by skl2onnx and scikit-learn, in other
+    circumstances."""
     X, queries = near_duplicates(160, 1e-7, 0, 200)
     pipe = usual_pipeline(X, 20, 1, np.arange(len(X)))
     shares = ", ".join(
         f"{name} {np.mean(answer(queries) != [answer(q[None])[0] for q in queries]):.0%}"
-        for name, answer in (("skl2onnx", converted(pipe, X)), ("scikit-learn", pipe.predict))
+        for name, answer in (
+            ("skl2onnx", converted(pipe, X)),
+            ("scikit-learn", pipe.predict),
+        )
     )
     return f"nearest of near-duplicates differs alone and in a batch: {shares}"
 

@@ -1,7 +1,9 @@
-"""`python -m tests.hard_cases.golden`: a model and a golden file of each hard set of vectors.
+"""`python -m tests.hard_cases.golden`: a model and a golden file of each hard set of
+vectors.
 
-`edge-classify verify` on another machine, or with another ONNX Runtime, then says whether its
-answers are the same. Every golden file holds the same hard frames beside its vectors.
+`edge-classify verify` on another machine, or with another ONNX Runtime, then says
+whether its answers are the same. Every golden file holds the same hard frames beside
+its vectors.
 """
 
 import argparse
@@ -23,7 +25,13 @@ from export.api import describe
 from export.graph import to_onnx
 from tests.conftest import FOREARM, touch
 from tests.hard_cases.models import Array, features, labels_for
-from tests.hard_cases.neighbours import MANY, dominated, lattice, near_duplicates, offset_data
+from tests.hard_cases.neighbours import (
+    MANY,
+    dominated,
+    lattice,
+    near_duplicates,
+    offset_data,
+)
 from train.dataset import DataSet, load_trials
 from train.pipeline import Choice, ContactClassifier
 
@@ -66,11 +74,14 @@ def short(recording: Recording) -> Recording:
     """Let go after half the window, and touched from the first frame on."""
     frames = recording.frames[20:].copy()
     frames[60:] = 0
-    return replace(recording, frames=frames, t=recording.t[20:], joints=recording.joints[20:])
+    return replace(
+        recording, frames=frames, t=recording.t[20:], joints=recording.joints[20:]
+    )
 
 
 def hard_trials(folder: Path) -> DataSet:
-    """Contacts with everything that frames and times can do to them, stored in a folder."""
+    """Contacts with everything that frames and times can do to them, stored in a
+    folder."""
     changes = (seam, saturated, jittered, split, wrapped, short)
     for seed in range(2 * len(changes)):
         change = changes[seed % len(changes)]
@@ -81,11 +92,15 @@ def hard_trials(folder: Path) -> DataSet:
 
 
 def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
-    """Training vectors of each hard case, which are the queries too, and the model's settings."""
+    """Training vectors of each hard case, which are the queries too, and the model's
+    settings."""
     return {
         "frames": (dataset.features(), Choice("IV", 5, 2)),
         "near-duplicates": (near_duplicates(160, 1e-7, 0)[0], Choice("none", 6, 5)),
-        "near-duplicates-many": (near_duplicates(MANY, 1e-7, 0)[0], Choice("none", 6, 5)),
+        "near-duplicates-many": (
+            near_duplicates(MANY, 1e-7, 0)[0],
+            Choice("none", 6, 5),
+        ),
         "many": (features(MANY), Choice("IV", 20, 4)),
         "offset": (offset_data(1e6, 0.01, 0)[0], Choice("none", 6, 5)),
         "tiny": (features(160) * 1e-24, Choice("none", 6, 5)),
@@ -109,7 +124,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             folder = arguments.out / name
             with write_whole(folder / "model.onnx") as file:
                 file.write(to_onnx(fitted, info))
-            golden.write(folder / "golden.npz", Model(folder / "model.onnx"), dataset, X)
+            golden.write(
+                folder / "golden.npz", Model(folder / "model.onnx"), dataset, X
+            )
             print(folder)
         # Decisions before the full window.
         out = str(arguments.out / "decision_points")

@@ -1,4 +1,5 @@
-"""The arm's kinematics: many steps, large and tiny angles, limits and wrapped angles."""
+"""The arm's kinematics: many steps, large and tiny angles, limits and wrapped
+angles."""
 
 import json
 import math
@@ -24,7 +25,9 @@ def orthonormal_error(steps: int, reach: float) -> float:
     return worst
 
 
-def exact_turn(axis: tuple[float, float, float], angle: float) -> list[list[mpmath.mpf]]:
+def exact_turn(
+    axis: tuple[float, float, float], angle: float
+) -> list[list[mpmath.mpf]]:
     """Rodrigues' formula in 60 digits (400 for the reduction of large angles)."""
     with mpmath.workdps(400):
         a = mpmath.mpf(angle)
@@ -37,7 +40,8 @@ def exact_turn(axis: tuple[float, float, float], angle: float) -> list[list[mpma
 
 
 def turn_error(angle: float, seed: int) -> float:
-    """Largest error of a rotation; off the diagonal relative to the angle where it is tiny."""
+    """Largest error of a rotation; off the diagonal relative to the angle where it is
+    tiny."""
     x, y, z = np.random.default_rng(seed).normal(size=3).tolist()
     seen = Chain([Joint("j", (x, y, z))]).pose([angle])[:3, :3]
     truth = exact_turn((x, y, z), angle)
@@ -57,7 +61,8 @@ def line_error(angle: float, step: float) -> float:
         return math.remainder(q, 2.0 * math.pi)
 
     text = "".join(
-        json.dumps({"t": t, "q": [wrap(q)]}) + "\n" for t, q in ((5.0, angle), (5.01, angle + step))
+        json.dumps({"t": t, "q": [wrap(q)]}) + "\n"
+        for t, q in ((5.0, angle), (5.01, angle + step))
     )
     lines = iter([text.encode(), None])
     joints = Joints(lambda: next(lines), dof=1, now=lambda: 0.0)
@@ -88,7 +93,9 @@ CASES = [
         [{"angle": a, "seed": 0} for a in (0.0, 1e-300, 1e-8, math.pi, 1e6, 1e15)]
         + [
             {"angle": limit + 2.0 * math.pi * turns, "seed": 0}
-            for limit in {limit for limits in Chain.cody().limits for limit in limits or ()}
+            for limit in {
+                limit for limits in Chain.cody().limits for limit in limits or ()
+            }
             for turns in (-1000, 0, 1)
         ],
         {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
@@ -103,7 +110,11 @@ CASES = [
         line_error,
         [{"angle": math.pi - 0.001, "step": 0.002}],
         {"angle": st.floats(-7, 7), "step": st.floats(-0.3, 0.3)},
-        Ladder("radians between two lines", [1e-9, 1e-3, 1.0, 3.1, 3.2], seeded("step", angle=3.0)),
+        Ladder(
+            "radians between two lines",
+            [1e-9, 1e-3, 1.0, 3.1, 3.2],
+            seeded("step", angle=3.0),
+        ),
         bound=2e-12,
     ),
 ]

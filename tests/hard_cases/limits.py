@@ -22,7 +22,8 @@ from tests.hard_cases.models import shipped
 
 
 def skin_error(side: int, across: bool, full: bool = False) -> float:
-    """Error of area, peak and centroid of a block at full scale, over a quarter of the columns.
+    """Error of area, peak and centroid of a block at full scale, over a quarter of the
+    columns.
 
     Args:
         side: rows and columns.
@@ -42,15 +43,18 @@ def skin_error(side: int, across: bool, full: bool = False) -> float:
 
 
 def clock_error(start: float) -> float:
-    """Largest difference of a feature, in its own size, from that of a contact begun at 0.
+    """Largest difference of a feature, in its own size, from that of a contact begun at
+    0.
 
-    Steps of 2^-7 s from a whole number of seconds are exact to 2^45 s; beyond, frames are to be
-    refused or their times kept, never merged without a word.
+    Steps of 2^-7 s from a whole number of seconds are exact to 2^45 s; beyond, frames
+    are to be refused or their times kept, never merged without a word.
     """
     begin = float(np.floor(start))
     vectors = []
     for origin in (0.0, begin):
-        frames = [Frame(origin + i / 128.0, np.zeros((16, 24), np.uint16)) for i in range(200)]
+        frames = [
+            Frame(origin + i / 128.0, np.zeros((16, 24), np.uint16)) for i in range(200)
+        ]
         for i in range(11, 200):
             frames[i].counts[4 : 6 + i // 50, 5:8] = 200 + 7 * i
         vectors.append(feature_vector(contact_of(frames, horizon_s=1.2).series(), 1.2))
@@ -65,7 +69,8 @@ def touches() -> tuple[Recording, ...]:
 
 
 def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Recording:
-    """The same with a pause so many frames after the touch, and with times in another unit."""
+    """The same with a pause so many frames after the touch, and with times in another
+    unit."""
     touched = recording.frames.max(axis=(1, 2)) > recording.layout.onset
     t = recording.t.copy()
     t[int(touched.argmax()) + frames :] += pause_s
@@ -80,14 +85,20 @@ def decisions(recording: Recording) -> tuple[float, list[Decided]]:
 
 
 def gap_error(pause_s: float, frames: int, unit: float) -> float:
-    """Decisions whose flag `gap` is wrong: one step covers more than a quarter of the window."""
+    """Decisions whose flag `gap` is wrong: one step covers more than a quarter of the
+    window."""
     window, wrong = Fraction(shipped().info.window_s), 0
     for touch in touches():
         recording = paused(touch, pause_s, frames, unit)
         onset, decided = decisions(recording)
-        ages = [Fraction(t) - Fraction(onset) for t in recording.t[recording.t >= onset].tolist()]
+        ages = [
+            Fraction(t) - Fraction(onset)
+            for t in recording.t[recording.t >= onset].tolist()
+        ]
         steps = [min(b, window) - min(a, window) for a, b in pairwise(ages)]
-        wrong += sum(("gap" in event.flags) != (max(steps) > window / 4) for event in decided)
+        wrong += sum(
+            ("gap" in event.flags) != (max(steps) > window / 4) for event in decided
+        )
     return float(wrong)
 
 
@@ -105,11 +116,13 @@ def gap_usual() -> str:
 
 
 COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_force")
-"""Of the contact, and of the untouched right half, whose logarithm is that of the floor."""
+"""Of the contact, and of the untouched right half, whose logarithm is that of the
+floor."""
 
 
 def transform_error(counts: int, scale: float) -> float:
-    """Largest error of a logarithm or root of a constant force, over the larger of it and 1."""
+    """Largest error of a logarithm or root of a constant force, over the larger of it
+    and 1."""
     layout = replace(FOREARM, counts_per_newton=scale)
     frame = np.zeros((16, 24), np.uint16)
     frame[4:6, 5:8] = counts
@@ -119,7 +132,12 @@ def transform_error(counts: int, scale: float) -> float:
     with mpmath.workdps(50):
         force = mpmath.mpf(int(counts)) / mpmath.mpf(scale)
         floor = mpmath.mpf(layout.threshold_counts + 1) / mpmath.mpf(scale)
-        true = [mpmath.log(force + floor), mpmath.sqrt(force), mpmath.log(floor), mpmath.mpf(0)]
+        true = [
+            mpmath.log(force + floor),
+            mpmath.sqrt(force),
+            mpmath.log(floor),
+            mpmath.mpf(0),
+        ]
         errors = [
             abs(mpmath.mpf(value) - want) / max(1, abs(want))
             for row, want in zip(seen.tolist(), true, strict=True)
@@ -135,7 +153,11 @@ CASES = [
         "taxels, counts",
         skin_error,
         [
-            *({"side": side, "across": a} for side in (16, 64, 256) for a in (True, False)),
+            *(
+                {"side": side, "across": a}
+                for side in (16, 64, 256)
+                for a in (True, False)
+            ),
             {"side": 256, "across": False, "full": True},
         ],
         {"side": st.integers(4, 64).map(lambda n: 4 * n), "across": st.booleans()},

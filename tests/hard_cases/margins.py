@@ -1,4 +1,5 @@
-"""The margin of each case, found by search, beside where recordings lie; and the guards' prices."""
+"""The margin of each case, found by search, beside where recordings lie; and the
+guards' prices."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -13,7 +14,14 @@ from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from tests.hard_cases.cases import Case, Ladder
 from tests.hard_cases.frames import contact_of
-from tests.hard_cases.models import Ours, converted, features, labels_for, session, usual_pipeline
+from tests.hard_cases.models import (
+    Ours,
+    converted,
+    features,
+    labels_for,
+    session,
+    usual_pipeline,
+)
 
 FAILED, REFUSED = "fails", "refused with a sentence"
 SEEDS = range(5)
@@ -25,7 +33,10 @@ def failure(case: Case, ladder: Ladder, value: float) -> str:
     at = ladder.at(value)
     for seed in SEEDS if "seed" in at else SEEDS[:1]:
         try:
-            if not case.error(**at | ({"seed": seed} if "seed" in at else {})) <= case.bound:
+            if (
+                not case.error(**at | ({"seed": seed} if "seed" in at else {}))
+                <= case.bound
+            ):
                 return FAILED
         except EdgeError:
             return REFUSED
@@ -33,7 +44,8 @@ def failure(case: Case, ladder: Ladder, value: float) -> str:
 
 
 def margin(case: Case) -> str:
-    """The last value at which a case holds, the first at which it does not, and the recordings."""
+    """The last value at which a case holds, the first at which it does not, and the
+    recordings."""
     ladder = case.ladder
     if ladder is None:
         return "no parameter to go further with: all of it is tried"

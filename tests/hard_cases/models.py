@@ -42,7 +42,8 @@ def shipped() -> Model:
 
 
 def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
-    """The shipped model's metadata, with the tasks of a model that was fitted on vectors alone."""
+    """The shipped model's metadata, with the tasks of a model that was fitted on
+    vectors alone."""
     tasks = {
         task: Task(
             tuple(map(str, fitted.classes_[task])),
@@ -64,9 +65,12 @@ def labels_for(X: Array, classes: int = 5, seed: int = 0) -> NDArray[np.str_]:
 
 
 class Ours:
-    """A fitted classifier of one task, its exported graph, and the oracle of the two."""
+    """A fitted classifier of one task, its exported graph, and the oracle of the
+    two."""
 
-    def __init__(self, X: Array, y: NDArray[np.str_] | None = None, choice: Choice = USUAL) -> None:
+    def __init__(
+        self, X: Array, y: NDArray[np.str_] | None = None, choice: Choice = USUAL
+    ) -> None:
         y = labels_for(X) if y is None else y
         self.fitted = ContactClassifier({"t": choice}).fit(X, {"t": y})
         with tempfile.TemporaryDirectory() as folder:
@@ -86,18 +90,25 @@ class Ours:
         """The graph's answers to queries one by one, as the board asks."""
         answers = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
         return {
-            name.removeprefix("t_"): np.concatenate([answer[name] for answer in answers])
+            name.removeprefix("t_"): np.concatenate(
+                [answer[name] for answer in answers]
+            )
             for name in answers[0]
         }
 
     def wrong(self, queries: Array) -> int:
-        """Queries whose neighbours, order, label or a bit of a distance is not the oracle's."""
+        """Queries whose neighbours, order, label or a bit of a distance is not the
+        oracle's."""
         seen, wrong = self.alone(queries), 0
         for i, point in enumerate(self.whole(queries)):
             near, squares = exact.nearest(self.rows, point, self.k)
             label = exact.winner([self.labels[j] for j in near])
-            distances = [exact.distance(squares[j], self.projection.grid_.unit) for j in near]
-            answer = (seen[key][i].tolist() for key in ("neighbours", "label", "distances"))
+            distances = [
+                exact.distance(squares[j], self.projection.grid_.unit) for j in near
+            ]
+            answer = (
+                seen[key][i].tolist() for key in ("neighbours", "label", "distances")
+            )
             wrong += (near, label, distances) != tuple(answer)
         return wrong
 
@@ -105,9 +116,9 @@ class Ours:
 def usual_pipeline(X: Array, components: int, k: int, y: Any) -> Any:
     """PCA and k-NN as scikit-learn fits them by default, brute force."""
     c = min(components, *X.shape)
-    return make_pipeline(PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")).fit(
-        X, y
-    )
+    return make_pipeline(
+        PCA(c, random_state=0), KNeighborsClassifier(k, algorithm="brute")
+    ).fit(X, y)
 
 
 def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
@@ -117,23 +128,31 @@ def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
     options.log_severity_level = 4
     if level is not None:
         options.graph_optimization_level = level
-    return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(
+        data, options, providers=["CPUExecutionProvider"]
+    )
 
 
 def converted(pipe: Any, X: Array) -> Callable[[Array], NDArray[Any]]:
     """The answers of the default skl2onnx conversion: float32 in, its own k-NN."""
     proto = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False})
     theirs = session(proto.SerializeToString())
-    return lambda queries: np.ravel(theirs.run(None, {"X": queries.astype(np.float32)})[0])
+    return lambda queries: np.ravel(
+        theirs.run(None, {"X": queries.astype(np.float32)})[0]
+    )
 
 
 def answers_of_usual(pipe: Any, X: Array, queries: Array) -> dict[str, NDArray[Any]]:
     """The answers of scikit-learn and of its conversion."""
-    return {"scikit-learn": pipe.predict(queries), "skl2onnx": converted(pipe, X)(queries)}
+    return {
+        "scikit-learn": pipe.predict(queries),
+        "skl2onnx": converted(pipe, X)(queries),
+    }
 
 
 def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:
-    """Shares of nearest rows that are not those of exact arithmetic without any rounding."""
+    """Shares of nearest rows that are not those of exact arithmetic without any
+    rounding."""
     numbers = np.arange(len(X))
     pipe = usual_pipeline(X, components, 1, numbers)
     pca = pipe[0]
@@ -142,5 +161,7 @@ def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:
     answers = answers_of_usual(pipe, X, queries)
     ours = Ours(X, choice=Choice("none", components, 1))
     answers["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]
-    shares = ", ".join(f"{name} {np.mean(v != truth):.0%}" for name, v in answers.items())
+    shares = ", ".join(
+        f"{name} {np.mean(v != truth):.0%}" for name, v in answers.items()
+    )
     return f"wrong nearest: {shares}"

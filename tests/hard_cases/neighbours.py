@@ -26,7 +26,9 @@ WHOLE = "Python's whole numbers"
 LISTS = "queries with another neighbour, order, label or distance"
 
 
-def near_duplicates(n: int, spread: float, seed: int, count: int = 24) -> tuple[Array, Array]:
+def near_duplicates(
+    n: int, spread: float, seed: int, count: int = 24
+) -> tuple[Array, Array]:
     """Clusters whose rows differ by `spread` of their norm, and queries like them."""
     rng = np.random.default_rng(seed)
     base = features(8, seed)
@@ -34,13 +36,19 @@ def near_duplicates(n: int, spread: float, seed: int, count: int = 24) -> tuple[
     def jittered(rows: Array) -> Array:
         return rows * (1.0 + spread * rng.normal(size=rows.shape))
 
-    return jittered(np.repeat(base, n // 8, axis=0)), jittered(base[rng.integers(0, 8, count)])
+    return jittered(np.repeat(base, n // 8, axis=0)), jittered(
+        base[rng.integers(0, 8, count)]
+    )
 
 
-def offset_data(offset: float, sd: float, seed: int, n: int = 160) -> tuple[Array, Array]:
+def offset_data(
+    offset: float, sd: float, seed: int, n: int = 160
+) -> tuple[Array, Array]:
     """Vectors far from zero."""
     rng = np.random.default_rng(seed)
-    return offset + sd * rng.normal(size=(n, 120)), offset + sd * rng.normal(size=(24, 120))
+    return offset + sd * rng.normal(size=(n, 120)), offset + sd * rng.normal(
+        size=(24, 120)
+    )
 
 
 def scaled_data(scale: float, seed: int, n: int = 160) -> tuple[Array, Array]:
@@ -54,7 +62,8 @@ def far_data(factor: float, seed: int, n: int = 160) -> tuple[Array, Array]:
 
 
 def lattice(seed: int, n: int = 160) -> tuple[Array, Array]:
-    """Whole numbers in three columns, and queries midway between rows: pairs lie equally far."""
+    """Whole numbers in three columns, and queries midway between rows: pairs lie
+    equally far."""
     rng = np.random.default_rng(seed)
     X, queries = np.zeros((n, 120)), np.zeros((24, 120))
     half = rng.integers(-3, 4, (n // 2, 3))
@@ -71,7 +80,8 @@ def duplicates(n: int, seed: int) -> tuple[Array, Array]:
 
 
 def dominated(power: float, seed: int) -> tuple[Array, Array]:
-    """One feature is 10^power times as large as the others, which alone separate the rows."""
+    """One feature is 10^power times as large as the others, which alone separate the
+    rows."""
     rng = np.random.default_rng(seed)
     X = features(160, seed)
     X[:, :40] = np.rint(2.0 * rng.random((160, 40))) * 10.0**power
@@ -81,15 +91,20 @@ def dominated(power: float, seed: int) -> tuple[Array, Array]:
 
 
 def denormals(times: int, seed: int) -> tuple[Array, Array]:
-    """One feature has a few of the smallest numbers of float64; the others are ordinary."""
+    """One feature has a few of the smallest numbers of float64; the others are
+    ordinary."""
     X, queries = features(160, seed), features(24, seed + 1)
     smallest = float(np.finfo(np.float64).smallest_subnormal)
-    X[:, :40] = np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
+    X[:, :40] = (
+        np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
+    )
     queries[:, :40] = X[:24, :40]
     return X, queries
 
 
-def wrong(data: Callable[..., tuple[Array, Array]], choice: Choice) -> Callable[..., float]:
+def wrong(
+    data: Callable[..., tuple[Array, Array]], choice: Choice
+) -> Callable[..., float]:
     """The error of a case: wrong answers to the queries of `data`."""
 
     def error(**at: float) -> float:
@@ -114,32 +129,43 @@ def discriminants_error(shrinkage: float, seed: int) -> float:
 
 
 def far_error(factor: float, seed: int, n: int = 160) -> float:
-    """Wrong answers, and queries that were cut off without a word or flagged without need."""
+    """Wrong answers, and queries that were cut off without a word or flagged without
+    need."""
     X, queries = far_data(factor, seed, n)
     ours = Ours(X)
     p = ours.projection
     d = (queries - p.mean_) * p.gain_
     z = d @ p.weights_ / p.grid_.unit
-    off = (np.abs(d / p.grid_.step).max(axis=1) > 2.0**24) | (np.abs(z).max(axis=1) > p.grid_.limit)
+    off = (np.abs(d / p.grid_.step).max(axis=1) > 2.0**24) | (
+        np.abs(z).max(axis=1) > p.grid_.limit
+    )
     flags = [ours.model.decide(query)["t"].out_of_range for query in queries]
     return ours.wrong(queries) + float((off != flags).sum())
 
 
 def grid_error(spread: float, seed: int) -> float:
-    """Largest error of a distance, over the longest training row, against unrounded numbers."""
+    """Largest error of a distance, over the longest training row, against unrounded
+    numbers."""
     X, queries = near_duplicates(80, spread, seed, 8)
     ours = Ours(X, choice=Choice("none", 6, 80))
     seen, p = ours.alone(queries), ours.projection
-    true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(float)
+    true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
+        float
+    )
     z = ours.fitted.rows_[ours.fitted.spaces_["t"]]
-    true *= np.linalg.norm(z) / np.linalg.norm(true[:80])  # proportional numbers, to 1e-7
+    true *= np.linalg.norm(z) / np.linalg.norm(
+        true[:80]
+    )  # proportional numbers, to 1e-7
     distances = np.linalg.norm(true[80:, None] - true[:80], axis=2)
-    errors = np.abs(seen["distances"] - np.take_along_axis(distances, seen["neighbours"], axis=1))
+    errors = np.abs(
+        seen["distances"] - np.take_along_axis(distances, seen["neighbours"], axis=1)
+    )
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
 
 def ties_usual() -> str:
-    """The last of 12 overlapping classes is hardly ever said where the lowest number wins."""
+    """The last of 12 overlapping classes is hardly ever said where the lowest number
+    wins."""
     X, queries = features(160), features(400, 1)
     ours = Ours(X, labels_for(X, 12), Choice("none", 6, 2))
     seen, labels = ours.alone(queries), np.array(ours.labels)
@@ -155,13 +181,16 @@ def ties_usual() -> str:
 
 
 def equal_usual() -> str:
-    """Equal distances are to be answered with the lower row, which the order of sums decides."""
+    """Equal distances are to be answered with the lower row, which the order of sums
+    decides."""
     X, queries = lattice(0)
     lowest = ((X[:, None] - queries) ** 2).sum(axis=2).argmin(axis=0)
     shares = []
     for name in ("brute", "kd_tree"):
         model = KNeighborsClassifier(1, algorithm=name).fit(X, np.arange(len(X)))
-        shares.append(f"scikit-learn {name} {np.mean(model.predict(queries) != lowest):.0%}")
+        shares.append(
+            f"scikit-learn {name} {np.mean(model.predict(queries) != lowest):.0%}"
+        )
     return "not the lower row: " + ", ".join(shares)
 
 
@@ -240,12 +269,20 @@ CASES = [
         [{"scale": scale, "seed": 0} for scale in (1e-24, 1e20)],
         {"scale": powers_of_ten(-24, 20)},
         Ladder(
-            "scale", decades(20, 170, 0.1), seeded("scale", seed=0), "0.01 to 920 and 0.02 to 25"
+            "scale",
+            decades(20, 170, 0.1),
+            seeded("scale", seed=0),
+            "0.01 to 920 and 0.02 to 25",
         ),
         lambda: usual_neighbours(*scaled_data(1e20, 0)),
     ),
     answers("exact duplicates", wrong(duplicates, Choice("IV", 20, 4)), **BY_ROWS),
-    answers("equal distances", wrong(lattice, Choice("none", 6, 8)), **BY_ROWS, usual=equal_usual),
+    answers(
+        "equal distances",
+        wrong(lattice, Choice("none", 6, 8)),
+        **BY_ROWS,
+        usual=equal_usual,
+    ),
     answers(
         "vote ties with even k",
         ties_error,

@@ -17,7 +17,14 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
-from tests.hard_cases.models import Array, Ours, converted, features, labels_for, usual_pipeline
+from tests.hard_cases.models import (
+    Array,
+    Ours,
+    converted,
+    features,
+    labels_for,
+    usual_pipeline,
+)
 from train.__main__ import parser
 from train.crossval import neighbours
 from train.pipeline import Choice, ContactClassifier
@@ -55,11 +62,14 @@ def small_model() -> Ours:
 
 
 def graph(bad: float) -> None:
-    """Every position in one batch; the graph itself answers -1 and votes for nothing."""
+    """Every position in one batch; the graph itself answers -1 and votes for
+    nothing."""
     queries = np.repeat(features(1, 1), 121, axis=0)
     queries[np.arange(120), np.arange(120)] = bad
     answer = small_model().model.run(queries)
-    refused = (answer["t_label"][:120] == -1).all() and not answer["t_scores"][:120].any()
+    refused = (answer["t_label"][:120] == -1).all() and not answer["t_scores"][
+        :120
+    ].any()
     if refused and answer["t_label"][120] >= 0:
         raise InputError("label -1")
 
@@ -95,7 +105,9 @@ ENTRIES: dict[str, Callable[[float], object]] = {
     "a skin's scale": lambda bad: SkinLayout.from_dict(
         {"rows": 2, "cols": 2, "counts_per_newton": bad}
     ),
-    "a skin's pitch": lambda bad: SkinLayout.from_dict({"rows": 2, "cols": 2, "pitch_m": bad}),
+    "a skin's pitch": lambda bad: SkinLayout.from_dict(
+        {"rows": 2, "cols": 2, "pitch_m": bad}
+    ),
     "a feature vector": lambda bad: small_model().model.decide(spoiled(bad, 1)[0]),
     "the graph": graph,
     "a training vector": lambda bad: ContactClassifier({"t": Choice("none", 2, 1)}).fit(
@@ -107,15 +119,22 @@ ENTRIES: dict[str, Callable[[float], object]] = {
 
 
 SIZES: dict[str, Callable[[float], object]] = {
-    "a vector, infinite once scaled": lambda size: small_model().model.decide(np.full(120, size)),
-    "units of training vectors": lambda size: Projection("none", 3).fit(features(20) * size),
+    "a vector, infinite once scaled": lambda size: small_model().model.decide(
+        np.full(120, size)
+    ),
+    "units of training vectors": lambda size: Projection("none", 3).fit(
+        features(20) * size
+    ),
 }
 BEYOND = [("a vector, infinite once scaled", size) for size in (1e303, -1e305, 1.7e308)]
-BEYOND += [("units of training vectors", size) for size in (1e-300, 1e-40, 1e105, 1e300)]
+BEYOND += [
+    ("units of training vectors", size) for size in (1e-300, 1e-40, 1e105, 1e300)
+]
 
 
 def let_in(entry: str, bad: float) -> float:
-    """1 where an entry takes a value that is not finite, or that float64 cannot hold scaled."""
+    """1 where an entry takes a value that is not finite, or that float64 cannot hold
+    scaled."""
     try:
         (ENTRIES | SIZES)[entry](bad)
     except InputError:

@@ -6,5 +6,7 @@ from tests.hard_cases.cases import Case
 
 GROUPS = "neighbours scaling frames kinematics limits refusals everywhere simulator"
 CASES: list[Case] = [
-    case for name in GROUPS.split() for case in import_module(f"tests.hard_cases.{name}").CASES
+    case
+    for name in GROUPS.split()
+    for case in import_module(f"tests.hard_cases.{name}").CASES
 ]

@@ -13,7 +13,8 @@ METHODS = st.sampled_from(SCALINGS)
 
 
 def constant_error(scaling: str, value: float, seed: int) -> float:
-    """The larger of two constant columns' weight and of a projection's shift when they move."""
+    """The larger of two constant columns' weight and of a projection's shift when they
+    move."""
     X = features(60, seed)
     X[:, [7, 95]] = value
     moved = X.copy()
@@ -24,16 +25,16 @@ def constant_error(scaling: str, value: float, seed: int) -> float:
 
 
 def hadamard_data(values: Array, seed: int = 0) -> Array:
-    """(512, 32) data whose singular values are exactly these times 128: Hadamard rows and columns
-    are orthogonal and their sums are exact."""
+    """(512, 32) data whose singular values are exactly these times 128: Hadamard rows
+    and columns are orthogonal and their sums are exact."""
     h, g = (hadamard(n).astype(np.float64) for n in (512, 32))
     columns = np.random.default_rng(seed).permutation(np.arange(1, 512))[: len(values)]
     return (h[:, columns] * values) @ g[1 : len(values) + 1]
 
 
 def cut_error(gap: float, seed: int) -> float:
-    """How far the reported gap at the cut is from the one that the data was made with; wrong
-    where it is not under the warning's limit although the true one is."""
+    """How far the reported gap at the cut is from the one that the data was made with;
+    wrong where it is not under the warning's limit although the true one is."""
     values = np.array([4.0, 2.0, 2.0 * np.sqrt(1.0 - gap), 1.0])
     p = Projection("none", 2, ["max_force"]).fit(hadamard_data(values, seed))
     true = 1.0 - (values[2] / values[1]) ** 2
@@ -47,7 +48,8 @@ def orders(top: int, count: int) -> Array:
 
 
 def decades_error(top: int, count: int, seed: int) -> float:
-    """Largest error of a singular value over the largest one; a rank that is off counts 1."""
+    """Largest error of a singular value over the largest one; a rank that is off counts
+    1."""
     X, truth = hadamard_data(orders(top, count), seed), 128.0 * orders(top, count)
     _, axes, values = principal_axes(X)
     limit = truth[0] * max(X.shape) * np.finfo(float).eps
@@ -72,7 +74,9 @@ CASES = [
         cut_error,
         [{"gap": 0.0, "seed": 0}, {"gap": 1e-9, "seed": 0}],
         {"gap": powers_of_ten(-14, -6.1) | powers_of_ten(-5.9, -1), "seed": SEEDS},
-        Ladder("relative gap", decades(-1, -16, 1), seeded("gap", seed=0), "0.03 and 0.02"),
+        Ladder(
+            "relative gap", decades(-1, -16, 1), seeded("gap", seed=0), "0.03 and 0.02"
+        ),
         bound=1e-13,
     ),
     Case(

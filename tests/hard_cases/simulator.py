@@ -12,7 +12,9 @@ def push_error(h: float, mu: float, steps: int = 120) -> float:
     """Pushes that a judge complains about, of every stiffness and mass."""
     grid = np.meshgrid(10.0 ** np.arange(-3, 16, 2), 10.0 ** np.arange(-9, 10, 1.8))
     stiffness, mass = (values.ravel() for values in grid)
-    rig = slider(np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None])
+    rig = slider(
+        np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None]
+    )
     trace = rig.run(steps)
     pushes = (Trace(*(seen[:, i : i + 1] for seen in trace)) for i in range(mass.size))
     judged = zip(pushes, stiffness, mass, strict=True)
@@ -37,8 +39,16 @@ CASES = [
         "force, stick, energy ledger",
         "pushes with a complaint",
         push_error,
-        [{"h": h, "mu": mu} for h in (0.001, 0.01, 0.02, 0.05, 0.1, 0.2) for mu in (0.05, 1.0)],
-        {"h": powers_of_ten(-3.0, -0.7), "mu": st.floats(0.05, 1.0), "steps": st.just(30)},
+        [
+            {"h": h, "mu": mu}
+            for h in (0.001, 0.01, 0.02, 0.05, 0.1, 0.2)
+            for mu in (0.05, 1.0)
+        ],
+        {
+            "h": powers_of_ten(-3.0, -0.7),
+            "mu": st.floats(0.05, 1.0),
+            "steps": st.just(30),
+        },
         Ladder("s a step", decades(-3, 3, 1), seeded("h", mu=0.5, steps=30)),
         lambda: f"explicit LuGre grows to {lugre(0.01):.0e} at 10 ms",
         examples=4,

@@ -21,7 +21,11 @@ def refuse(x):
 @pytest.mark.parametrize(
     ("error", "values", "words"),
     [
-        (lambda x: float(x >= 1e3), decades(0, 6, 1), "x: holds to 100, fails from 1000"),
+        (
+            lambda x: float(x >= 1e3),
+            decades(0, 6, 1),
+            "x: holds to 100, fails from 1000",
+        ),
         (lambda x: float(x >= 1e3), [1.0, 2.0], "x: holds to 2, no failure seen"),
         (lambda x: float(x >= 1e3), [1e4], "x: fails from 10000"),
         (refuse, [1.0], "x: refused with a sentence from 1"),

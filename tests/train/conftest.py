@@ -7,7 +7,8 @@ from train.__main__ import main
 
 @pytest.fixture
 def refusal(capsys):
-    """The function that gives the sentence with which a command refuses what it is given."""
+    """The function that gives the sentence with which a command refuses what it is
+    given."""
 
     def sentence(*words):
         assert main([*map(str, words)]) == 2

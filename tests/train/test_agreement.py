@@ -5,7 +5,9 @@ import numpy as np
 from train.agreement import factors_of, families, products
 
 TASKS = {
-    "category": np.array(["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]),
+    "category": np.array(
+        ["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]
+    ),
     "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
     "object": np.array(["wall", "box", "pillow", "ball"]),
     "softness": np.array(["rigid", "rigid", "soft", "soft"]),

@@ -17,7 +17,10 @@ def test_an_arm_is_the_recordings_own_or_the_one_given_or_codys(make_touch):
     assert arm_of(first_joint, "a", swing) is swing
     own = replace(first_joint, meta={**first_joint.meta, "arm": swing.to_dict()})
     assert arm_of(own, "a").to_dict() == swing.to_dict()
-    assert arm_of(replace(first_joint, meta={**first_joint.meta, "arm": None}), "a", swing) is None
+    assert (
+        arm_of(replace(first_joint, meta={**first_joint.meta, "arm": None}), "a", swing)
+        is None
+    )
     assert arm_of(make_touch(arm=False), "a", swing) is None
 
 

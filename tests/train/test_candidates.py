@@ -14,7 +14,11 @@ def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn
     y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
     y["object"] = np.arange(8).astype(str)
     plain, drawn = (
-        {grid.targets for candidate in candidates(y, drawn=d) for grid in candidate.grids}
+        {
+            grid.targets
+            for candidate in candidates(y, drawn=d)
+            for grid in candidate.grids
+        }
         for d in (False, True)
     )
     assert plain == {(), ("mobility", "softness"), together}
@@ -22,8 +26,13 @@ def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn
 
 
 def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
-    """A thing whose category is of its own, such as `liquid`, has no softness and no mobility."""
-    y = {task: np.append(labels, "") for task, labels in TASKS.items() if task != "object"}
+    """A thing whose category is of its own, such as `liquid`, has no softness and no
+    mobility."""
+    y = {
+        task: np.append(labels, "")
+        for task, labels in TASKS.items()
+        if task != "object"
+    }
     y["category"][-1] = "liquid"
     targets = {grid.targets for candidate in candidates(y) for grid in candidate.grids}
     assert ("mobility", "softness") not in targets
@@ -31,7 +40,9 @@ def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
-    assert {candidate.sets for candidate in candidates(TASKS, joints=True)} == set(WITH_JOINTS)
+    assert {candidate.sets for candidate in candidates(TASKS, joints=True)} == set(
+        WITH_JOINTS
+    )
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 
@@ -54,7 +65,9 @@ def test_arguments_you_pass_are_held_fixed():
 def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
     for joints, sets in ((False, ("contact",)), (True, ("contact", "joints"))):
         tried = candidates(TASKS, joints=joints, drawn=True)
-        assert [(candidate.sets, candidate.projection) for candidate in tried] == [(sets, "lda")]
+        assert [(candidate.sets, candidate.projection) for candidate in tried] == [
+            (sets, "lda")
+        ]
         grids = [grid for candidate in tried for grid in candidate.grids]
         assert min(min(grid.shrinkages) for grid in grids) == 0.3
         # Ten directions at most: as many as the most components.

@@ -9,7 +9,14 @@ import pytest
 import train
 from edge.recording import save
 from edge.statistics import wilson
-from train.choose import Chosen, decided_together, fold_count, groupable, kinds_of, without_folds
+from train.choose import (
+    Chosen,
+    decided_together,
+    fold_count,
+    groupable,
+    kinds_of,
+    without_folds,
+)
 from train.evaluate import AnswerTable, Promise
 from train.pipeline import Choice, ContactClassifier, vote
 
@@ -29,10 +36,17 @@ def test_five_folds_are_enough_for_a_quick_choice_and_for_very_many_trials():
 
 
 def drawn_touches(make_touch, kinds=("box", "bin", "post"), numbered=True):
-    """{object: a touch of it}, as of a scene with two objects of each kind and category."""
+    """{object: a touch of it}, as of a scene with two objects of each kind and
+    category."""
     touches = {}
-    for seed, (category, kind, i) in enumerate(product(("hard", "soft"), kinds, (1, 2))):
-        thing = f"{category} {kind} {i:02d}" if numbered else f"{category} {kind} {'ab'[i - 1]}"
+    for seed, (category, kind, i) in enumerate(
+        product(("hard", "soft"), kinds, (1, 2))
+    ):
+        thing = (
+            f"{category} {kind} {i:02d}"
+            if numbered
+            else f"{category} {kind} {'ab'[i - 1]}"
+        )
         labels = {"category": category, "object": thing}
         touches[thing] = make_touch(kind=category, seed=seed, labels=labels)
         touches[thing].meta["simulation"] = {}
@@ -49,7 +63,8 @@ def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
 
 
 @pytest.mark.parametrize(
-    ("kinds", "left_out"), [(("box", "bin", "post"), "kind"), (("box", "bin"), "object")]
+    ("kinds", "left_out"),
+    [(("box", "bin", "post"), "kind"), (("box", "bin"), "object")],
 )
 def test_entire_kinds_are_left_out_where_every_class_has_three(
     kinds, left_out, make_touch, tmp_path
@@ -58,37 +73,53 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
         save(tmp_path / f"{thing}.npz", touch)
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     assert fitted.chosen["category"].left_out == left_out
-    assert {max(grid.components) for tried in fitted.candidates for grid in tried.grids} == {10}
+    assert {
+        max(grid.components) for tried in fitted.candidates for grid in tried.grids
+    } == {10}
     assert fitted.chosen["object"].left_out == "trial"
 
 
 def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():
-    """One candidate is right on other trials of known objects, the other on new objects."""
+    """One candidate is right on other trials of known objects, the other on new
+    objects."""
     near, far = Choice("IV", 1, 1, "lda"), Choice("IV", 1, 3, "lda")
     folds, prices = np.arange(12) % 3, np.zeros(2, dtype=np.int64)
     right = np.repeat([[True], [False]], 12, axis=1)
     by_trial = AnswerTable(folds, {"t": [near, far]}, {"t": np.stack([right] * 3)})
-    by_group = AnswerTable(folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)})
+    by_group = AnswerTable(
+        folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)}
+    )
     assert without_folds("t", by_trial, by_trial, prices, 0.0) == [near] * 3
     assert without_folds("t", by_trial, by_group, prices, 0.0) == [far] * 3
 
 
 def test_tasks_that_agree_are_scored_as_they_are_decided_together():
-    """Against models fitted without each fold; each task by itself decides otherwise."""
+    """Against models fitted without each fold; each task by itself decides
+    otherwise."""
     rng = np.random.default_rng(1)
-    mobility, softness = (np.array(list(pair))[rng.integers(0, 2, 60)] for pair in ("fm", "rs"))
-    y = {"mobility": mobility, "softness": softness, "category": np.char.add(softness, mobility)}
+    mobility, softness = (
+        np.array(list(pair))[rng.integers(0, 2, 60)] for pair in ("fm", "rs")
+    )
+    y = {
+        "mobility": mobility,
+        "softness": softness,
+        "category": np.char.add(softness, mobility),
+    }
     X = rng.normal(size=(60, 6))
     X[:, 0] += mobility == "m"
     X[:, 3] += softness == "s"
     choices = {task: Choice("IV", 2, 3, "lda") for task in y}
     folds, none_right = np.arange(60) % 5, Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {
-        task: Chosen(choice, none_right, none_right, "trial") for task, choice in choices.items()
+        task: Chosen(choice, none_right, none_right, "trial")
+        for task, choice in choices.items()
     }
     plans = {"trial": (folds, [choices] * 5)}
     decided = decided_together(chosen, X, y, plans, TWO, (3, 3))
-    alone, together = np.zeros(60, dtype=bool), {task: np.zeros(60, dtype=bool) for task in y}
+    alone, together = (
+        np.zeros(60, dtype=bool),
+        {task: np.zeros(60, dtype=bool) for task in y},
+    )
     for fold in range(5):
         train, test = folds != fold, folds == fold
         model = ContactClassifier(choices, TWO, (3, 3))
@@ -100,27 +131,39 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together():
         alone[test] = model.classes_["category"][votes] == y["category"][test]
     for task, settings in decided.items():
         assert (settings.accuracy.hits == together[task]).all()
-        assert settings.accuracy.right == settings.by_trial.right == together[task].sum()
+        assert (
+            settings.accuracy.right == settings.by_trial.right == together[task].sum()
+        )
         assert settings.by_fold == (choices,) * 5
     assert (together["category"] == (together["mobility"] & together["softness"])).all()
     assert (alone != together["category"]).any()
 
 
-FEW = {"features": ["max_force"], "projection": "pca", "scaling": "none", "k": 1, "jobs": 1}
+FEW = {
+    "features": ["max_force"],
+    "projection": "pca",
+    "scaling": "none",
+    "k": 1,
+    "jobs": 1,
+}
 
 
 def touches(make_touch, folder, seconds, late_s):
     """Touches of two kinds that differ from `late_s` after onset on."""
     for seed in range(20):
         labels = {"kind": "ab"[seed % 2]}
-        touch = make_touch(seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels)
+        touch = make_touch(
+            seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels
+        )
         frames = np.minimum(touch.frames, 700)
         frames[touch.t > 0.2 + late_s] //= 1 + seed % 2
         save(folder / f"{seed}.npz", replace(touch, frames=frames))
     return str(folder)
 
 
-def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(make_touch, tmp_path):
+def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(
+    make_touch, tmp_path
+):
     late = touches(make_touch, tmp_path / "late", 6.0, 1.8)
     fitted = train.fit(late, **FEW)
     assert fitted.window_s == 2.4
@@ -137,12 +180,16 @@ def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(make_touch, t
     assert early.window_s == 1.2
 
 
-@pytest.mark.parametrize("given", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}])
+@pytest.mark.parametrize(
+    "given", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}]
+)
 def test_a_window_that_is_given_is_kept(given, make_touch, tmp_path):
     fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **given)
     assert fitted.window_s == 1.2
     assert not any("the window is" in note for note in fitted.notes)
 
 
-def test_touches_that_last_little_longer_than_the_window_are_told_in_it(make_touch, tmp_path):
+def test_touches_that_last_little_longer_than_the_window_are_told_in_it(
+    make_touch, tmp_path
+):
     assert train.fit(touches(make_touch, tmp_path, 2.0, 1.8), **FEW).window_s == 1.2

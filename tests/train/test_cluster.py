@@ -13,6 +13,8 @@ def test_an_address_without_a_scheduler_is_one_sentence(monkeypatch):
         raise OSError("Timed out trying to connect")
 
     monkeypatch.setattr(distributed, "Client", refused)
-    refusal = pytest.raises(InputError, match="127.0.0.1:1: no Dask scheduler answers there")
+    refusal = pytest.raises(
+        InputError, match="127.0.0.1:1: no Dask scheduler answers there"
+    )
     with refusal, on_cluster("tcp://127.0.0.1:1"):
         pass

@@ -128,7 +128,8 @@ def rows_of(shape, values, rng):
 @pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
 @pytest.mark.parametrize("decades", [2, 3.9, 8, 15])
 def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
-    """Below 1e-4 of the largest singular value the covariance is not trusted any more."""
+    """Below 1e-4 of the largest singular value the covariance is not trusted any
+    more."""
     side = min(shape)
     X = rows_of(shape, 10.0 ** -np.linspace(0, decades, side), np.random.default_rng(5))
     ours = Spectrum(X).leading(side - 2)
@@ -140,8 +141,11 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
 
 @pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (0.02, 0.005), (2e-4, 0.5)])
 @pytest.mark.parametrize("shape", [(60, 120), (120, 60)])
-def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(shape, share, gap):
-    """Where the last axis' share of the largest variance times its relative gap is 1e-4."""
+def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(
+    shape, share, gap
+):
+    """Where the last axis' share of the largest variance times its relative gap is
+    1e-4."""
     rng = np.random.default_rng(7)
     for components in (2, 5, 19):
         falling = share ** np.linspace(0.0, 0.5, components)
@@ -164,4 +168,6 @@ def test_the_neighbours_are_those_of_a_projection_fitted_without_the_trial():
         train = np.delete(np.arange(16), i)
         model = Projection("IV", 6).fit(X[train])
         differences = model.transform(X[train]) - model.transform(tested[i : i + 1])
-        assert (train[(differences**2).sum(axis=1).argsort(kind="stable")] == rows[i, 5]).all()
+        assert (
+            train[(differences**2).sum(axis=1).argsort(kind="stable")] == rows[i, 5]
+        ).all()

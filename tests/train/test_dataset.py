@@ -41,7 +41,9 @@ def test_several_processes_follow_the_contacts_as_one_does(recordings, folder):
     touch = load(folder / "soft_1.npz")
     touch.meta["contacts"] = [{}, {}]
     save(folder / "soft_9.npz", touch)
-    with pytest.raises(InputError, match=r"soft_9.npz: meta.contacts labels 2 contacts, 1 "):
+    with pytest.raises(
+        InputError, match=r"soft_9.npz: meta.contacts labels 2 contacts, 1 "
+    ):
         load_trials([folder], jobs=2)
 
 
@@ -84,17 +86,25 @@ def test_recordings_that_are_never_touched_are_left_out_and_named(folder, make_t
     assert len(data.trials) == 4
 
 
-def test_a_taxel_is_dead_that_no_frame_of_any_recording_could_read(make_touch, tmp_path):
+def test_a_taxel_is_dead_that_no_frame_of_any_recording_could_read(
+    make_touch, tmp_path
+):
     touch, valid = make_touch(), np.ones((16, 24), dtype=bool)
     valid[0, :3] = False
     by_frame = np.tile(valid, (len(touch.t), 1, 1))
     by_frame[5, 0, 1] = True
-    for name, mask, dead in (("a", valid, (0, 1, 2)), ("b", by_frame, (0, 2)), ("c", None, ())):
+    for name, mask, dead in (
+        ("a", valid, (0, 1, 2)),
+        ("b", by_frame, (0, 2)),
+        ("c", None, ()),
+    ):
         save(tmp_path / f"{name}.npz", replace(touch, valid=mask))
         assert load_trials([tmp_path]).layout.dead == dead
 
 
-def test_the_few_that_lack_joint_angles_do_not_take_them_from_the_others(folder, make_touch):
+def test_the_few_that_lack_joint_angles_do_not_take_them_from_the_others(
+    folder, make_touch
+):
     save(folder / "bare.npz", make_touch(arm=False))
     data = load_trials([folder])
     assert data.chain is not None
@@ -111,7 +121,10 @@ def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path
 
 
 def test_a_label_that_a_few_lack_stays_a_task_without_them(folder, make_touch):
-    save(folder / "odd.npz", make_touch(labels={"category": "rigid-fixed", "mood": "bad"}))
+    save(
+        folder / "odd.npz",
+        make_touch(labels={"category": "rigid-fixed", "mood": "bad"}),
+    )
     data = load_trials([folder])
     assert data.tasks == ("category", "object")
     assert [path.name for path in data.left_out["a label for object"]] == ["odd.npz"]
@@ -128,7 +141,9 @@ def described(recording, **meta):
     return replace(recording, meta={**recording.meta, **meta})
 
 
-def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, tmp_path):
+def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(
+    two, tmp_path
+):
     save(tmp_path / "two.npz", two)
     data = load_trials([tmp_path])
     assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
@@ -137,7 +152,10 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, t
     assert (len(data.trials), data.unused) == (2, ())
     assert data.trials[1].onset_s == data.trials[0].onset_s + 1.3
     assert data.trials[1].labels == data.trials[0].labels
-    save(tmp_path / "two.npz", described(two, contacts=[{"object": "one"}, {"object": "other"}]))
+    save(
+        tmp_path / "two.npz",
+        described(two, contacts=[{"object": "one"}, {"object": "other"}]),
+    )
     assert load_trials([tmp_path]).labels("object").tolist() == ["one", "other"]
 
 
@@ -149,7 +167,9 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(two, t
         ([1, 2], 'must be "alike" or a list'),
     ],
 )
-def test_labels_of_contacts_that_do_not_fit_are_one_sentence(contacts, word, two, tmp_path):
+def test_labels_of_contacts_that_do_not_fit_are_one_sentence(
+    contacts, word, two, tmp_path
+):
     save(tmp_path / "two.npz", described(two, contacts=contacts))
     with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
         load_trials([tmp_path])
@@ -169,14 +189,25 @@ ONE_JOINT = {"joint": [{"axis": [0, 0, 1]}]}
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (lambda r: skinned(r, wraps=False), "odd.npz: this skin has 16 x 24 taxels, flat"),
-        (lambda r: skinned(r, counts_per_newton=None), "closed around, with forces in counts"),
+        (
+            lambda r: skinned(r, wraps=False),
+            "odd.npz: this skin has 16 x 24 taxels, flat",
+        ),
+        (
+            lambda r: skinned(r, counts_per_newton=None),
+            "closed around, with forces in counts",
+        ),
         (lambda r: with_angles(r, 3), "odd.npz: has 3 joint angles and names no arm"),
         (lambda r: described(with_angles(r, 1), arm=ONE_JOINT), "is not that of"),
-        (lambda r: described(r, arm=ONE_JOINT), "odd.npz: has 5 joint angles, its arm takes 1"),
+        (
+            lambda r: described(r, arm=ONE_JOINT),
+            "odd.npz: has 5 joint angles, its arm takes 1",
+        ),
     ],
 )
-def test_recordings_that_do_not_belong_together_are_refused(change, word, folder, make_touch):
+def test_recordings_that_do_not_belong_together_are_refused(
+    change, word, folder, make_touch
+):
     save(folder / "odd.npz", change(make_touch()))
     with pytest.raises(InputError, match=word):
         load_trials([folder])
@@ -195,7 +226,9 @@ def test_recordings_without_labels_are_refused(make_touch, tmp_path):
 def test_damaged_files_stop_the_fit_and_the_first_is_named(folder):
     for name in ("hard_3", "soft_1"):
         (folder / f"{name}.npz").write_bytes(b"PK")
-    with pytest.raises(InputError, match=r"hard_3.npz: not .*; 1 more cannot be used either"):
+    with pytest.raises(
+        InputError, match=r"hard_3.npz: not .*; 1 more cannot be used either"
+    ):
         load_trials([folder])
 
 
@@ -212,15 +245,21 @@ def test_recordings_that_name_no_arm_take_the_one_given(make_touch, tmp_path):
     assert data.chain is swing
 
 
-def test_angles_are_measured_by_the_names_of_their_joints(recordings, make_touch, tmp_path):
-    """A recording whose columns are reversed, with a wheel between them, has the same features."""
+def test_angles_are_measured_by_the_names_of_their_joints(
+    recordings, make_touch, tmp_path
+):
+    """A recording whose columns are reversed, with a wheel between them, has the same
+    features."""
     arm, trial = Chain.cody(), make_touch()
     save(tmp_path / "a" / "one.npz", trial)
     names = list(arm.names)[::-1]
     shuffled = np.insert(trial.joints[:, ::-1], 2, 7.0, axis=1)
     meta = {**trial.meta, "joint_names": [*names[:2], "wheel", *names[2:]]}
     save(tmp_path / "b" / "one.npz", replace(trial, joints=shuffled, meta=meta))
-    straight, reordered = load_trials([tmp_path / "a"]), load_trials([tmp_path / "b"], arm=arm)
+    straight, reordered = (
+        load_trials([tmp_path / "a"]),
+        load_trials([tmp_path / "b"], arm=arm),
+    )
     np.testing.assert_array_equal(reordered.features(), straight.features())
 
 

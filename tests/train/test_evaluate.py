@@ -7,7 +7,15 @@ import pytest
 
 from edge.errors import InputError
 from edge.statistics import wilson
-from train.evaluate import Promise, Result, choose, evaluate, fits, group_folds, stratified_folds
+from train.evaluate import (
+    Promise,
+    Result,
+    choose,
+    evaluate,
+    fits,
+    group_folds,
+    stratified_folds,
+)
 from train.pipeline import ContactClassifier
 from train.search import SearchGrid
 
@@ -45,12 +53,15 @@ def test_every_answer_is_that_of_the_exported_estimators():
         for j in range(4):
             train = np.flatnonzero((folds != i) & (folds != j))
             test = np.flatnonzero(folds == j)
-            for choice, right in zip(table.choices["t"], table.right["t"][i], strict=True):
+            for choice, right in zip(
+                table.choices["t"], table.right["t"][i], strict=True
+            ):
                 assert (right[test] == told_right(choice, X, y, train, test)).all()
 
 
 def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
-    """Each trial has a twin of another label: the earlier of equally near ones decides."""
+    """Each trial has a twin of another label: the earlier of equally near ones
+    decides."""
     folds = np.repeat(np.arange(6) % 3, 2)
     y = np.array(["a", "b", "b", "c", "c", "a"] * 2)
     grids = [replace(grid, neighbours=(1, 2)) for grid in GRIDS]
@@ -59,7 +70,9 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
         table = evaluate(X, {"t": y}, folds, grids, features=TWO)
         for fold in range(3):
             train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-            for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
+            for choice, right in zip(
+                table.choices["t"], table.right["t"][fold], strict=True
+            ):
                 assert (right[test] == told_right(choice, X, y, train, test)).all()
 
 
@@ -74,7 +87,9 @@ def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_o
     assert (table.tested["t"] == tested).all()
     for fold in range(3):
         train, test = folds != fold, (folds == fold) & tested
-        for choice, right in zip(table.choices["t"], table.right["t"][fold], strict=True):
+        for choice, right in zip(
+            table.choices["t"], table.right["t"][fold], strict=True
+        ):
             assert (right[test] == told_right(choice, X, y, train, test, own)).all()
     assert table.nested("t").total == tested.sum()
 
@@ -88,7 +103,9 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
         inner = [
             np.concatenate(
                 [
-                    told_right(c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j)
+                    told_right(
+                        c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j
+                    )
                     for j in range(4)
                     if j != i
                 ]
@@ -142,12 +159,19 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
     two = np.where(y == "a", "yes", "no")
     labels = {"t": y, "u": two}
     grid = SearchGrid(
-        "IV", "lda", shrinkages=(0.1,), neighbours=(1,), targets=("t", "u"), most_directions=most
+        "IV",
+        "lda",
+        shrinkages=(0.1,),
+        neighbours=(1,),
+        targets=("t", "u"),
+        most_directions=most,
     )
     table = evaluate(X, labels, stratified_folds(y, 4), [grid], features=TWO)
     train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
     (choice,) = table.choices["t"]
-    assert choice.components == (most or sum(len(set(labels[task])) - 1 for task in labels))
+    assert choice.components == (
+        most or sum(len(set(labels[task])) - 1 for task in labels)
+    )
     model = ContactClassifier({"t": choice}, TWO)
     model.fit(X[train], {task: own[train] for task, own in labels.items()})
     said = model.classes_["t"][model.decide(X[test])["t"].labels]
@@ -166,7 +190,8 @@ def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
 
 
 def test_of_candidates_that_cost_the_same_the_best_is_chosen():
-    """By how it is better the error of a difference does not ask: nothing is saved by the other."""
+    """By how it is better the error of a difference does not ask: nothing is saved by
+    the other."""
     right = np.ones((4, 100), dtype=bool)
     right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
     right[3, 50:] = False
@@ -195,6 +220,10 @@ def test_progress_is_told_after_each_of_the_fits_that_are_announced():
     folds, seen = stratified_folds(y, 5), []
     for nested, count in ((True, 15), (False, 5)):
         seen.clear()
-        options = {"progress": lambda: seen.append(1), "nested": nested, "features": TWO}
+        options = {
+            "progress": lambda: seen.append(1),
+            "nested": nested,
+            "features": TWO,
+        }
         evaluate(X, {"t": y}, folds, GRIDS[:1], **options)
         assert len(seen) == fits(folds, nested) == count

@@ -1,4 +1,5 @@
-"""Named sets, transforms, summaries and features of cells and joints, against exact values."""
+"""Named sets, transforms, summaries and features of cells and joints, against exact
+values."""
 
 import math
 from fractions import Fraction
@@ -76,7 +77,12 @@ def test_units_are_those_of_the_skin():
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
     given = ["contact_area", "paper", "skin_force"]
-    assert expand(given) == ("contact_area", "max_force", "contact_motion", "skin_force")
+    assert expand(given) == (
+        "contact_area",
+        "max_force",
+        "contact_motion",
+        "skin_force",
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
@@ -92,14 +98,21 @@ def test_a_vector_has_the_widths_that_are_told(name, samples):
 
 
 def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
-    wanted = ["max_force", "max_force_mean", "taxel_force@10", "sqrt_taxel_force_deviation"]
+    wanted = [
+        "max_force",
+        "max_force_mean",
+        "taxel_force@10",
+        "sqrt_taxel_force_deviation",
+    ]
     assert widths(wanted, 40, SKIN) == (40, 1, 230, 23)
     wanted = ["joint_change", "joint_angle_mean@9", "taxel_force", "max_force_rate@3"]
     assert widths(wanted, 4, SKIN, 7) == (28, 7, 92, 3)
 
 
 def test_a_name_says_its_own_number_of_times():
-    few = vector_of(touch(PEAKS), "max_force@3", "max_force", "taxel_force_mean@2", samples=5)
+    few = vector_of(
+        touch(PEAKS), "max_force@3", "max_force", "taxel_force_mean@2", samples=5
+    )
     assert few[:3].tolist() == [1.0, 2.0, 4.0]
     assert few[3:8].tolist() == [p / 100 for p in PEAKS]
     assert few[8 + 6] == (1.0 + 4.0) / 2
@@ -115,7 +128,9 @@ def test_the_transform_next_to_the_name_is_the_first():
 
 
 def test_a_square_root_keeps_the_sign():
-    frames = [pressed(SKIN, t, {(0, 2): 50, (1, 1): 50, (2, 0): 50}) for t in (0.0, 1.0)]
+    frames = [
+        pressed(SKIN, t, {(0, 2): 50, (1, 1): 50, (2, 0): 50}) for t in (0.0, 1.0)
+    ]
     slant = vector_of(frames, "skin_slant")
     assert (slant < 0.0).all()
     assert vector_of(frames, "sqrt_skin_slant") == pytest.approx(-np.sqrt(-slant))
@@ -127,15 +142,24 @@ def test_summaries_are_one_number_of_the_transformed_samples():
     deviation = math.sqrt(math.fsum((r - mean) ** 2 for r in roots) / 5)
     steps = [abs(b - a) for a, b in pairwise(roots)]
     seen = vector_of(
-        touch(PEAKS), "sqrt_max_force_mean", "sqrt_max_force_deviation", "sqrt_max_force_roughness"
+        touch(PEAKS),
+        "sqrt_max_force_mean",
+        "sqrt_max_force_deviation",
+        "sqrt_max_force_roughness",
     )
-    assert seen == pytest.approx([mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15)
+    assert seen == pytest.approx(
+        [mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15
+    )
 
 
 def test_the_floor_of_a_logarithm_is_the_least_that_is_in_contact():
     frames = touch([100, 100, 0, 0, 0])
     seen = vector_of(
-        frames, "log_max_force", "log_contact_area", "log_force_motion", "log_taxel_force_mean"
+        frames,
+        "log_max_force",
+        "log_contact_area",
+        "log_force_motion",
+        "log_taxel_force_mean",
     )
     assert seen[4] == math.log(0.1)  # a threshold of 9 counts, 100 counts a newton
     assert seen[9] == math.log(1.0)
@@ -148,10 +172,14 @@ def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
     frames = touch([100, 100, 100])
     frames[1].counts[1, 3] = 200
     frames[2].counts[:] = 0
-    pressure = vector_of(frames, "skin_pressure", "left_pressure", window=0.5, samples=3)
+    pressure = vector_of(
+        frames, "skin_pressure", "left_pressure", window=0.5, samples=3
+    )
     assert pressure == pytest.approx([0.75, 3.5 / 3, 0.0, 0.75, 0.75, 0.0])
     wanted = ["stiffness", "skin_force", "force_motion"]
-    stiffness, force, motion = vector_of(frames, *wanted, window=0.5, samples=3).reshape(3, 3)
+    stiffness, force, motion = vector_of(
+        frames, *wanted, window=0.5, samples=3
+    ).reshape(3, 3)
     assert stiffness[:2] == pytest.approx((force[:2] + 0.1) / (motion[:2] + 0.002))
     assert stiffness[0] == pytest.approx(1.6 / 0.002)
 
@@ -167,7 +195,11 @@ def test_cells_follow_in_their_places_and_have_one_largest_value():
 def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
     angles = np.array([[1.0, -2.0], [1.5, -2.0], [2.0, -2.5], [2.0, -3.0], [2.0, -3.0]])
     seen = vector_of(
-        touch(PEAKS, joints=angles), "joint_change", "joint_angle", "joint_change_rate", joints=2
+        touch(PEAKS, joints=angles),
+        "joint_change",
+        "joint_angle",
+        "joint_change_rate",
+        joints=2,
     )
     change, angle, rate = seen.reshape(3, 2, 5)
     assert change.tolist() == (angles - angles[0]).T.tolist()
@@ -177,7 +209,9 @@ def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
 
 def test_angles_that_lack_are_interpolated_and_flagged():
     angles = [np.array([1.0]), None, np.array([2.0]), None, np.array([3.0])]
-    contact = followed(SKIN, touch(PEAKS, joints=angles), features=["joint_angle"], joints=1)
+    contact = followed(
+        SKIN, touch(PEAKS, joints=angles), features=["joint_angle"], joints=1
+    )
     assert contact.missing_pose
     vector = feature_vector(contact.series(), 1.0, 5, ["joint_angle"])
     assert vector.tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]

@@ -20,7 +20,9 @@ def fitted(recordings):
 
 def test_each_task_has_its_own_choice_and_the_model_measures_what_they_take(fitted):
     assert set(fitted.chosen) == {"category", "object"}
-    taken = {name for settings in fitted.chosen.values() for name in settings.choice.features}
+    taken = {
+        name for settings in fitted.chosen.values() for name in settings.choice.features
+    }
     assert set(fitted.dataset.names) == taken
     assert fitted.X.shape == (16, sum(fitted.dataset.widths(fitted.samples)))
     assert len(fitted.measured.names) > len(fitted.dataset.names)
@@ -35,24 +37,36 @@ def test_the_number_that_is_told_is_that_of_the_whole_choice(fitted):
 
 def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
     data = load_trials([recordings], features=["max_force", "contact_area"])
-    given = {"features": ["max_force", "contact_area"], "projection": "pca", "scaling": "IV"}
+    given = {
+        "features": ["max_force", "contact_area"],
+        "projection": "pca",
+        "scaling": "IV",
+    }
     fitted = train.fit(data, **given, leave_out="trial", decision_points_s=(), jobs=1)
     assert fitted.chosen["category"].left_out == "trial"
     assert fitted.sequential is None
     said = fitted.classifier.decide(fitted.X)["category"].labels
-    assert (fitted.classifier.classes_["category"][said] == data.labels("category")).all()
+    assert (
+        fitted.classifier.classes_["category"][said] == data.labels("category")
+    ).all()
 
 
 def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_path):
     for kind in ("hard", "soft"):
         for seed in range(9):
             labels = {"category": kind, "object": f"{kind} {seed % 3}", "side": kind}
-            save(tmp_path / f"{kind}{seed}.npz", make_touch(kind=kind, seed=seed, labels=labels))
+            save(
+                tmp_path / f"{kind}{seed}.npz",
+                make_touch(kind=kind, seed=seed, labels=labels),
+            )
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     told = fitted.chosen["category"]
     assert told.left_out == "object"
     # The 18 trials count as much as their six objects do.
-    assert [result.variance for result in (told.accuracy, *told.candidates)] == [3.0, 3.0]
+    assert [result.variance for result in (told.accuracy, *told.candidates)] == [
+        3.0,
+        3.0,
+    ]
     assert told.by_trial.variance == VARIANCE
     assert fitted.chosen["object"].left_out == "trial"
     # The folds have all labels of the task that has the most of them.
@@ -68,7 +82,9 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
         save(tmp_path / f"{name}.npz", make_touch(seconds=0.0, labels=labels))
     paths = [str(recordings), str(tmp_path)]
     both = train.fit(paths, features=["paper"], projection="pca", scaling="IV", jobs=1)
-    alone = train.fit(paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1)
+    alone = train.fit(
+        paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1
+    )
     seen, before = (f.chosen["category"].accuracy for f in (both, alone))
     assert (seen.right, seen.total) == (before.right + 1, before.total + 2)
 
@@ -101,24 +117,31 @@ def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(
     )
     choices = {"object": Choice("IV", components, 3, features=("max_force",))}
     notes: list[str] = []
-    assert _decision_points(data, choices, None, 1.2, 40, notes, trials) == pytest.approx(points)
+    assert _decision_points(
+        data, choices, None, 1.2, 40, notes, trials
+    ) == pytest.approx(points)
     assert [note.split(" decision points")[0] for note in notes] == (
         [] if len(points) == 11 else [str(len(points) or "no")]
     )
 
 
 def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are_two_warnings():
-    """Ten taxels' rest values tell the label; the touch comes later, or is there from the start."""
+    """Ten taxels' rest values tell the label; the touch comes later, or is there from
+    the start."""
     labels = np.array(["a", "b"] * 10)
     frames = np.where(labels == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5))
 
     def warning(onset_s):
-        recordings = [Recording(np.arange(6) / 10.0, f) for f in frames.astype(np.uint16)]
+        recordings = [
+            Recording(np.arange(6) / 10.0, f) for f in frames.astype(np.uint16)
+        ]
         trials = [SimpleNamespace(recording=r, onset_s=onset_s) for r in recordings]
         (note,) = _leaks(SimpleNamespace(trials=trials), {"kind": labels})
         return note
 
     assert "the first frame alone tells kind in 100% of the trials" in warning(0.1)
-    assert "begin with their recording, so their onset is not known; record" in warning(0.0)
+    assert "begin with their recording, so their onset is not known; record" in warning(
+        0.0
+    )
     frames[:, 1:] = 50  # and grows
     assert "or take --threshold 18 --onset 27, by which it begins later" in warning(0.0)

@@ -22,9 +22,13 @@ def test_channels_of_one_unit_share_a_shift():
 @pytest.mark.parametrize("biases", [504, 1008])
 def test_biases_are_quantiles_of_the_results_of_training(biases):
     table = kernel_table(TOUCHES, biases, alike=False)
-    results = np.concatenate([convolved(shifted(t, table.shifts)) for t in TOUCHES], axis=1)
+    results = np.concatenate(
+        [convolved(shifted(t, table.shifts)) for t in TOUCHES], axis=1
+    )
     own = results[convolution_of_bias(biases)]
-    assert all(bias in row for bias, row in zip(table.biases, own.tolist(), strict=True))
+    assert all(
+        bias in row for bias, row in zip(table.biases, own.tolist(), strict=True)
+    )
     limits = np.array(table.biases)[:, None]
     shares = np.arange(1, biases + 1) * (np.sqrt(5) + 1) / 2 % 1
     assert ((own < limits).mean(axis=1) <= shares).all()
@@ -32,4 +36,6 @@ def test_biases_are_quantiles_of_the_results_of_training(biases):
 
 
 def test_the_same_touches_give_the_same_table():
-    assert kernel_table(TOUCHES, 504, alike=True) == kernel_table(TOUCHES, 504, alike=True)
+    assert kernel_table(TOUCHES, 504, alike=True) == kernel_table(
+        TOUCHES, 504, alike=True
+    )

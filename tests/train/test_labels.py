@@ -17,7 +17,9 @@ SIMULATED = {
 
 def test_softness_and_mobility_follow_from_the_category_and_the_reverse():
     halves = {"softness": "soft", "mobility": "fixed"}
-    own = completed([SIMULATED, {"category": "soft-fixed"}, halves, {"mobility": "movable"}])
+    own = completed(
+        [SIMULATED, {"category": "soft-fixed"}, halves, {"mobility": "movable"}]
+    )
     assert own[0] == SIMULATED
     assert own[1] == own[2] == {"category": "soft-fixed", **halves}
     assert own[3] == {"mobility": "movable"}
@@ -31,7 +33,9 @@ def test_labels_of_other_tasks_follow_where_all_trials_that_have_them_agree():
         "filling": "empty",
     }
     odd = {**complete, "grasp": "left-empty"}
-    assert completed([complete, odd, {"grasp": "right-empty"}])[2] == {"grasp": "right-empty"}
+    assert completed([complete, odd, {"grasp": "right-empty"}])[2] == {
+        "grasp": "right-empty"
+    }
 
 
 def test_no_task_is_added_and_a_label_of_another_form_is_left():
@@ -48,7 +52,9 @@ def test_a_task_is_what_most_have_or_ten():
         shared_tasks([{}, {}, {"a": "x"}])
 
 
-def test_trials_that_lack_a_label_stay_for_their_other_tasks(make_touch, recordings, tmp_path):
+def test_trials_that_lack_a_label_stay_for_their_other_tasks(
+    make_touch, recordings, tmp_path
+):
     bare = make_touch(seed=9)
     bare.meta["labels"] = {"category": "rigid-fixed"}
     save(tmp_path / "bare.npz", bare)
@@ -56,4 +62,6 @@ def test_trials_that_lack_a_label_stay_for_their_other_tasks(make_touch, recordi
     assert len(load_trials(data).trials) == 16
     partial = load_trials(data, partial=True)
     assert (len(partial.trials), partial.labels("object")[-1]) == (17, "")
-    assert [path.name for path in partial.left_out["a label for object"]] == ["bare.npz"]
+    assert [path.name for path in partial.left_out["a label for object"]] == [
+        "bare.npz"
+    ]

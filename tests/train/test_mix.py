@@ -12,7 +12,12 @@ from edge.statistics import wilson
 from train.pipeline import Choice, ContactClassifier
 from train.projection import Projection
 
-GIVEN = {"features": ["max_force", "contact_area"], "projection": "lda", "quick": True, "jobs": 1}
+GIVEN = {
+    "features": ["max_force", "contact_area"],
+    "projection": "lda",
+    "quick": True,
+    "jobs": 1,
+}
 
 
 def saved(folder, make_touch, count, *, simulated, swap=False, first=0, **more):
@@ -22,8 +27,15 @@ def saved(folder, make_touch, count, *, simulated, swap=False, first=0, **more):
         touch = make_touch(kind=kind, seed=seed)
         labels = {"category": ("rigid-fixed", "soft-fixed")[(seed + swap) % 2], **more}
         if simulated:
-            labels |= {"softness": labels["category"].split("-")[0], "object": f"{kind} {seed % 6}"}
-        meta = {**touch.meta, "labels": labels, **({"simulation": {}} if simulated else {})}
+            labels |= {
+                "softness": labels["category"].split("-")[0],
+                "object": f"{kind} {seed % 6}",
+            }
+        meta = {
+            **touch.meta,
+            "labels": labels,
+            **({"simulation": {}} if simulated else {}),
+        }
         save(folder / f"{seed:02}.npz", replace(touch, meta=meta))
     return str(folder)
 
@@ -48,21 +60,32 @@ def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_on
     )
 
 
-def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(make_touch, tmp_path):
+def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
+    make_touch, tmp_path
+):
     simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True, swap=True)
-    own = saved(tmp_path / "own", make_touch, 22, simulated=False, first=50, room="kitchen")
+    own = saved(
+        tmp_path / "own", make_touch, 22, simulated=False, first=50, room="kitchen"
+    )
     fitted = train.fit([own, simulated], **GIVEN)
     assert fitted.chosen["category"].choice.weights == (0, 1)
-    assert fitted.chosen["room"].choice.weights == (0, 1)  # no simulated trial has a room
+    assert fitted.chosen["room"].choice.weights == (
+        0,
+        1,
+    )  # no simulated trial has a room
     assert fitted.classifier.rows_[fitted.classifier.spaces_["category"]].shape[0] == 22
-    assert any("simulated trials no longer help category" in note for note in fitted.notes)
+    assert any(
+        "simulated trials no longer help category" in note for note in fitted.notes
+    )
     assert fitted.sequential.stopping_["category"].trials == 22
 
 
 def test_two_trials_choose_nothing(make_touch, tmp_path):
     simulated = saved(tmp_path / "simulated", make_touch, 8, simulated=True)
     own = saved(tmp_path / "own", make_touch, 2, simulated=False, first=50)
-    with pytest.raises(InputError, match="2 of the trials are no simulated ones; record at least"):
+    with pytest.raises(
+        InputError, match="2 of the trials are no simulated ones; record at least"
+    ):
         train.fit([own, simulated], **GIVEN)
 
 
@@ -75,7 +98,9 @@ def test_a_weight_of_three_is_a_trial_that_stands_three_times():
         X, {"t": labels}, own
     )
     times = np.repeat(np.arange(12), np.where(own, 3, 1))
-    oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(X[times], labels[times])
+    oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(
+        X[times], labels[times]
+    )
     space = fitted.spaces_["t"]
     assert fitted.projections_[space].weights_.tobytes() == oracle.weights_.tobytes()
     assert (fitted.rows_[space] == oracle.transform(X)).all()

@@ -1,4 +1,5 @@
-"""The report of an export: the answers to left-out trials, and the reasons for wrong ones."""
+"""The report of an export: the answers to left-out trials, and the reasons for wrong
+ones."""
 
 from dataclasses import replace
 
@@ -15,17 +16,22 @@ from train import model_report as report
 
 @pytest.fixture(scope="module")
 def written(recordings, tmp_path_factory):
-    """A report of 16 trials, of which hard_3 is labelled wrong and hard_7 touches nothing."""
+    """A report of 16 trials, of which hard_3 is labelled wrong and hard_7 touches
+    nothing."""
     folder, out = tmp_path_factory.mktemp("labelled"), tmp_path_factory.mktemp("report")
     for path in sorted(recordings.glob("*.npz")):
         trial = load(path)
         if path.stem == "hard_3":
-            trial = replace(trial, meta={**trial.meta, "labels": {"category": "soft-fixed"}})
+            trial = replace(
+                trial, meta={**trial.meta, "labels": {"category": "soft-fixed"}}
+            )
         trial.meta["labels"] = {"category": trial.labels["category"]}
         if path.stem == "hard_7":
             trial = replace(trial, frames=0 * trial.frames)
         save(folder / path.name, trial)
-    fitted = train.fit(str(folder), features=["paper"], projection="pca", quick=True, jobs=1)
+    fitted = train.fit(
+        str(folder), features=["paper"], projection="pca", quick=True, jobs=1
+    )
     export.save(out / "model.onnx", fitted)
     page = report.write(out, fitted, Model(out / "model.onnx"), measure(fitted))
     return fitted, page
@@ -48,7 +54,10 @@ def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     ]
     right = sum(float(row["recall %"]) * int(row["trials"]) / 100.0 for row in rows)
     assert right == pytest.approx(result.right, abs=0.01)
-    assert f"{result.accuracy:.1%} of 16 trials are classified correctly" in page.read_text()
+    assert (
+        f"{result.accuracy:.1%} of 16 trials are classified correctly"
+        in page.read_text()
+    )
     assert "The trials include 1 recording without a contact." in page.read_text()
 
 
@@ -69,9 +78,16 @@ def test_features_learning_curve_and_prices_have_their_tables(written):
     shares = [float(row["category, % of pull"]) for row in table(page, "features")]
     assert sum(shares) == pytest.approx(100.0, abs=0.02)
     learning = table(page, "learning")
-    assert [int(row["trials"]) for row in learning] == [3, 6, 9, 12]  # four of five folds of 15
+    assert [int(row["trials"]) for row in learning] == [
+        3,
+        6,
+        9,
+        12,
+    ]  # four of five folds of 15
     hits = fitted.chosen["category"].accuracy.hits
-    assert float(learning[-1]["category %"]) == pytest.approx(100 * hits.mean(), abs=0.01)
+    assert float(learning[-1]["category %"]) == pytest.approx(
+        100 * hits.mean(), abs=0.01
+    )
     assert [row["features"] for row in table(page, "candidates")] == ["paper"]
     assert float(table(page, "candidates_timings")[0]["us per decision"]) > 0.0
 

@@ -1,4 +1,5 @@
-"""Votes, neighbours and all tasks of a model, against the rules and scikit-learn's own tools."""
+"""Votes, neighbours and all tasks of a model, against the rules and scikit-learn's own
+tools."""
 
 import numpy as np
 import pytest
@@ -20,9 +21,14 @@ def test_votes_and_ties():
 
 
 def test_equal_distances_go_to_the_earlier_row():
-    rows, y = np.array([[-1.0], [1.0], [-1.0], [3.0]]), {"t": np.array(["d", "c", "b", "a"])}
+    rows, y = (
+        np.array([[-1.0], [1.0], [-1.0], [3.0]]),
+        {"t": np.array(["d", "c", "b", "a"])},
+    )
     for k in (1, 2, 3):
-        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(rows, y)
+        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
+            rows, y
+        )
         assert model.classes_["t"][model.decide(np.array([[0.0]]))["t"].labels] == ["d"]
 
 
@@ -45,27 +51,39 @@ def test_a_classifier_answers_every_task_by_the_rules():
     squares = model.squares("object", X)
     assert (squares.argmin(axis=1) == np.arange(30)).all()
     assert not squares.diagonal().any()
-    assert (model.classes_["object"][model.decide(X)["object"].labels] == y["object"]).all()
+    assert (
+        model.classes_["object"][model.decide(X)["object"].labels] == y["object"]
+    ).all()
 
 
 def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
-    """At one size of gap the maximum is known: odds of 8.5 to 2.5 for 8 of 10, by half a trial."""
-    assert slope(np.repeat([2.0, -2.0], [8, 2])) == pytest.approx(np.log(8.5 / 2.5) / 2.0)
+    """At one size of gap the maximum is known: odds of 8.5 to 2.5 for 8 of 10, by half
+    a trial."""
+    assert slope(np.repeat([2.0, -2.0], [8, 2])) == pytest.approx(
+        np.log(8.5 / 2.5) / 2.0
+    )
     assert slope(np.full(9, 1e-9)) == pytest.approx(np.log(9.5 / 0.5) * 1e9)
     assert slope(np.repeat([1.0, -1.0], [1, 8])) == pytest.approx(1e-3)
     assert slope(np.zeros(3)) == slope(np.zeros(0)) == 1.0
 
 
 def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
-    """Discriminants of 200 columns separate any two labels of 40 trials, but not of new ones."""
-    X, y = np.random.default_rng(0).normal(size=(40, 200)), {"real": np.tile(["a", "b"], 20)}
+    """Discriminants of 200 columns separate any two labels of 40 trials, but not of new
+    ones."""
+    X, y = (
+        np.random.default_rng(0).normal(size=(40, 200)),
+        {"real": np.tile(["a", "b"], 20)},
+    )
     X[::2, 0] += 9.0
     y["random"] = np.random.default_rng(1).permutation(y["real"])
     choices = dict.fromkeys(y, Choice("none", 1, 1, "lda", 1e-3, weights=(0, 1)))
     model = ContactClassifier(choices, ["max_force"], [200]).fit(X, y)
-    gaps = {task: np.ptp(each.distances, axis=1) for task, each in model.decide(X).items()}
+    gaps = {
+        task: np.ptp(each.distances, axis=1) for task, each in model.decide(X).items()
+    }
     assert gaps["random"].max() < 2.0 < gaps["real"].min()
-    # Simulated trials that count for nothing say nothing either, though here they are all wrong.
+    # Simulated trials that count for nothing say nothing either, though here they are
+    # all wrong.
     both = np.vstack([X, -X]), {task: np.tile(labels, 2) for task, labels in y.items()}
     model.fit(*both, np.arange(80) < 40)
     assert np.ptp(model.decide(X)["real"].distances, axis=1).min() > 2.0
@@ -82,4 +100,6 @@ def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
 )
 def test_choices_that_make_no_sense_are_named(choice, word):
     with pytest.raises(InputError, match=word):
-        ContactClassifier({"t": choice}).fit(features(30), {"t": np.repeat(["a", "b"], 15)})
+        ContactClassifier({"t": choice}).fit(
+            features(30), {"t": np.repeat(["a", "b"], 15)}
+        )

@@ -19,9 +19,11 @@ def test_components_match_long_double_and_have_a_fixed_sign():
     centred = (X - X.mean(axis=0)).astype(np.longdouble)
     covariance = centred.T @ centred
     assert len(axes) == 49
-    # Each is an eigenvector of the long double scatter to within rounding of the largest.
+    # Each is an eigenvector of the long double scatter to within rounding of the
+    # largest.
     residual = (
-        covariance @ axes.T.astype(np.longdouble) - axes.T * values.astype(np.longdouble) ** 2
+        covariance @ axes.T.astype(np.longdouble)
+        - axes.T * values.astype(np.longdouble) ** 2
     )
     assert float(np.abs(residual).max()) < 1e-12 * float(values[0] ** 2)
     top = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
@@ -37,7 +39,9 @@ def test_the_sign_does_not_hang_on_rounding():
         X = 5.0 + np.repeat(np.column_stack([a, -a, 0.01 * b]), 40, axis=1)
         weights = Projection("none", 2).fit(X).weights_
         assert (weights[:40, 0] > 0.7 / 40**0.5).all()
-        assert (Projection("none", 2).fit(X[rng.permutation(30)]).weights_ == weights).all()
+        assert (
+            Projection("none", 2).fit(X[rng.permutation(30)]).weights_ == weights
+        ).all()
 
 
 def test_components_stop_at_the_rank():
@@ -55,7 +59,9 @@ def test_components_stop_at_the_rank():
     offset=st.sampled_from([0.0, 1e3, 1e6]),
     spread=st.sampled_from([1e-6, 1.0, 1e6]),
 )
-def test_coordinates_are_those_of_whole_numbers_in_any_order(seed, scaling, offset, spread):
+def test_coordinates_are_those_of_whole_numbers_in_any_order(
+    seed, scaling, offset, spread
+):
     X = features(30, seed) * spread + offset
     p = Projection(scaling, 4).fit(X)
     z = p.transform(X)
@@ -67,7 +73,8 @@ def test_coordinates_are_those_of_whole_numbers_in_any_order(seed, scaling, offs
 @pytest.mark.parametrize("kind", ["pca", "lda"])
 @pytest.mark.parametrize("columns", [1, 3, 120, 4096])
 def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
-    """For features at their limit with the signs of the weights, the worst that can come."""
+    """For features at their limit with the signs of the weights, the worst that can
+    come."""
     X = np.random.default_rng(columns).normal(size=(30, columns))
     X *= 10.0 ** np.linspace(0, 6, columns)
     p = Projection("none", 20, ["max_force"], kind).fit(X, np.arange(30) % 5)
@@ -110,9 +117,15 @@ def exact_distances(rows, labels, shrinkage):
         X = mpmath.matrix(rows)
         mean = mpmath.matrix([[mpmath.fsum(X[:, j]) / n for j in range(X.cols)]])
         own = {c: [i for i, label in enumerate(labels) if label == c] for c in classes}
-        means = {c: sum((X[i, :] for i in m), 0 * mean) / len(m) for c, m in own.items()}
+        means = {
+            c: sum((X[i, :] for i in m), 0 * mean) / len(m) for c, m in own.items()
+        }
         within = sum(
-            ((X[i, :] - means[c]).T * (X[i, :] - means[c]) for c in classes for i in own[c]),
+            (
+                (X[i, :] - means[c]).T * (X[i, :] - means[c])
+                for c in classes
+                for i in own[c]
+            ),
             mpmath.zeros(X.cols),
         )
         between = sum(
@@ -121,7 +134,8 @@ def exact_distances(rows, labels, shrinkage):
         )
         total = sum((X[i, j] - mean[j]) ** 2 for i in range(n) for j in range(X.cols))
         shrunk = within + shrinkage * total / n * mpmath.eye(X.cols)
-        # With shrunk = L L', the directions are L'^-1 v for the eigenvectors v of L^-1 B L'^-1.
+        # With shrunk = L L', the directions are L'^-1 v for the eigenvectors v of L^-1
+        # B L'^-1.
         inverse = mpmath.cholesky(shrunk) ** -1
         values, vectors = mpmath.eigsy(inverse * between * inverse.T)
         out = np.zeros((n, n))
@@ -132,7 +146,16 @@ def exact_distances(rows, labels, shrinkage):
         return out
 
 
-ROWS = [[3, 1, 4], [1, 5, 9], [2, 6, 5], [3, 5, 8], [9, 7, 9], [3, 2, 3], [8, 4, 6], [2, 6, 4]]
+ROWS = [
+    [3, 1, 4],
+    [1, 5, 9],
+    [2, 6, 5],
+    [3, 5, 8],
+    [9, 7, 9],
+    [3, 2, 3],
+    [8, 4, 6],
+    [2, 6, 4],
+]
 
 
 @pytest.mark.parametrize(
@@ -148,12 +171,15 @@ ROWS = [[3, 1, 4], [1, 5, 9], [2, 6, 5], [3, 5, 8], [9, 7, 9], [3, 2, 3], [8, 4,
         pytest.param(ROWS, "abbbbbbb", id="a class of one"),
         pytest.param([*ROWS[:4], *ROWS[:4]], "abcdabcd", id="equal trials"),
         pytest.param([[a, 2 * a, -a] for a, *_ in ROWS], "abababab", id="rank 1"),
-        pytest.param([[a + 10**6, b, c - 10**6] for a, b, c in ROWS], "aabbccaa", id="offsets"),
+        pytest.param(
+            [[a + 10**6, b, c - 10**6] for a, b, c in ROWS], "aabbccaa", id="offsets"
+        ),
     ],
 )
 @pytest.mark.parametrize("shrinkage", [1.0, 0.1, 0.001])
 def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
-    """1e-16 of the largest eigenvalue, over the least that the ridge leaves: below 1e-11."""
+    """1e-16 of the largest eigenvalue, over the least that the ridge leaves: below
+    1e-11."""
     indices = np.unique(list(labels), return_inverse=True)[1]
     X = np.array(rows, dtype=np.float64)
     weights = Spectrum(X).discriminants(indices, shrinkage)
@@ -191,7 +217,9 @@ def test_the_discriminants_of_several_tasks_stand_side_by_side():
 
 @pytest.mark.parametrize("value", [0.0, 7.5])
 def test_trials_that_are_all_equal_have_no_discriminant(value):
-    fitted = Projection(kind="lda").fit(np.full((6, 120), value), np.repeat(["a", "b"], 3))
+    fitted = Projection(kind="lda").fit(
+        np.full((6, 120), value), np.repeat(["a", "b"], 3)
+    )
     assert fitted.transform(np.zeros((2, 120))).shape == (2, 0)
 
 
@@ -200,7 +228,9 @@ def test_discriminants_without_labels_or_shrinkage_and_unknown_projections_are_r
         Projection(kind="lda").fit(features(30))
     for shrinkage in (0.0, -0.1, np.nan):
         with pytest.raises(InputError, match="shrinkage of lda must be above 0, not"):
-            Projection(kind="lda", shrinkage=shrinkage).fit(features(30), np.repeat(["a", "b"], 15))
+            Projection(kind="lda", shrinkage=shrinkage).fit(
+                features(30), np.repeat(["a", "b"], 15)
+            )
     with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
         Projection(kind="nca").fit(features(30))
 

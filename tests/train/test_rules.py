@@ -1,4 +1,5 @@
-"""Learn-then-test: exact limits, walks that stop at the first failure, certificates that hold."""
+"""Learn-then-test: exact limits, walks that stop at the first failure, certificates
+that hold."""
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ from edge.model.stopping import TEST_SHARE, StoppingRule
 from train.rules import NEVER, RISK, Course, certify, following, stops, upper_limit
 
 
-@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)])
+@pytest.mark.parametrize(
+    ("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)]
+)
 def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
     limit = upper_limit(wrong, trials, 0.1)
     assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
@@ -32,7 +35,11 @@ class TestStops:
 
     def test_what_is_unknown_waits_until_it_is_known_or_for_the_full_window(self):
         assert self.stop(unknown=[(0, 0), (1, 1), (2, 1)]) == [1, 2, 0]
-        assert self.stop(unknown=[(0, 1), (1, 1)], confidence=NEVER, last=0) == [0, 2, 0]
+        assert self.stop(unknown=[(0, 1), (1, 1)], confidence=NEVER, last=0) == [
+            0,
+            2,
+            0,
+        ]
 
 
 SECONDS = np.array([0.4, 0.8, 1.2])
@@ -44,7 +51,8 @@ def course(confidence, wrong):
 
 
 def drawn(n, rng):
-    """Confidences that are the probability of being right, and outcomes drawn with them."""
+    """Confidences that are the probability of being right, and outcomes drawn with
+    them."""
     final = rng.beta(8.0, 1.0, n)
     confidence = np.stack([0.4 + 0.2 * final, 0.2 + 0.7 * final, final])
     right = rng.random(n) < confidence
@@ -59,8 +67,8 @@ def test_the_first_rule_is_the_full_window_at_the_whole_level():
 
 
 def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
-    """Right answers at the first decision point count for nothing once the full window, which is
-    tested first, has 20 of 100 wrong."""
+    """Right answers at the first decision point count for nothing once the full window,
+    which is tested first, has 20 of 100 wrong."""
     wrong = np.zeros((3, 100), dtype=bool)
     wrong[-1, :20] = True
     rules = certify(course(np.full((3, 100), 0.9), wrong), SECONDS)
@@ -70,14 +78,17 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
 
 
 def test_certificates_fail_no_oftener_than_they_say():
-    """Of 300 calibrations the share whose rule errs more often than certified; at most a tenth."""
+    """Of 300 calibrations the share whose rule errs more often than certified; at most
+    a tenth."""
     error, rng = 0.2, np.random.default_rng(2)
     world_confidence, world = drawn(20_000, rng)
     failed = 0
     for _ in range(300):
         confidence, right = drawn(100, rng)
         able = [
-            rule for rule in certify(course(confidence, ~right), SECONDS) if rule.error <= error
+            rule
+            for rule in certify(course(confidence, ~right), SECONDS)
+            if rule.error <= error
         ]
         if able:
             at = stops(world_confidence, able[-1], np.zeros_like(world))
@@ -104,7 +115,9 @@ class TestProduct:
         assert at.tolist() == [0, 0]
         assert wrong.all()
 
-    def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(self):
+    def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(
+        self,
+    ):
         rules = [StoppingRule(0.2, 1.2, NEVER, 2), StoppingRule(0.3, 1.0, 0.7, 2)]
         own = [StoppingRule(0.1, 0.8, 0.9, 2), StoppingRule(0.25, 0.5, 0.6, 2)]
         given = following(own, rules, course(self.FAST, self.WRONG), SECONDS)

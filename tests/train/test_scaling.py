@@ -66,7 +66,14 @@ def test_method_iv_standardises_at_any_scale(scale):
     assert far == pytest.approx(usual, rel=1e-3, abs=1e-3)
 
 
-SIX = ("skin_force", "contact_motion", "left_length", "max_force", "skin_area", "contact_area")
+SIX = (
+    "skin_force",
+    "contact_motion",
+    "left_length",
+    "max_force",
+    "skin_area",
+    "contact_area",
+)
 
 
 def vectors(types):
@@ -86,11 +93,15 @@ def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stand
     assert gain[1] * largest[1] == pytest.approx(max(largest[3], largest[5]))
 
 
-@pytest.mark.parametrize("names", [("skin_force", "skin_area"), ("contact_motion", "skin_area")])
+@pytest.mark.parametrize(
+    "names", [("skin_force", "skin_area"), ("contact_motion", "skin_area")]
+)
 def test_method_v_without_the_papers_features_is_no_scaling(names):
     assert scale_of(vectors(2), "V", names).tolist() == [1.0, 1.0]
 
 
 def test_columns_that_are_no_whole_number_of_samples_are_refused():
-    with pytest.raises(InputError, match="10 columns are no whole number of samples of 3"):
+    with pytest.raises(
+        InputError, match="10 columns are no whole number of samples of 3"
+    ):
         scale_of(np.zeros((2, 10)), "IV")

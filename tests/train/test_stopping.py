@@ -1,4 +1,5 @@
-"""Calibrated confidences: logistic curves, folds, novelty, and the trials of each task."""
+"""Calibrated confidences: logistic curves, folds, novelty, and the trials of each
+task."""
 
 import numpy as np
 import pytest
@@ -18,13 +19,19 @@ class TestLogistic:
         right = rng.random(len(margins)) < 1 / (1 + np.exp(-(0.5 * margins + 1.0)))
         assert logistic(margins, right) == pytest.approx((0.5, 1.0), abs=0.05)
 
-    @pytest.mark.parametrize("margins", [np.full(50, 25.0), np.append(np.linspace(0, 1, 30), 40)])
+    @pytest.mark.parametrize(
+        "margins", [np.full(50, 25.0), np.append(np.linspace(0, 1, 30), 40)]
+    )
     @pytest.mark.parametrize("right", [False, True])
-    def test_equal_outcomes_and_one_far_margin_have_the_best_curve(self, margins, right):
+    def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
+        self, margins, right
+    ):
         slope, intercept = logistic(margins, np.full(len(margins), right))
         mean, spread = margins.mean(), margins.std() or 1.0
         errors = expit(slope * margins + intercept) - right
-        assert errors @ (margins - mean) == pytest.approx(0.5 * spread * (1.0 - slope * spread))
+        assert errors @ (margins - mean) == pytest.approx(
+            0.5 * spread * (1.0 - slope * spread)
+        )
         assert errors.sum() == pytest.approx(-0.5 * (intercept + slope * mean))
 
     def test_a_larger_margin_never_speaks_against_a_label(self):
@@ -49,11 +56,14 @@ SECONDS = np.array([0.4, 0.8, 1.2])
 def calibrated(choices, X, y):
     """A model whose settings serve every fold too."""
     folds = stratified_folds(next(iter(y.values())))
-    return SequentialClassifier(choices, SECONDS, ("max_force",)).fit(X, y, folds, [choices] * 10)
+    return SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
+        X, y, folds, [choices] * 10
+    )
 
 
 def touches(n, seed=0):
-    """At the first decision point the labels look alike; from the second on they do not."""
+    """At the first decision point the labels look alike; from the second on they do
+    not."""
     rng = np.random.default_rng(seed)
     labels = rng.choice(["a", "b"], n)
     X = rng.normal(size=(3, n, 12))
@@ -75,7 +85,9 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
     model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
     _, margins, _ = answers(model.decision_points_, X)["t"]
     *_, courses = model.judged(X, {"t": labels})
-    assert (np.diff(courses["t"].confidences[0].ravel()[margins.argsort(axis=None)]) >= 0.0).all()
+    assert (
+        np.diff(courses["t"].confidences[0].ravel()[margins.argsort(axis=None)]) >= 0.0
+    ).all()
 
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
@@ -98,7 +110,8 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
 
 
 def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
-    """A fold lies far from the others: of the many labels it is wrong, of the two it is not."""
+    """A fold lies far from the others: of the many labels it is wrong, of the two it is
+    not."""
     X, labels = touches(200)
     far = stratified_folds(labels) == 0
     X[:, far, 5] = 500.0 * (1 + np.arange(far.sum()))
@@ -121,7 +134,8 @@ def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
 
 
 def test_what_no_task_takes_is_there_for_the_folds_alone():
-    """The folds may choose features that the model does not: its own vectors are narrower."""
+    """The folds may choose features that the model does not: its own vectors are
+    narrower."""
     X, labels = touches(60)
     names = ("max_force", "contact_area")
     folds = stratified_folds(labels)
@@ -132,10 +146,14 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    assert (answers(model.decision_points_, X[..., model.columns_])["t"][2] == 0.0).all()
+    assert (
+        answers(model.decision_points_, X[..., model.columns_])["t"][2] == 0.0
+    ).all()
 
 
 def test_too_few_trials_are_refused():
     X, labels = touches(19)
-    with pytest.raises(InputError, match="calibration needs at least 20 trials, not 19"):
+    with pytest.raises(
+        InputError, match="calibration needs at least 20 trials, not 19"
+    ):
         calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})

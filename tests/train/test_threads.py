@@ -8,7 +8,9 @@ from train.threads import single_thread
 
 def threads():
     """Threads of each library of linear algebra in this process."""
-    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+    return {
+        pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
+    }
 
 
 def test_linear_algebra_takes_one_thread_within_the_block():

@@ -13,12 +13,17 @@ GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 
 
 def noisy(recording, seed):
     """With noise of up to 40 counts on every taxel."""
-    noise = np.random.default_rng(seed).integers(0, 41, recording.frames.shape).astype(np.uint16)
+    noise = (
+        np.random.default_rng(seed)
+        .integers(0, 41, recording.frames.shape)
+        .astype(np.uint16)
+    )
     return replace(recording, frames=np.maximum(recording.frames, noise))
 
 
 def weaker(recording, share, **skin):
-    """With a share of its force, and other thresholds; an entry of None is taken out."""
+    """With a share of its force, and other thresholds; an entry of None is taken
+    out."""
     skin = {**recording.meta["skin"], **skin}
     kept = {key: value for key, value in skin.items() if value is not None}
     frames = (recording.frames * share).astype(np.uint16)
@@ -45,13 +50,17 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
     for seed in range(4):
         touch = make_touch(seed=seed)
         soft = weaker(touch, 70.0 / touch.frames.max())
-        trials.append(noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed))
+        trials.append(
+            noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed)
+        )
     assert proposed(trials) == (40, 60)  # the touch peaks at 70
     strong = [noisy(make_touch(seed=seed), seed) for seed in range(4)]
     assert proposed(strong) == (80, 120)
 
 
-def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(make_touch):
+def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
+    make_touch,
+):
     touch = make_touch(seed=0, lead_s=0.0)
     slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
     slow.frames[0] = 3
@@ -61,7 +70,9 @@ def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(mak
 def saved(folder, make_touch, **skin):
     for seed in range(20):
         touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
-        save(folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin))
+        save(
+            folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
+        )
     return str(folder)
 
 

@@ -1,4 +1,5 @@
-"""Reading a map of touch: `tests.edge.output.test_touch_map` reads what runs have written."""
+"""Reading a map of touch: `tests.edge.output.test_touch_map` reads what runs have
+written."""
 
 import pytest
 
@@ -6,12 +7,16 @@ from edge.errors import InputError
 from train.touch_map import TouchMap
 
 HEAD = '{"event": "map", "frame": "a", "unit": "metre", "tasks": ["mobility"]}\n'
-PLACED = '{"event": "decision", "contact": 1, "onset_s": 0.5, "place": [0.1, 0.2, 0.3], '
+PLACED = (
+    '{"event": "decision", "contact": 1, "onset_s": 0.5, "place": [0.1, 0.2, 0.3], '
+)
 
 
 def test_a_contact_comes_once_all_of_its_tasks_are_decided(tmp_path):
     path = tmp_path / "map.jsonl"
-    path.write_text(HEAD + PLACED + '"task": "mobility", "label": null, "confidence": 0.5}\n')
+    path.write_text(
+        HEAD + PLACED + '"task": "mobility", "label": null, "confidence": 0.5}\n'
+    )
     (touch,) = TouchMap(path)
     assert (touch.position, touch.onset_s) == ((0.1, 0.2, 0.3), 0.5)
     assert (touch.labels, touch.confidence) == ({"mobility": None}, {"mobility": 0.5})
@@ -25,7 +30,10 @@ def test_a_contact_comes_once_all_of_its_tasks_are_decided(tmp_path):
         ("hello\n", "not a map"),
         ('{"event": "decision"}\n', "line 1: not of a map"),
         ('{"event": "map", "frame": "a", "unit": "metre"}\n', "line 1: not of a map"),
-        (HEAD + PLACED + '"task": "mobility", "label": "fixed"}\n', "line 2: not of a map"),
+        (
+            HEAD + PLACED + '"task": "mobility", "label": "fixed"}\n',
+            "line 2: not of a map",
+        ),
         (
             '{"event": "map", "frame": "a", "unit": "metre", "tasks": []}\n'
             '{"event": "map", "frame": "b", "unit": "metre", "tasks": []}\n',

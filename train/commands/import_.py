@@ -1,8 +1,8 @@
 """Turn another lab's data into recordings.
 
-Writes one recording for each trial; existing files of the same name are replaced. Data without
-thresholds get those that `python -m train thresholds` proposes. To add a format, see
-train/importers/__init__.py.
+Writes one recording for each trial; existing files of the same name are replaced. Data
+without thresholds get those that `python -m train thresholds` proposes. To add a
+format, see train/importers/__init__.py.
 """
 
 import argparse
@@ -30,9 +30,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     for name in names():
         module = import_module(f"train.importers.{name}")
         headline, _, more = (module.__doc__ or name).partition("\n\n")
-        command = formats.add_parser(name, help=headline, description=f"{headline}\n\n{more}")
+        command = formats.add_parser(
+            name, help=headline, description=f"{headline}\n\n{more}"
+        )
         command.add_argument("file", type=Path, help="the file or folder")
-        command.add_argument("--out", required=True, type=Path, help="folder for the recordings")
+        command.add_argument(
+            "--out", required=True, type=Path, help="folder for the recordings"
+        )
         add_arm(command, "to select and order a log's joint angles by name")
         command.add_argument(
             "--zero",
@@ -48,7 +52,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
     arm = open_arm(arguments)
-    if not os.path.exists(arguments.file):  # Path.exists raises for a name that is too long
+    if not os.path.exists(
+        arguments.file
+    ):  # Path.exists raises for a name that is too long
         raise InputError(f"{arguments.file}: no such file or folder")
     if arguments.file.name in ("", ".."):  # a bag is a folder, perhaps the current one
         arguments.file = arguments.file.resolve()
@@ -59,14 +65,18 @@ def run(arguments: argparse.Namespace) -> int:
     paths: set[Path] = set()
     for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
-            raise InputError(f"{arguments.file}: holds no joint angles; leave --arm out")
+            raise InputError(
+                f"{arguments.file}: holds no joint angles; leave --arm out"
+            )
         path = arguments.out / f"{name}.npz"
         if not name or path.parent != arguments.out:
             raise InputError(
                 f"{arguments.file}: the trial {name!r} needs a name that a file can have"
             )
         if path in paths:
-            raise InputError(f"{arguments.file}: two trials are named {name}; rename one of them")
+            raise InputError(
+                f"{arguments.file}: two trials are named {name}; rename one of them"
+            )
         paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
         if "threshold_counts" in recording.meta["skin"]:
@@ -94,7 +104,8 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
 
 
 def zeroed(recording: Recording) -> Recording:
-    """The recording minus each taxel's median over the first three frames, and at least 0."""
+    """The recording minus each taxel's median over the first three frames, and at least
+    0."""
     offset = np.median(recording.frames[:ZERO_FRAMES], axis=0).astype(np.uint16)
     frames = np.where(recording.frames > offset, recording.frames - offset, 0)
     return replace(recording, frames=frames.astype(np.uint16))

@@ -1,9 +1,10 @@
 """Draw a recording or a map of touch.
 
-Draws a recording: frames over time with the contact region, and the three features; with --scene,
-the arm and the object from the side; with --model, its curves over those of the nearest training
-trials. Draws several recordings side by side, with the decisions of --model. Draws a map that
-`edge-classify run --map` wrote: the places of the contacts, and their labels.
+Draws a recording: frames over time with the contact region, and the three features;
+with --scene, the arm and the object from the side; with --model, its curves over those
+of the nearest training trials. Draws several recordings side by side, with the
+decisions of --model. Draws a map that `edge-classify run --map` wrote: the places of
+the contacts, and their labels.
 """
 
 import argparse
@@ -15,7 +16,9 @@ from edge.errors import InputError
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     option = parser.add_argument
-    option("recording", nargs="+", help="an .npz recording, several to compare, or a map")
+    option(
+        "recording", nargs="+", help="an .npz recording, several to compare, or a map"
+    )
     option(
         "--model",
         metavar="model.onnx",
@@ -24,13 +27,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     text = "with --model, the folder of the training trials (default: that of the recording)"
     option("--data", type=Path, metavar="DIR", help=text)
-    option("--out", metavar="PNG", help="the picture to write (default: beside the recording)")
     option(
-        "--scene", action="store_true", help="sketch arm, contact and its path from the side too"
+        "--out",
+        metavar="PNG",
+        help="the picture to write (default: beside the recording)",
     )
-    option("--dark", action="store_true", help="draw several recordings for a dark page")
-    option("--threshold", type=int, metavar="COUNTS", help="threshold, instead of the skin's")
-    option("--task", help="on a map, the task whose labels are shown (default: category)")
+    option(
+        "--scene",
+        action="store_true",
+        help="sketch arm, contact and its path from the side too",
+    )
+    option(
+        "--dark", action="store_true", help="draw several recordings for a dark page"
+    )
+    option(
+        "--threshold",
+        type=int,
+        metavar="COUNTS",
+        help="threshold, instead of the skin's",
+    )
+    option(
+        "--task", help="on a map, the task whose labels are shown (default: category)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -67,10 +85,18 @@ def run(arguments: argparse.Namespace) -> int:
     elif model is not None:
         from train.draw import explanation
 
-        explanation.draw(load(first), out, model, arguments.data or Path(first).parent, first)
+        explanation.draw(
+            load(first), out, model, arguments.data or Path(first).parent, first
+        )
     else:
         from train.draw.recording import draw
 
-        draw(load(first), out, where=first, scene=arguments.scene, threshold=arguments.threshold)
+        draw(
+            load(first),
+            out,
+            where=first,
+            scene=arguments.scene,
+            threshold=arguments.threshold,
+        )
     print(out)
     return 0

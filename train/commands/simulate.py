@@ -1,7 +1,7 @@
 """Simulate a scene into recordings.
 
-Simulates the touches that a scene file describes, and only the effects that it calls for. The same
-scene gives the same files, whatever the batch or the machine.
+Simulates the touches that a scene file describes, and only the effects that it calls
+for. The same scene gives the same files, whatever the batch or the machine.
 """
 
 import argparse
@@ -32,7 +32,9 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.out and not arguments.explain:
         raise InputError("simulate: give --out DIR, --explain or both")
     if arguments.jobs == 0 or arguments.jobs < -1:
-        raise InputError(f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}")
+        raise InputError(
+            f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}"
+        )
     if arguments.explain:
         from train.simulate.convergence import explain
 
@@ -46,7 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
             written = write(scene, arguments.out, **given, progress=shown.update)
         lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]
         if written.redrawn:
-            lines.append(f"drawn again until they fitted their labels: {written.redrawn}")
+            lines.append(
+                f"drawn again until they fitted their labels: {written.redrawn}"
+            )
         if written.unfelt:
             lines.append(
                 f"in {written.unfelt} of them no taxel rises above skin.onset_counts "

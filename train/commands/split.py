@@ -1,8 +1,8 @@
 """Cut recordings into one for each contact.
 
-Writes each contact of each recording to its own file, named after the recording and the contact's
-number. Its labels come from meta.contacts, a list with the labels of each contact, or else are
-those of the recording.
+Writes each contact of each recording to its own file, named after the recording and the
+contact's number. Its labels come from meta.contacts, a list with the labels of each
+contact, or else are those of the recording.
 """
 
 import argparse
@@ -25,7 +25,9 @@ LEAD_S = 0.25
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("data", nargs="+", help=".npz recordings or folders of them")
-    parser.add_argument("--out", required=True, type=Path, help="folder for the recordings")
+    parser.add_argument(
+        "--out", required=True, type=Path, help="folder for the recordings"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

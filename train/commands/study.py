@@ -1,6 +1,7 @@
 """Repeat every analysis of the paper on a data set, beside the paper's own numbers.
 
-Writes OUT/report.html, which needs no other file, each plot as PNG and each table as CSV.
+Writes OUT/report.html, which needs no other file, each plot as PNG and each table as
+CSV.
 """
 
 import argparse
@@ -13,14 +14,30 @@ from edge.files import check_writable
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     option = parser.add_argument
-    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
+    option(
+        "--data",
+        nargs="+",
+        required=True,
+        metavar="REC",
+        help=".npz recordings or folders",
+    )
     option(
         "--scene",
         help="the scene that the recordings were simulated from: adds the analyses that simulate "
         "anew (speeds, stiffness, sensor effects) and the paper's numbers",
     )
-    option("--out", type=Path, default=Path("build/study"), help="folder (default: %(default)s)")
-    option("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    option(
+        "--out",
+        type=Path,
+        default=Path("build/study"),
+        help="folder (default: %(default)s)",
+    )
+    option(
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        help="processes (default: all cores)",
+    )
     option(
         "--seeds",
         type=int,
@@ -37,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_writable(arguments.out)  # before the work
 
-    given = {name: getattr(arguments, name) for name in ("scene", "jobs", "address", "seeds")}
+    given = {
+        name: getattr(arguments, name) for name in ("scene", "jobs", "address", "seeds")
+    }
     print(study(arguments.data, arguments.out, **given))
     return 0

@@ -1,9 +1,9 @@
 """Propose thresholds from the recordings' own noise.
 
-Takes the first 0.1 s of each recording as noise, and finds the level that one in ten recordings
-exceeds there. Proposes twice this level as threshold, or the level itself where its double misses
-touches. Proposes 1.5 times the threshold as onset. Counts the contacts that these and other
-thresholds give.
+Takes the first 0.1 s of each recording as noise, and finds the level that one in ten
+recordings exceeds there. Proposes twice this level as threshold, or the level itself
+where its double misses touches. Proposes 1.5 times the threshold as onset. Counts the
+contacts that these and other thresholds give.
 """
 
 import argparse
@@ -25,7 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = read(arguments.data, progress=True).recordings
     threshold, onset = proposed(recordings)
     recorded = recordings[0].layout
-    rows = [("recorded", recorded.threshold_counts, recorded.onset), ("proposed", threshold, onset)]
+    rows = [
+        ("recorded", recorded.threshold_counts, recorded.onset),
+        ("proposed", threshold, onset),
+    ]
     for name, factor in (("half", 0.5), ("twice", 2), ("four times", 4)):
         # Multiples of nothing say nothing, so those of one count stand in.
         low, high = (round(factor * max(level, 1)) for level in (threshold, onset))

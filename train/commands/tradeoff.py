@@ -1,7 +1,7 @@
 """Show the price of accuracy in time: waiting, the wire, arithmetic.
 
-Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as CSV, and
-front.json, which `python -m export --front` reads.
+Writes OUT/report.html (nothing outside it is linked), each plot as PNG, each table as
+CSV, and front.json, which `python -m export --front` reads.
 """
 
 import argparse
@@ -16,7 +16,13 @@ from edge.files import check_writable
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     option = parser.add_argument
-    option("--data", nargs="+", required=True, metavar="REC", help=".npz recordings or folders")
+    option(
+        "--data",
+        nargs="+",
+        required=True,
+        metavar="REC",
+        help=".npz recordings or folders",
+    )
     text = "file that `edge-classify bench` wrote of a model fitted on these recordings"
     option("--board", required=True, metavar="board.json", help=text)
     text = "file that `python -m export.arithmetic` wrote of that model: adds its number formats"
@@ -29,17 +35,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="your price of a wrong decision and of a second's wait: the report names the window "
         "of least cost (default: wrong=10,second=1)",
     )
-    option("--scene", help="the scene that they were simulated from: adds the physical limit")
+    option(
+        "--scene",
+        help="the scene that they were simulated from: adds the physical limit",
+    )
     option("--task", help="task of front.json (default: category, or else the first)")
-    option("--out", type=Path, default=Path("build/tradeoff"), help="folder (default: %(default)s)")
-    option("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    option(
+        "--out",
+        type=Path,
+        default=Path("build/tradeoff"),
+        help="folder (default: %(default)s)",
+    )
+    option(
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        help="processes (default: all cores)",
+    )
 
 
 def cost(text: str) -> tuple[float, float]:
     """The prices of a wrong decision and of a second, out of `wrong=10,second=1`.
 
     Raises:
-        ArgumentTypeError: the text has another form, or a price is below 0 or not finite.
+        ArgumentTypeError: the text has another form, or a price is below 0 or not
+            finite.
     """
     with suppress(ValueError, KeyError):
         prices = dict(term.split("=") for term in text.split(","))

@@ -1,4 +1,5 @@
-"""Draw touches side by side: the loaded skin, the three features, the decision and its time."""
+"""Draw touches side by side: the loaded skin, the three features, the decision and its
+time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +31,9 @@ GAMMA = 0.4
 """Exponent of the colour scale, so that soft touches are seen beside hard ones."""
 INKS = {False: ["#1f4e79", "#b03a2e"], True: ["#79b8ff", "#ff9080"]}
 """Colours of curves and decisions, on a light page and on a dark one."""
-DARK = dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "#0d1117")
+DARK = dict.fromkeys(
+    ("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "#0d1117"
+)
 
 
 def draw(
@@ -49,32 +52,48 @@ def draw(
         dark: light lines on a dark background.
 
     Raises:
-        InputError: there are too many, one has no contact or does not suit the model, or `out`
-            cannot be written.
+        InputError: there are too many, one has no contact or does not suit the model,
+            or `out` cannot be written.
     """
     if len(recordings) > MOST:
-        raise InputError(f"{len(recordings)} recordings are too many side by side; give {MOST}")
-    inks: dict[str, Any] = {"font.size": 12, "axes.prop_cycle": cycler(color=INKS[dark])}
+        raise InputError(
+            f"{len(recordings)} recordings are too many side by side; give {MOST}"
+        )
+    inks: dict[str, Any] = {
+        "font.size": 12,
+        "axes.prop_cycle": cycler(color=INKS[dark]),
+    }
     page: list[Any] = ["dark_background", DARK, inks] if dark else [inks]
     with style.context(page):
         _draw(recordings, out, model)
 
 
-def _draw(recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None) -> None:
-    touches = [(name, recording, *contact_of(name, recording)) for name, recording in recordings]
+def _draw(
+    recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None
+) -> None:
+    touches = [
+        (name, recording, *contact_of(name, recording))
+        for name, recording in recordings
+    ]
     horizon = WINDOW_S if model is None else model.info.window_s
     figure = Figure(figsize=(2.6 * len(recordings) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
-    frames = [strongest_frame(recording, onset, horizon) for _, recording, onset, _ in touches]
-    scale = PowerNorm(GAMMA, vmin=0.0, vmax=max(float(force.max()) for _, force in frames))
+    frames = [
+        strongest_frame(recording, onset, horizon) for _, recording, onset, _ in touches
+    ]
+    scale = PowerNorm(
+        GAMMA, vmin=0.0, vmax=max(float(force.max()) for _, force in frames)
+    )
     for (name, recording, _, series), (seconds, force), column in zip(
         touches, frames, axes.T, strict=True
     ):
         image = column[0].imshow(force, norm=scale, cmap="magma", aspect="auto")
         kind = recording.labels.get("category", "").replace("-", ", ")
-        title = "\n".join(filter(None, (kind, recording.labels.get("object")))) or "touch"
+        title = (
+            "\n".join(filter(None, (kind, recording.labels.get("object")))) or "touch"
+        )
         column[0].set_title(title, fontsize=14, weight="bold")
         column[0].set_xlabel(f"column, at {seconds:.2f} s")
         decided = None if model is None else _decided(name, recording, model)
@@ -106,7 +125,9 @@ def _draw(recordings: Sequence[tuple[str, Recording]], out: Path, model: Model |
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
 
 
-def contact_of(name: str, recording: Recording, number: int = 1) -> tuple[float, FeatureSeries]:
+def contact_of(
+    name: str, recording: Recording, number: int = 1
+) -> tuple[float, FeatureSeries]:
     """Onset and series of a recording's first contact, or of a later one.
 
     Raises:
@@ -117,24 +138,34 @@ def contact_of(name: str, recording: Recording, number: int = 1) -> tuple[float,
         recording = recording.for_joints(chain.names, name)
     touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
     if len(touches) < number:
-        raise InputError(f"{name}: holds no contact" + (f" {number}" if number > 1 else ""))
+        raise InputError(
+            f"{name}: holds no contact" + (f" {number}" if number > 1 else "")
+        )
     return touches[number - 1]
 
 
 def _decided(name: str, recording: Recording, model: Model) -> Decided | None:
     """The decision of the first task: the category, where the model has one."""
-    task = "category" if "category" in model.info.tasks else next(iter(model.info.tasks))
+    task = (
+        "category" if "category" in model.info.tasks else next(iter(model.info.tasks))
+    )
     with about(name):
         events = list(Classifier(model, recording.layout).classify(recording))
     return next((e for e in events if isinstance(e, Decided) and e.task == task), None)
 
 
-def strongest_frame(recording: Recording, onset: float, horizon: float) -> tuple[float, np.ndarray]:
-    """Seconds from onset to the frame with the largest total force in the window, and its forces.
+def strongest_frame(
+    recording: Recording, onset: float, horizon: float
+) -> tuple[float, np.ndarray]:
+    """Seconds from onset to the frame with the largest total force in the window, and
+    its forces.
 
-    The forces are of shape (rows, cols), in newtons, or in counts if the scale is unknown.
+    The forces are of shape (rows, cols), in newtons, or in counts if the scale is
+    unknown.
     """
     t = recording.t - onset
     (inside,) = np.nonzero((t >= 0.0) & (t <= horizon))
     k = inside[recording.frames[inside].sum(axis=(1, 2), dtype=np.int64).argmax()]
-    return float(t[k]), recording.frames[k] / (recording.layout.counts_per_newton or 1.0)
+    return float(t[k]), recording.frames[k] / (
+        recording.layout.counts_per_newton or 1.0
+    )

@@ -1,4 +1,5 @@
-"""Draw the reasons for a model's answers: a touch's curves over those of the nearest trials."""
+"""Draw the reasons for a model's answers: a touch's curves over those of the nearest
+trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ from train.draw.recording import curves, units
 from train.report.figures import STROKES, STYLE
 
 TOUCH, SAME, OTHER = STROKES[0], STROKES[2], STROKES[1]
-"""Colour, marker and dashes of the touch, of trials with its answer, and of those with another."""
+"""Colour, marker and dashes of the touch, of trials with its answer, and of those with
+another."""
 MOST_NEAR, MOST_PULLS = 4, 5
 
 
@@ -31,8 +33,8 @@ class Case:
     Attributes:
         title: the task and the answer.
         touch: the contact.
-        near: text of the legend, contact (None if it is not at hand), and whether the label is
-            that of the answer, for each of the nearest trials.
+        near: text of the legend, contact (None if it is not at hand), and whether the
+            label is that of the answer, for each of the nearest trials.
         pulls: {feature: how much more it pulls towards the answer}.
         rival: the other label, with which the pulls compare the answer.
     """
@@ -44,29 +46,45 @@ class Case:
     rival: str
 
 
-def draw_case(canvas: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool) -> None:
-    """Draw the three features of a case beside those of its nearest trials, and the pulls."""
+def draw_case(
+    canvas: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool
+) -> None:
+    """Draw the three features of a case beside those of its nearest trials, and the
+    pulls."""
     axes = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
     legend = {}
     for axis, (name, unit) in zip(axes, units(layout).items(), strict=False):
         stroke = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
-        legend["this touch"] = axis.plot(*_within(case.touch, name, window_s), **stroke)[0]
+        legend["this touch"] = axis.plot(
+            *_within(case.touch, name, window_s), **stroke
+        )[0]
         for place, (text, series, same) in enumerate(case.near, start=1):
             colour, _, dashes = SAME if same else OTHER
             curve = ([], []) if series is None else _within(series, name, window_s)
             style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
             marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
             legend[text] = axis.plot(*curve, **style, **marks)[0]
-        axis.set(title=name, xlabel="seconds from onset", ylabel=unit, xlim=(0.0, 1.06 * window_s))
+        axis.set(
+            title=name,
+            xlabel="seconds from onset",
+            ylabel=unit,
+            xlim=(0.0, 1.06 * window_s),
+        )
         axis.set_ylim(bottom=0.0)
     strongest = list(case.pulls.items())[:MOST_PULLS]
     signs = [SAME[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]
     axes[3].barh(range(len(strongest)), [pull for _, pull in strongest], color=signs)
-    axes[3].set_yticks(range(len(strongest)), [name for name, _ in strongest], fontsize=8)
+    axes[3].set_yticks(
+        range(len(strongest)), [name for name, _ in strongest], fontsize=8
+    )
     axes[3].invert_yaxis()
     axes[3].axvline(0.0, color="0.3", lw=0.8)
-    axes[3].set(title="pulls to the answer", xlabel=f"squared distance,\nagainst {case.rival}")
-    canvas.legend(legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False)
+    axes[3].set(
+        title="pulls to the answer", xlabel=f"squared distance,\nagainst {case.rival}"
+    )
+    canvas.legend(
+        legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False
+    )
 
 
 def _within(series: FeatureSeries, name: str, window_s: float) -> tuple[Any, Any]:
@@ -74,12 +92,15 @@ def _within(series: FeatureSeries, name: str, window_s: float) -> tuple[Any, Any
     return series.t[inside], curves(series)[name][inside]
 
 
-def draw(recording: Recording, out: Path, model: Model, folder: Path, where: str) -> None:
-    """Draw a recording over the trials of a folder that a model finds nearest, into a PNG.
+def draw(
+    recording: Recording, out: Path, model: Model, folder: Path, where: str
+) -> None:
+    """Draw a recording over the trials of a folder that a model finds nearest, into a
+    PNG.
 
     Raises:
-        InputError: the recording does not suit the model or holds no contact, or the folder holds
-            none of the trials.
+        InputError: the recording does not suit the model or holds no contact, or the
+            folder holds none of the trials.
     """
     touch = contact_of(where, recording)[1]
     known: dict[str, FeatureSeries | None] = {}
@@ -115,5 +136,8 @@ def _trial(folder: Path, name: str) -> FeatureSeries | None:
     """A trial's contact by its name, if its recording is in the folder."""
     path, number = folder / f"{name}.npz", 1
     if not path.is_file() and name.rpartition(" ")[2].isdecimal():
-        path, number = folder / f"{name.rpartition(' ')[0]}.npz", int(name.rpartition(" ")[2])
+        path, number = (
+            folder / f"{name.rpartition(' ')[0]}.npz",
+            int(name.rpartition(" ")[2]),
+        )
     return contact_of(str(path), load(path), number)[1] if path.is_file() else None

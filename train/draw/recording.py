@@ -1,4 +1,5 @@
-"""Draw a recording: its frames with the contact region, the three features, and the arm."""
+"""Draw a recording: its frames with the contact region, the three features, and the
+arm."""
 
 from pathlib import Path
 from typing import Any
@@ -35,11 +36,12 @@ def draw(
     Args:
         where: name of the recording in errors.
         scene: add the arm and the contact's path, seen from the side.
-        threshold: counts above which a taxel is in contact; the recording's own where None.
+        threshold: counts above which a taxel is in contact; the recording's own where
+            None.
 
     Raises:
-        InputError: a sketch is asked for without a known arm or of a damaged `meta.simulation`, or
-            `out` cannot be written.
+        InputError: a sketch is asked for without a known arm or of a damaged
+            `meta.simulation`, or `out` cannot be written.
     """
     from matplotlib.figure import Figure
 
@@ -49,12 +51,18 @@ def draw(
         recording = recording.for_joints(chain.names)
     if scene and chain is None:
         raise InputError(f"{where}: has no joint angles, so there is no arm to sketch")
-    contact = first_contact(recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S))
+    contact = first_contact(
+        recording, ContactTracker(layout, chain=chain, horizon_s=HORIZON_S)
+    )
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
-    labels = ", ".join(f"{task}: {label}" for task, label in sorted(recording.labels.items()))
-    figure.suptitle(f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}")
+    labels = ", ".join(
+        f"{task}: {label}" for task, label in sorted(recording.labels.items())
+    )
+    figure.suptitle(
+        f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
+    )
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
     _frames(figure, grid, recording, layout, onset)
     third = FRAMES // 3
@@ -62,7 +70,9 @@ def draw(
         axis = figure.add_subplot(grid[1, third * i : third * (i + 1)])
         axis.set(title=name, xlabel="seconds from onset", ylabel=unit)
         if series is None:
-            axis.text(0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes)
+            axis.text(
+                0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes
+            )
         else:
             axis.plot(series.t, curves(series)[name])
             axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
@@ -70,7 +80,9 @@ def draw(
             axis.set_ylim(bottom=0.0)
     if scene and chain is not None:
         with parsing(f"{where}: meta.simulation", "that of a scene"):
-            draw_side(figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset)
+            draw_side(
+                figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset
+            )
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 
@@ -90,7 +102,9 @@ def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
     }
 
 
-def _frames(figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float) -> None:
+def _frames(
+    figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float
+) -> None:
     """Draw a frame before the onset, and others spread over the window."""
     frames, t = list(recording), recording.t
     spread = np.linspace(0.0, min(WINDOW_S, float(t[-1]) - onset), FRAMES - 1)
@@ -101,12 +115,18 @@ def _frames(figure: Any, grid: Any, recording: Recording, layout: SkinLayout, on
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     for axis, k in zip(axes, shown, strict=True):
         counts, valid = frames[k].counts, frames[k].valid
-        force = np.ma.masked_array(counts / scale, mask=False if valid is None else ~valid)
+        force = np.ma.masked_array(
+            counts / scale, mask=False if valid is None else ~valid
+        )
         image = axis.imshow(force, vmin=0.0, vmax=top, cmap="viridis", aspect="equal")
-        region = largest_region(counts, layout.threshold_counts, valid=valid, wraps=layout.wraps)
+        region = largest_region(
+            counts, layout.threshold_counts, valid=valid, wraps=layout.wraps
+        )
         title = f"{t[k] - onset:+.2f} s"
         if region is not None:
-            axis.contour(region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2)
+            axis.contour(
+                region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2
+            )
             row, col = region.centroid
             axis.plot(col % layout.cols, row, "r+", markersize=9)
             title += f", {region.area} taxels"

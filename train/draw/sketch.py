@@ -1,4 +1,5 @@
-"""Sketch a contact from the side: the arm, and the object that was simulated, as it moves."""
+"""Sketch a contact from the side: the arm, and the object that was simulated, as it
+moves."""
 
 import math
 from typing import Any
@@ -12,7 +13,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 
 DEPTH_M, STANDS_M = 0.12, 0.15
-"""Depth of an object, and its foot's distance below the contact, where the scene gives none."""
+"""Depth of an object, and its foot's distance below the contact, where the scene gives
+none."""
 ABOVE_M = 0.02
 """Smallest height of an object above the contact."""
 STEMS = 30
@@ -20,18 +22,23 @@ STEMS = 30
 LOST_S = 0.3
 """Seconds without contact after which an object that tips has fallen."""
 
-MOMENTS = (("at onset", 0.0, "0.45", "--", "//"), ("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"))
+MOMENTS = (
+    ("at onset", 0.0, "0.45", "--", "//"),
+    ("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"),
+)
 """The moments that are drawn: name, seconds from onset, colour, line and hatching."""
 
 Place = tuple[np.ndarray, np.ndarray, float]
-"""Position (3,) of a contact, the skin's outward normal there (3,), and metres along the skin to
-its first row."""
+"""Position (3,) of a contact, the skin's outward normal there (3,), and metres along
+the skin to its first row."""
 
 
 def link_positions(chain: Chain, q: Any) -> np.ndarray:
     """(links, 3) positions of the chain's joints and its tip, in metres."""
     chains = [Chain(chain.joints[: i + 1]) for i in range(len(chain.joints))]
-    return np.vstack([np.zeros(3), *(link.pose(q[: link.dof])[:3, 3] for link in chains)])
+    return np.vstack(
+        [np.zeros(3), *(link.pose(q[: link.dof])[:3, 3] for link in chains)]
+    )
 
 
 def draw_side(
@@ -39,19 +46,34 @@ def draw_side(
 ) -> None:
     """Draw the arm at onset and at the end of the window, in the x-z plane of its base.
 
-    An object that was simulated (`meta.simulation`) stands on its table, and slides, leans or turns
-    there.
+    An object that was simulated (`meta.simulation`) stands on its table, and slides,
+    leans or turns there.
     """
     joints, drawn = recording.joints, recording.meta.get("simulation")
     assert joints is not None
     first: Place | None = None
     motion = ""
     for text, later, style, line, hatch in MOMENTS:
-        k = int(np.clip(np.searchsorted(recording.t, onset + later), 0, len(recording.t) - 1))
+        k = int(
+            np.clip(
+                np.searchsorted(recording.t, onset + later), 0, len(recording.t) - 1
+            )
+        )
         points = link_positions(chain, joints[k])
-        axis.plot(*points[:, [0, 2]].T, line, marker="o", color=style, label=text, markersize=4)
+        axis.plot(
+            *points[:, [0, 2]].T,
+            line,
+            marker="o",
+            color=style,
+            label=text,
+            markersize=4,
+        )
         if layout.radius_m is not None:
-            axis.fill(*skin_outline(chain.pose(joints[k]), layout).T, facecolor=style, alpha=0.35)
+            axis.fill(
+                *skin_outline(chain.pose(joints[k]), layout).T,
+                facecolor=style,
+                alpha=0.35,
+            )
         last = _last_contact(recording, joints, chain, layout, k)
         if last is None:
             continue
@@ -61,7 +83,9 @@ def draw_side(
             star = {"color": style, "ms": 13, "mec": "white", "ls": "none"}
             axis.plot(*place[0][[0, 2]], "*", **star, label=f"contact {text}")
         if drawn:
-            motion = _object(axis, drawn, first, place[0], since, color=style, hatch=hatch)
+            motion = _object(
+                axis, drawn, first, place[0], since, color=style, hatch=hatch
+            )
     title = "seen from the side"
     if drawn:
         mass = drawn["values"].get("mass_kg")
@@ -88,22 +112,32 @@ def _last_contact(
 ) -> tuple[float, Place] | None:
     """Seconds from the last contact to frame k, and the place of that contact."""
     for i in range(k, -1, -1):
-        region = largest_region(recording.frames[i], layout.threshold_counts, wraps=layout.wraps)
+        region = largest_region(
+            recording.frames[i], layout.threshold_counts, wraps=layout.wraps
+        )
         if region is not None:
             pose, position = chain.pose(joints[i]), layout.position(*region.centroid)
             place = pose[:3, :3] @ position + pose[:3, 3]
-            normal, above = pose[:3, :2] @ position[:2], region.centroid[0] * layout.pitch[0]
+            normal, above = (
+                pose[:3, :2] @ position[:2],
+                region.centroid[0] * layout.pitch[0],
+            )
             return float(recording.t[k] - recording.t[i]), (place, normal, above)
     return None
 
 
 def _object(
-    axis: Any, drawn: dict[str, Any], first: Place, now: np.ndarray, since: float, **style: Any
+    axis: Any,
+    drawn: dict[str, Any],
+    first: Place,
+    now: np.ndarray,
+    since: float,
+    **style: Any,
 ) -> str:
     """Draw the object where it now stands; its motion in words, for the title.
 
-    Of a face larger than the skin, only the part beside and below the skin is drawn: nothing is
-    known of an object beside the upper arm.
+    Of a face larger than the skin, only the part beside and below the skin is drawn:
+    nothing is known of an object beside the upper arm.
 
     Args:
         first: the contact at onset.
@@ -128,10 +162,14 @@ def _object(
     if "stems" in effects:
         count = min(int(size("stem_count") or 12), STEMS)
         for behind in np.linspace(0.0, size("stem_spread_m") or 0.06, count):
-            # A pot that slides takes its stems along; otherwise they bend as far as pressed.
+            # A pot that slides takes its stems along; otherwise they bend as far as
+            # pressed.
             bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
             ends = slid + behind + np.array([0.0, bent])
-            heights, lines = start[1] + [floor, top], {"color": style["color"], "alpha": 0.5}
+            heights, lines = (
+                start[1] + [floor, top],
+                {"color": style["color"], "alpha": 0.5},
+            )
             axis.plot(start[0] + ahead * ends, heights, **lines, lw=1)
         return ""
     motion = ""
@@ -143,7 +181,11 @@ def _object(
         edge = np.array([depth, floor])
         c, s = math.cos(lean), math.sin(lean)
         outline = (outline - edge) @ np.array([[c, -s], [s, c]]) + edge
-        motion = ", has fallen over" if fallen else f", leans by {math.degrees(lean):.0f} degrees"
+        motion = (
+            ", has fallen over"
+            if fallen
+            else f", leans by {math.degrees(lean):.0f} degrees"
+        )
     else:
         outline[:, 0] += slid
         if "turning" in effects and aside is not None and foot is not None:

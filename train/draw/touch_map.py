@@ -21,7 +21,8 @@ UNKNOWN = "no label"
 def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
     """The name of the arm or skin behind the contacts, and its lines (points, 3).
 
-    In the map's frame: the skin's edges, or the arm with each joint in the middle of its range.
+    In the map's frame: the skin's edges, or the arm with each joint in the middle of
+    its range.
     """
     layout, chain = info.layout, info.chain
     if chain is not None:
@@ -31,7 +32,9 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
     around = np.linspace(0.0, cols if layout.wraps else cols - 1, 4 * cols + 1).tolist()
     lines = [[(row, col) for col in around] for row in (0, rows - 1)]
     lines += [[(0, col), (rows - 1, col)] for col in around[::cols]]
-    return "the skin", [np.array([layout.position(*place) for place in line]) for line in lines]
+    return "the skin", [
+        np.array([layout.position(*place) for place in line]) for line in lines
+    ]
 
 
 def draw(
@@ -42,8 +45,8 @@ def draw(
 ) -> None:
     """Draw two views of the contacts, with a colour and marker for each label.
 
-    Contacts whose votes were divided are fainter. With the model's `info`, the outline of its arm
-    or skin is drawn behind them.
+    Contacts whose votes were divided are fainter. With the model's `info`, the outline
+    of its arm or skin is drawn behind them.
 
     Raises:
         InputError: the map is empty, or has no such task.
@@ -54,7 +57,9 @@ def draw(
     tasks = sorted({task for touch in touches for task in touch.labels})
     chosen = task or ("category" if "category" in tasks else tasks[0])
     if chosen not in tasks:
-        raise InputError(f"{contacts.path}: has no task {chosen!r}; it has {', '.join(tasks)}")
+        raise InputError(
+            f"{contacts.path}: has no task {chosen!r}; it has {', '.join(tasks)}"
+        )
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
     positions = np.array([touch.position for touch in touches])
@@ -69,16 +74,25 @@ def draw(
             labelled = np.array([seen == label for seen in labels])
             style = {"s": 90, "edgecolors": "black", "linewidths": 0.6}
             style["color"] = "0.6" if label == UNKNOWN else f"C{i % 10}"
-            style |= {"marker": MARKERS[i % len(MARKERS)], "alpha": 0.35 + 0.65 * sure[labelled]}
+            style |= {
+                "marker": MARKERS[i % len(MARKERS)],
+                "alpha": 0.35 + 0.65 * sure[labelled],
+            }
             text = f"{label} ({int(labelled.sum())})"
             axis.scatter(*positions[labelled][:, [across, up]].T, **style, label=text)
         unit = UNITS.get(contacts.head.unit, contacts.head.unit)
-        axis.set(xlabel=f"{'xyz'[across]} ({unit})", ylabel=f"{'xyz'[up]} ({unit})", title=view)
+        axis.set(
+            xlabel=f"{'xyz'[across]} ({unit})",
+            ylabel=f"{'xyz'[up]} ({unit})",
+            title=view,
+        )
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.15)
         axis.locator_params(nbins=6)
         axis.grid(alpha=0.3)
-    figure.legend(*axes[0].get_legend_handles_labels(), title=chosen, loc="outside right upper")
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), title=chosen, loc="outside right upper"
+    )
     frame = "the skin" if contacts.head.frame == "skin" else contacts.head.frame
     figure.suptitle(f"{counted(len(touches), 'contact')} in the frame of {frame}")
     with write_whole(out) as file:

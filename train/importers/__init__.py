@@ -5,9 +5,9 @@ A module `NAME.py` here adds `python -m train import NAME FILE --out DIR`. It ha
     def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]
 
 which yields each trial's file name (without `.npz`) and recording, and raises
-`edge.errors.InputError` if the file is not of the format. `arm` is the one that the user names,
-for formats with joint angles. A format with options of its own also has `add_options(parser)`;
-its `trials` then gets the parsed options as a third argument.
+`edge.errors.InputError` if the file is not of the format. `arm` is the one that the
+user names, for formats with joint angles. A format with options of its own also has
+`add_options(parser)`; its `trials` then gets the parsed options as a third argument.
 """
 
 import pkgutil

@@ -1,12 +1,13 @@
 """Tables of values: a file for each trial, or one long table; text, .npy or .mat.
 
-A folder holds a file for each trial: a row a frame, a column a taxel, and if you like columns of
-time and joint angles. The label is the name of the folder that the file lies in, or else its own
-name without the number at the end; `labels.csv`, with the column `trial` and one for each task,
-replaces it. A single file with a column `trial` holds all trials. It has such rows, or the columns
-`taxel` and `value` with a row for each value; its columns of text are labels. COLS are names or
-numbers from 1, such as `1-9,force`. `skin.json` in the folder is the `skin` of the recordings.
-With `--frames`, a folder holds a folder for each trial, with a file for each frame: a line a row.
+A folder holds a file for each trial: a row a frame, a column a taxel, and if you like
+columns of time and joint angles. The label is the name of the folder that the file lies
+in, or else its own name without the number at the end; `labels.csv`, with the column
+`trial` and one for each task, replaces it. A single file with a column `trial` holds
+all trials. It has such rows, or the columns `taxel` and `value` with a row for each
+value; its columns of text are labels. COLS are names or numbers from 1, such as
+`1-9,force`. `skin.json` in the folder is the `skin` of the recordings. With `--frames`,
+a folder holds a folder for each trial, with a file for each frame: a line a row.
 """
 
 import argparse
@@ -64,7 +65,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class _Table:
-    """Named columns of texts or numbers, (n, columns), and the skin's shape where it is known.
+    """Named columns of texts or numbers, (n, columns), and the skin's shape where it is
+    known.
 
     Texts are objects: where numpy converts texts of its own type, it swallows Ctrl-C.
     """
@@ -75,14 +77,21 @@ class _Table:
     shape: tuple[int, ...] = ()
 
     def columns(self, wanted: str) -> list[int]:
-        """The places of a list of names and numbers; `q` also stands for q.1, q.2, ..."""
+        """The places of a list of names and numbers; `q` also stands for q.1, q.2,
+        ..."""
         places: list[int] = []
         for term in wanted.split(","):
-            named = [i for i, name in enumerate(self.names) if name.split(".")[0] == term]
+            named = [
+                i for i, name in enumerate(self.names) if name.split(".")[0] == term
+            ]
             if not named and (ends := re.fullmatch(r"(\d+)(?:-(\d+))?", term)):
-                named = list(range(len(self.names)))[int(ends[1]) - 1 : int(ends[2] or ends[1])]
+                named = list(range(len(self.names)))[
+                    int(ends[1]) - 1 : int(ends[2] or ends[1])
+                ]
             if not named:
-                raise InputError(f"{self.path}: has no column {term}; it has {shown(self.names)}")
+                raise InputError(
+                    f"{self.path}: has no column {term}; it has {shown(self.names)}"
+                )
             places += named
         return places
 
@@ -92,7 +101,11 @@ class _Table:
         try:
             values = texts.astype(np.float64)
         except ValueError:
-            cells = zip(np.tile(places, len(texts)).tolist(), texts.ravel().tolist(), strict=True)
+            cells = zip(
+                np.tile(places, len(texts)).tolist(),
+                texts.ravel().tolist(),
+                strict=True,
+            )
             place, text = next(cell for cell in cells if not _is_number(cell[1]))
             problem = f"{shown(text)} in column {self.names[place]} is no number"
             raise InputError(f"{self.path}: {problem}") from None
@@ -131,7 +144,9 @@ def trials(
     at_rest = max(starts, key=np.nansum) if options.falls else 0.0
     for (name, labels, table), (t, values, joints) in zip(named, measured, strict=True):
         shape = _shape(options.shape, table, skin, width)
-        counts = (np.clip(at_rest - values, 0.0, None) if options.falls else values) * options.scale
+        counts = (
+            np.clip(at_rest - values, 0.0, None) if options.falls else values
+        ) * options.scale
         valid = np.isfinite(counts)
         counts[~valid] = 0.0
         frames = np.rint(counts).clip(0.0, 65535.0).astype(np.uint16)
@@ -140,8 +155,14 @@ def trials(
                 f"{table.path}: {counts.min():g} to {counts.max():g} are no counts (whole numbers "
                 "from 0 to 65535); see --falls, --scale and --taxels"
             )
-        meta: dict[str, Any] = {"labels": {**labels, **beside.get(name, {})}, "source": path.name}
-        meta |= {"skin": {**skin.raw, "rows": shape[0], "cols": shape[1]}, "trial": name}
+        meta: dict[str, Any] = {
+            "labels": {**labels, **beside.get(name, {})},
+            "source": path.name,
+        }
+        meta |= {
+            "skin": {**skin.raw, "rows": shape[0], "cols": shape[1]},
+            "trial": name,
+        }
         if joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
         seen = None if valid.all() else valid.reshape(-1, *shape)
@@ -160,7 +181,10 @@ def _tables(path: Path, folder: Path, options: argparse.Namespace) -> Named:
             with parsing(str(file), "a table of trials"):
                 yield from _trials_in(table)
         else:
-            yield *_called(file.relative_to(folder).with_suffix(""), options.task), table
+            yield (
+                *_called(file.relative_to(folder).with_suffix(""), options.task),
+                table,
+            )
 
 
 def _framed(path: Path, folder: Path, options: argparse.Namespace) -> Named:
@@ -188,11 +212,17 @@ def _labels(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
         return {}
     with parsing(str(path), "a table of labels"):
         head, *rows = _rows(path, read_bytes(path))
-    if "trial" not in head or not any(row[head.index("trial")] in trials for row in rows):
-        raise InputError(f"{path}: needs a column trial with names such as {shown(trials)}")
+    if "trial" not in head or not any(
+        row[head.index("trial")] in trials for row in rows
+    ):
+        raise InputError(
+            f"{path}: needs a column trial with names such as {shown(trials)}"
+        )
     return {
         row[head.index("trial")]: {
-            task: label for task, label in zip(head, row, strict=True) if task != "trial" and label
+            task: label
+            for task, label in zip(head, row, strict=True)
+            if task != "trial" and label
         }
         for row in rows
     }
@@ -206,32 +236,44 @@ def _table(path: Path) -> _Table:
             return _of_arrays(path, data)
         rows = _rows(path, data)
     if all(map(_is_number, rows[0])):
-        return _Table(path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows, object))
+        return _Table(
+            path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows, object)
+        )
     if len(rows) == 1:
         raise InputError(f"{path}: {EMPTY}")
     return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:], object))
 
 
 def _rows(path: Path, data: bytes) -> list[list[str]]:
-    """The cells of a text, row by row; tabs, semicolons, commas or blanks are between them."""
+    """The cells of a text, row by row; tabs, semicolons, commas or blanks are between
+    them."""
     lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
     marks = [mark for mark in "\t;," if mark in lines[0]] if lines else []
-    rows = list(csv.reader(lines, delimiter=marks[0])) if marks else [x.split() for x in lines]
+    rows = (
+        list(csv.reader(lines, delimiter=marks[0]))
+        if marks
+        else [x.split() for x in lines]
+    )
     if not rows:
         raise InputError(f"{path}: {EMPTY}")
     width = len(rows[0])
     for number, row in enumerate(rows, 1):
         if len(row) != width:
             values = f"{len(row)} value{'s' * (len(row) != 1)}"
-            raise InputError(f"{path}: row {number} has {values}, and the first row {width}")
+            raise InputError(
+                f"{path}: row {number} has {values}, and the first row {width}"
+            )
     return rows
 
 
 def _of_arrays(path: Path, data: bytes) -> _Table:
-    """The table of the arrays in an .npy or .mat file, a row for each entry of their first axis."""
+    """The table of the arrays in an .npy or .mat file, a row for each entry of their
+    first axis."""
     file = io.BytesIO(data)
     stored = (
-        {"": np.lib.format.read_array(file)} if path.suffix.lower() == ".npy" else loadmat(file)
+        {"": np.lib.format.read_array(file)}
+        if path.suffix.lower() == ".npy"
+        else loadmat(file)
     )
     arrays = {
         key: np.atleast_1d(array)
@@ -248,12 +290,17 @@ def _of_arrays(path: Path, data: bytes) -> _Table:
         if array.size % n == 0:
             blocks.append(array.reshape(n, -1))
             columns = range(1, blocks[-1].shape[1] + 1)
-            names += [f"{key}.{i}".strip(".") for i in columns] if len(columns) > 1 else [key]
+            names += (
+                [f"{key}.{i}".strip(".") for i in columns]
+                if len(columns) > 1
+                else [key]
+            )
     return _Table(path, names, np.hstack(blocks), shape)
 
 
 def _stacked(folder: Path, files: list[Path], *, timed: bool) -> _Table:
-    """The frames of a trial, a row for each; `timed` if their files are named by their times."""
+    """The frames of a trial, a row for each; `timed` if their files are named by their
+    times."""
     tables = [_table(file) for file in files]
     frames = [table.numbers(list(range(len(table.names)))) for table in tables]
     shape = frames[0].shape
@@ -265,7 +312,9 @@ def _stacked(folder: Path, files: list[Path], *, timed: bool) -> _Table:
     names = [str(i + 1) for i in range(values.shape[1])]
     if not timed:
         return _Table(folder, names, values, shape)
-    with parsing(str(folder), "a folder of files that are named by their times", "; give --rate"):
+    with parsing(
+        str(folder), "a folder of files that are named by their times", "; give --rate"
+    ):
         t = np.array([float(file.stem) for file in files])
         if not np.isfinite(t).all():
             raise ValueError("a time is not finite")
@@ -284,17 +333,26 @@ def _trials_in(table: _Table) -> Named:
     """The trials of a long table."""
     names, values = table.names, table.values
     trial = values[:, names.index("trial")].astype(str)
-    texts = [i for i, name in enumerate(names) if not _is_number(values[0, i]) and name != "trial"]
+    texts = [
+        i
+        for i, name in enumerate(names)
+        if not _is_number(values[0, i]) and name != "trial"
+    ]
     kept = [i for i, name in enumerate(names) if name != "trial" and i not in texts]
     for trial_name in dict.fromkeys(trial.tolist()):
         rows = values[trial == trial_name]
         rows_of_trial = _Table(table.path, [names[i] for i in kept], rows[:, kept])
         labels = {names[i]: str(rows[0, i]) for i in texts}
-        yield trial_name, labels, _pivoted(rows_of_trial) if "taxel" in names else rows_of_trial
+        yield (
+            trial_name,
+            labels,
+            _pivoted(rows_of_trial) if "taxel" in names else rows_of_trial,
+        )
 
 
 def _pivoted(table: _Table) -> _Table:
-    """A row for each time and a column for each taxel, of a table with a row for each value."""
+    """A row for each time and a column for each taxel, of a table with a row for each
+    value."""
     places = [*table.time(), *table.columns("taxel,value")]
     if len(places) != 3:
         raise InputError(f"{table.path}: has no column of times; name it t")
@@ -315,13 +373,17 @@ def _measured(
     others = [i for i in range(len(table.names)) if i not in (*time, *angles)]
     values = table.numbers(table.columns(options.taxels) if options.taxels else others)
     if not time and options.rate is None:
-        raise InputError(f"{table.path}: no column is a time; give --rate HZ or --time COL")
+        raise InputError(
+            f"{table.path}: no column is a time; give --rate HZ or --time COL"
+        )
     t = table.numbers(time)[:, 0] if time else np.arange(len(values)) / options.rate
     joints = table.numbers(angles) * (np.pi / 180.0 if options.degrees else 1.0)
     return t, values, joints if angles else None
 
 
-def _shape(given: str | None, table: _Table, skin: ConfigTable, taxels: int) -> tuple[int, ...]:
+def _shape(
+    given: str | None, table: _Table, skin: ConfigTable, taxels: int
+) -> tuple[int, ...]:
     """Rows and columns of the skin."""
     shape = table.shape or (skin.whole("rows", 1), skin.whole("cols", taxels))
     if given is not None:
@@ -331,5 +393,7 @@ def _shape(given: str | None, table: _Table, skin: ConfigTable, taxels: int) -> 
         shape = int(sizes[1]), int(sizes[2])
     if len(shape) != 2 or shape[0] * shape[1] != taxels:
         size = " x ".join(map(str, shape))
-        raise InputError(f"{table.path}: {taxels} columns are not {size} taxels; give --shape")
+        raise InputError(
+            f"{table.path}: {taxels} columns are not {size} taxels; give --shape"
+        )
     return shape

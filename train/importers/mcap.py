@@ -1,4 +1,5 @@
-"""MCAP files of ROS 2 or JSON messages: one recording each; see train/importers/topics.py.
+"""MCAP files of ROS 2 or JSON messages: one recording each; see
+train/importers/topics.py.
 
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
@@ -20,8 +21,13 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
         from rosbags.typesys import Stores, get_typestore
     log = Log.of(path, arm)
     types = get_typestore(Stores.ROS2_HUMBLE)
-    with parsing(str(path), "a complete MCAP file", "; copy it again"), path.open("rb") as file:
-        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+    with (
+        parsing(str(path), "a complete MCAP file", "; copy it again"),
+        path.open("rb") as file,
+    ):
+        for schema, channel, message in make_reader(
+            file, validate_crcs=True
+        ).iter_messages():
             logged_s = message.log_time * 1e-9
             kind = "" if schema is None else schema.name
             if channel.message_encoding == "json":

@@ -1,4 +1,5 @@
-"""Bags of ROS 1 (`.bag`) or ROS 2 (a folder): one recording each; see train/importers/topics.py.
+"""Bags of ROS 1 (`.bag`) or ROS 2 (a folder): one recording each; see
+train/importers/topics.py.
 
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """

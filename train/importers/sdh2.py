@@ -1,8 +1,10 @@
-"""Grasps of a SCHUNK SDH-2 hand: a folder of OBJECT/*.dsa files, as published by their authors.
+"""Grasps of a SCHUNK SDH-2 hand: a folder of OBJECT/*.dsa files, as published by their
+authors.
 
-A `.dsa` file is XML, compressed with bzip2. It holds the masks of six matrices of texels, frames in
-which runs of zeros are packed, and the hand's seven joint angles with times of their own. Source:
-https://github.com/peter-kiechle/tactile-sensors, `python/classification`.
+A `.dsa` file is XML, compressed with bzip2. It holds the masks of six matrices of
+texels, frames in which runs of zeros are packed, and the hand's seven joint angles with
+times of their own. Source: https://github.com/peter-kiechle/tactile-sensors,
+`python/classification`.
 """
 
 import bz2
@@ -23,24 +25,27 @@ from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 
 PADS = (1, 5)
-"""The matrices that touch: the distal pads of the two fingers that close. In 3 of 856 grasps,
-another matrix is pressed lightly; it is left out."""
+"""The matrices that touch: the distal pads of the two fingers that close. In 3 of 856
+grasps, another matrix is pressed lightly; it is left out."""
 JOINTS = 7
 THRESHOLD_COUNTS = 50
 """Separates contact from noise on these pads; taken from the published recordings."""
 ONSET_COUNTS = 60
-"""A little above the threshold, so that a force that fluctuates there is one contact."""
+"""A little above the threshold, so that a force that fluctuates there is one
+contact."""
 LARGEST_BYTES = 1 << 26
 """Largest size of an unpacked file; the longest published grasp takes 1 MB."""
 STALE_S = 0.1
-"""Joint angles count as unknown so long before the first message or after the last: ten periods."""
+"""Joint angles count as unknown so long before the first message or after the last: ten
+periods."""
 
 
 def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
-    """One recording for each file: the two pads side by side, with an invalid column between them.
+    """One recording for each file: the two pads side by side, with an invalid column
+    between them.
 
-    Force stays in counts, as the scale to newtons is unknown. Motion is measured on the pads, as
-    the joints are those of the hand and not of an arm that carries it.
+    Force stays in counts, as the scale to newtons is unknown. Motion is measured on the
+    pads, as the joints are those of the hand and not of an arm that carries it.
 
     Raises:
         InputError: there is no such file, or one of them is damaged.
@@ -49,7 +54,9 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
         raise InputError("these joints are those of a hand's fingers; leave --arm out")
     paths = files(path)
     if not paths:
-        raise InputError(f"{path}: holds no OBJECT/*.dsa; give the folder of all objects")
+        raise InputError(
+            f"{path}: holds no OBJECT/*.dsa; give the folder of all objects"
+        )
     for i, file in enumerate(paths):
         recording = grasp(file)
         yield f"{i:04d}_{recording.labels['object']}", recording
@@ -101,7 +108,11 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
         dead=tuple(np.flatnonzero(~alive).tolist()),
     )
     meta: dict[str, Any] = {"labels": {"object": file.parent.name}, "arm": None}
-    meta |= {"skin": layout.to_dict(), "source": f"SDH-2 grasp {file.name}", "trial": file.stem}
+    meta |= {
+        "skin": layout.to_dict(),
+        "source": f"SDH-2 grasp {file.name}",
+        "trial": file.stem,
+    }
     return Recording(t, side_by_side, _joints(root, t, stamps[0]), alive, meta)
 
 
@@ -111,13 +122,16 @@ def _pads(
     """The geometry of the pads.
 
     Returns:
-        Which taxels of the pads side by side work; the indices of each pad's cells in a frame of
-        all matrices; the number of cells in such a frame; the distance between texels in metres.
+        Which taxels of the pads side by side work; the indices of each pad's cells in a
+        frame of all matrices; the number of cells in such a frame; the distance between
+        texels in metres.
     """
     cells, places, alive = 0, {}, {}
     pitch_m = math.nan
     for matrix in root.iterfind("./sensor/matrix"):
-        rows, cols = (int(_number(matrix, name, 1, 1024)) for name in ("cells_y", "cells_x"))
+        rows, cols = (
+            int(_number(matrix, name, 1, 1024)) for name in ("cells_y", "cells_x")
+        )
         index = int(matrix.get("index", "-1"))
         if index in PADS:
             places[index] = np.arange(cells, cells + rows * cols).reshape(rows, cols)
@@ -131,38 +145,56 @@ def _pads(
     if left.shape != right.shape:
         raise ValueError(f"its pads differ: {left.shape} and {right.shape} texels")
     between = np.zeros((len(left), 1), dtype=bool)
-    return np.hstack([alive[PADS[0]], between, alive[PADS[1]]]), [left, right], cells, pitch_m
+    return (
+        np.hstack([alive[PADS[0]], between, alive[PADS[1]]]),
+        [left, right],
+        cells,
+        pitch_m,
+    )
 
 
-def _mask(matrix: ElementTree.Element, name: str, rows: int, cols: int) -> NDArray[np.bool_]:
-    """(rows, cols), True for the texels that exist: all of them if the file has no such mask."""
+def _mask(
+    matrix: ElementTree.Element, name: str, rows: int, cols: int
+) -> NDArray[np.bool_]:
+    """(rows, cols), True for the texels that exist: all of them if the file has no such
+    mask."""
     text = "".join((matrix.findtext(name) or "1" * (rows * cols)).split())
     if len(text) != rows * cols or set(text) - {"0", "1"}:
-        raise ValueError(f"its {name} must be a 0 or 1 for each of {rows} x {cols} texels")
+        raise ValueError(
+            f"its {name} must be a 0 or 1 for each of {rows} x {cols} texels"
+        )
     return np.array([sign == "1" for sign in text]).reshape(rows, cols)
 
 
 def _unpacked(text: str, cells: int) -> NDArray[np.uint16]:
-    """(cells,) counts of a frame, given as big-endian float32 in hexadecimal; -n means n zeros."""
+    """(cells,) counts of a frame, given as big-endian float32 in hexadecimal; -n means
+    n zeros."""
     values = np.frombuffer(bytes.fromhex(text), dtype=">f4").astype(np.float64)
     if not (np.isfinite(values).all() and (values == np.rint(values)).all()):
         raise ValueError("a frame holds a count that is no whole number")
     lengths = np.where(values < 0.0, -values, 1.0)
     if lengths.sum() != cells or values.max(initial=0.0) > 65535.0:
         raise ValueError(f"a frame does not unpack to {cells} counts of 0 to 65535")
-    return np.repeat(np.maximum(values, 0.0), lengths.astype(np.int64)).astype(np.uint16)
+    return np.repeat(np.maximum(values, 0.0), lengths.astype(np.int64)).astype(
+        np.uint16
+    )
 
 
 def _joints(
     root: ElementTree.Element, t: NDArray[np.float64], start_ms: float
 ) -> NDArray[np.float64] | None:
-    """(n, 7) radians at the frames' times, NaN far from known ones; None if the file has none."""
+    """(n, 7) radians at the frames' times, NaN far from known ones; None if the file
+    has none."""
     stamps, angles = [], []
     for angle in root.iterfind("./joint_angles/angle"):
         stamps.append(_number(angle, "time_stamp"))
-        angles.append([float(v) for v in (angle.findtext("angle_data") or "").split(",")])
+        angles.append(
+            [float(v) for v in (angle.findtext("angle_data") or "").split(",")]
+        )
         if len(angles[-1]) != JOINTS or not np.isfinite(angles[-1]).all():
-            raise ValueError(f"a line of joint angles does not hold {JOINTS} finite numbers")
+            raise ValueError(
+                f"a line of joint angles does not hold {JOINTS} finite numbers"
+            )
     if not angles:
         return None
     joints_t = (np.array(stamps) - start_ms) / 1000.0
@@ -174,7 +206,9 @@ def _joints(
     return joints
 
 
-def _number(parent: ElementTree.Element, name: str, low: float = 0.0, high: float = 1e15) -> float:
+def _number(
+    parent: ElementTree.Element, name: str, low: float = 0.0, high: float = 1e15
+) -> float:
     text = parent.findtext(name) or "nan"
     if not low <= float(text) <= high:
         raise ValueError(f"its {name} must be {low:g} to {high:g}, not {shown(text)}")

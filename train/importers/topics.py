@@ -1,18 +1,19 @@
 """Topics of frames and joint angles in a robot's log, turned into one recording.
 
-Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), `std_msgs/UInt16MultiArray`
-(with two dimensions in its layout, or with the skin's rows and columns in the JSON file), or JSON
-`{"counts": [[...], ...]}`. Joint angles are `sensor_msgs/JointState`, or JSON `{"q": [...]}`,
-optionally with `"names": [...]`. A message may carry its own time (`header.stamp`, `"t"`);
-otherwise the time at which it was logged is used.
+Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`),
+`std_msgs/UInt16MultiArray` (with two dimensions in its layout, or with the skin's rows
+and columns in the JSON file), or JSON `{"counts": [[...], ...]}`. Joint angles are
+`sensor_msgs/JointState`, or JSON `{"q": [...]}`, optionally with `"names": [...]`. A
+message may carry its own time (`header.stamp`, `"t"`); otherwise the time at which it
+was logged is used.
 
-Joints are identified by name, in any order, and several messages may share them. With an arm, its
-joints are selected in the arm's order, and a warning names the others. Without an arm, all joints
-are kept.
+Joints are identified by name, in any order, and several messages may share them. With
+an arm, its joints are selected in the arm's order, and a warning names the others.
+Without an arm, all joints are kept.
 
 A JSON file beside the log, `NAME.json`, may complete it: `labels` {task: label}, `skin`
-(see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind, the ones to
-use: `frames_topic` and `joints_topic`.
+(see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind,
+the ones to use: `frames_topic` and `joints_topic`.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def needs(package: str) -> Iterator[None]:
     try:
         yield
     except ImportError:
-        raise InputError(f"this needs {package}; install it with `pip install {package}`") from None
+        raise InputError(
+            f"this needs {package}; install it with `pip install {package}`"
+        ) from None
 
 
 @dataclass
@@ -86,7 +89,8 @@ class Log:
         return cls(path, beside, arm)
 
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
-        """Take in a ROS message; kinds other than frames and joint angles are ignored."""
+        """Take in a ROS message; kinds other than frames and joint angles are
+        ignored."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         # Some drivers leave the stamp empty, which is the time 0.
         t = (0.0 if stamp is None else stamp.sec + stamp.nanosec * 1e-9) or logged_s
@@ -109,8 +113,11 @@ class Log:
                 counts = self._counts(topic, np.asarray(message.get("counts")))
                 self._frames[topic].append((t, counts))
 
-    def _pose(self, topic: str, t: float, names: list[str], q: NDArray[np.float64]) -> None:
-        """Take in a message's angles; joints without names get their positions as names."""
+    def _pose(
+        self, topic: str, t: float, names: list[str], q: NDArray[np.float64]
+    ) -> None:
+        """Take in a message's angles; joints without names get their positions as
+        names."""
         where = f"{self.path}: a message of {topic}"
         if q.ndim != 1 or (names and len(names) != len(q)):
             raise InputError(f"{where}: its names are {len(names)} and angles {q.size}")
@@ -118,7 +125,9 @@ class Log:
             raise InputError(f"{where} names a joint twice")
         if not np.isfinite(q).all():
             raise InputError(f"{where} has an angle that is not finite")
-        for name, angle in zip(names or map(str, range(len(q))), q.tolist(), strict=True):
+        for name, angle in zip(
+            names or map(str, range(len(q))), q.tolist(), strict=True
+        ):
             self._joints[topic][name].append((t, angle))
 
     def _image(self, topic: str, message: Any) -> NDArray[np.uint16]:
@@ -130,8 +139,13 @@ class Log:
                 f"{self.path}: the images of {topic} are {message.encoding}; they must be {known}"
             )
         raw = np.asarray(message.data, dtype=np.uint8)
-        if raw.size != message.height * message.step or message.step < message.width * size:
-            raise InputError(f"{self.path}: an image of {topic} does not have its stated size")
+        if (
+            raw.size != message.height * message.step
+            or message.step < message.width * size
+        ):
+            raise InputError(
+                f"{self.path}: an image of {topic} does not have its stated size"
+            )
         lines = raw.reshape(message.height, message.step)[:, : message.width * size]
         order = ">" if message.is_bigendian else "<"
         return np.ascontiguousarray(lines).view(f"{order}u{size}").astype(np.uint16)
@@ -164,10 +178,12 @@ class Log:
         return counts.astype(np.uint16)
 
     def recording(self) -> Recording:
-        """The frames in the order of time, from 0, with joint angles at the frames' times.
+        """The frames in the order of time, from 0, with joint angles at the frames'
+        times.
 
         Raises:
-            InputError: the log has no topic of frames or several, or the frames' shapes differ.
+            InputError: the log has no topic of frames or several, or the frames' shapes
+                differ.
         """
         name, frames = self._topic("frames", self._frames)
         if not frames:
@@ -178,7 +194,9 @@ class Log:
         frames = sorted(frames, key=lambda entry: entry[0])
         shapes = {picture.shape for _, picture in frames}
         if len(shapes) > 1:
-            raise InputError(f"{self.path}: frames of {name} have the shapes {sorted(shapes)}")
+            raise InputError(
+                f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
+            )
         t = np.array([at for at, _ in frames])
         joints, names = self._angles(t)
         rows, cols = shapes.pop()
@@ -195,7 +213,8 @@ class Log:
     def _angles(
         self, t: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64] | None, tuple[str, ...] | None]:
-        """Angles (n, dof) at the frames' times, and the joints' names if the log has them."""
+        """Angles (n, dof) at the frames' times, and the joints' names if the log has
+        them."""
         topic, series = self._topic("joints", self._joints)
         if not series:
             return None, None
@@ -210,7 +229,9 @@ class Log:
                 raise InputError(f"{self.path}: {topic} has {error}") from None
             others = [name for name in logged if name not in wanted]
             if others:
-                LOG.warning(f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}")
+                LOG.warning(
+                    f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
+                )
         elif self.arm is not None and len(logged) != self.arm.dof:
             raise InputError(
                 f"{self.path}: {topic} has {len(logged)} angles without names, but the arm has "
@@ -228,7 +249,8 @@ class Log:
         return angles, wanted if named else None
 
     def _topic(self, kind: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
-        """The topic of a kind that the JSON file names, or else the only one, with its messages."""
+        """The topic of a kind that the JSON file names, or else the only one, with its
+        messages."""
         name = self.beside.get(f"{kind}_topic", None)
         if name is None and len(topics) > 1:
             raise InputError(
@@ -245,10 +267,14 @@ class Log:
         return name, topics[name]
 
 
-def _at(t: NDArray[np.float64], series: list[tuple[float, float]]) -> NDArray[np.float64]:
-    """A joint's angles at times `t`: linear between messages, constant before and after them.
+def _at(
+    t: NDArray[np.float64], series: list[tuple[float, float]]
+) -> NDArray[np.float64]:
+    """A joint's angles at times `t`: linear between messages, constant before and after
+    them.
 
-    An angle that wraps at +-pi between two messages is taken to have gone the shorter way.
+    An angle that wraps at +-pi between two messages is taken to have gone the shorter
+    way.
     """
     at, angle = np.array(sorted(series)).T
     angles: NDArray[np.float64] = np.interp(t, at, np.unwrap(angle))

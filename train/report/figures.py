@@ -75,25 +75,35 @@ def legend(canvas: Any, axes: Any, columns: int) -> None:
     """Add a legend above the axes, where it hides nothing; none for a single series."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
-        canvas.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
+        canvas.legend(
+            handles, labels, loc="outside upper center", ncols=columns, frameon=False
+        )
 
 
-def spread(results: Sequence[Result]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n,) accuracies in percent, and (2, n) their distances to the ends of the intervals."""
+def spread(
+    results: Sequence[Result],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n,) accuracies in percent, and (2, n) their distances to the ends of the
+    intervals."""
     values = np.array([100 * result.accuracy for result in results])
     low, high = 100 * np.array([result.interval for result in results]).T
     return values, np.maximum([values - low, high - values], 0.0)
 
 
-def curve(axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]) -> None:
-    """Draw accuracies in percent with their 95 % intervals, in the `order`-th of `STROKES`."""
+def curve(
+    axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]
+) -> None:
+    """Draw accuracies in percent with their 95 % intervals, in the `order`-th of
+    `STROKES`."""
     colour, marker, dashes = STROKES[order % len(STROKES)]
     y, (below, above) = spread(results)
     axes.fill_between(x, y - below, y + above, color=colour, alpha=0.12, lw=0)
     axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
-def confusion(name: str, title: str, truth: NDArray[np.str_], answers: NDArray[np.str_]) -> Figure:
+def confusion(
+    name: str, title: str, truth: NDArray[np.str_], answers: NDArray[np.str_]
+) -> Figure:
     """A confusion matrix, with a row for each label and a column for each answer.
 
     Args:
@@ -193,19 +203,31 @@ def bars(
 
     def draw(canvas: Any, phone: bool) -> None:
         axes, diamonds = canvas.subplots(), []
-        for i, (stroke, (group, row)) in enumerate(zip(STROKES, groups.items(), strict=False)):
+        for i, (stroke, (group, row)) in enumerate(
+            zip(STROKES, groups.items(), strict=False)
+        ):
             y = np.arange(m) + (i - (g - 1) / 2) * height
             values, arms = spread(row)
-            style = {"color": stroke[0], "alpha": 0.85, "hatch": HATCHES[i], "ec": "white", "lw": 0}
+            style = {
+                "color": stroke[0],
+                "alpha": 0.85,
+                "hatch": HATCHES[i],
+                "ec": "white",
+                "lw": 0,
+            }
             error = {"xerr": arms, "error_kw": {"ecolor": "0.25", "elinewidth": 0.8}}
             axes.barh(y, values, height * 0.92, **style, **error, label=group)
-            diamonds += [(p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()]
+            diamonds += [
+                (p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()
+            ]
         if diamonds:
             style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
             axes.plot(*zip(*diamonds, strict=True), marker="D", **style)
         for text, at in (reference or {}).items():
             axes.axvline(at, color="0.35", lw=1, ls=":", label=text)
-        axes.set_yticks(range(m), [textwrap.fill(n, 18 if phone else 40) for n in names])
+        axes.set_yticks(
+            range(m), [textwrap.fill(n, 18 if phone else 40) for n in names]
+        )
         axes.invert_yaxis()
         axes.set(xlim=(0, 103), xlabel="decisions that are right, %")
         legend(canvas, axes, 2 if phone else 5)

@@ -1,4 +1,5 @@
-"""The report as one HTML file, with each table as CSV and each plot as PNG beside it."""
+"""The report as one HTML file, with each table as CSV and each plot as PNG beside
+it."""
 
 import base64
 import csv
@@ -19,7 +20,8 @@ CODE = re.compile(r"`([^`]+)`")
 
 
 def table_csv(table: Table) -> dict[str, str]:
-    """{file name: CSV text} of the table; columns measured by a clock have a file of their own."""
+    """{file name: CSV text} of the table; columns measured by a clock have a file of
+    their own."""
     columns = table.columns
     files = {table.name: [c for c in columns if c not in table.timed]}
     if table.timed:
@@ -28,7 +30,9 @@ def table_csv(table: Table) -> dict[str, str]:
     for name, shown in files.items():
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerows([shown, *([row.get(c, "") for c in shown] for row in table.rows)])
+        writer.writerows(
+            [shown, *([row.get(c, "") for c in shown] for row in table.rows)]
+        )
         texts[f"{name}.csv"] = text.getvalue()
     return texts
 
@@ -48,7 +52,11 @@ def _cell(value: Any, more: bool, decimals: int) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     text = f"{value:.{decimals}f}" if isinstance(value, float) else str(value)
     kinds = " ".join(["number"] * number + ["more"] * more)
-    return f'<td class="{kinds}">{_text(text)}</td>' if kinds else f"<td>{_text(text)}</td>"
+    return (
+        f'<td class="{kinds}">{_text(text)}</td>'
+        if kinds
+        else f"<td>{_text(text)}</td>"
+    )
 
 
 def _table(table: Table) -> str:
@@ -59,7 +67,9 @@ def _table(table: Table) -> str:
     decimals = [_decimals(column) for column in zip(*table.cells, strict=True)]
     rows = "\n".join(
         f"<tr{' class=no' if row[-1] == 'no' else ''}>"
-        + "".join(_cell(value, i >= table.narrow, decimals[i]) for i, value in enumerate(row))
+        + "".join(
+            _cell(value, i >= table.narrow, decimals[i]) for i, value in enumerate(row)
+        )
         + "</tr>"
         for row in table.cells
     )
@@ -83,7 +93,9 @@ def _figure(figure: Figure) -> str:
 
 def _section(section: Section, folded: bool) -> str:
     heading = f"<h2>{_text(section.title)}</h2>"
-    terms = [f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items()]
+    terms = [
+        f"<dt>{_text(a)}</dt><dd>{_text(b)}</dd>" for a, b in section.terms.items()
+    ]
     body = [
         section.widget,
         *(f"<p>{_text(text)}</p>" for text in section.text),
@@ -113,7 +125,9 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
     )
 
 
-def write(out: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> Path:
+def write(
+    out: Path, title: str, lead: Sequence[str], sections: Sequence[Section]
+) -> Path:
     """Write report.html, PNGs and CSVs into a folder, each whole or not at all.
 
     Args:
@@ -130,7 +144,9 @@ def write(out: Path, title: str, lead: Sequence[str], sections: Sequence[Section
         files |= {f"{figure.name}.png": figure.png for figure in section.figures}
         for table in section.tables:
             if table.rows:
-                files |= {name: text.encode() for name, text in table_csv(table).items()}
+                files |= {
+                    name: text.encode() for name, text in table_csv(table).items()
+                }
     files["report.html"] = page(title, lead, sections).encode()
     for name, data in files.items():
         with write_whole(out / name) as file:

@@ -1,4 +1,5 @@
-"""The accuracies of the reports (nested, leave-one-out, transferred) and their columns."""
+"""The accuracies of the reports (nested, leave-one-out, transferred) and their
+columns."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,8 +36,13 @@ def shares(result: Result) -> dict[str, Any]:
 
 
 def score(result: Result) -> dict[str, Any]:
-    """The columns of an accuracy, its 95 % interval, and the k and components that gave it."""
-    return {**shares(result), "k": result.k or "", "components": result.components or ""}
+    """The columns of an accuracy, its 95 % interval, and the k and components that gave
+    it."""
+    return {
+        **shares(result),
+        "k": result.k or "",
+        "components": result.components or "",
+    }
 
 
 def nested(
@@ -62,7 +68,9 @@ def nested(
     return {task: table.nested(task) for task in y}
 
 
-def voted(rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int) -> Result:
+def voted(
+    rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int
+) -> Result:
     """The accuracy of a vote among each trial's nearest neighbours.
 
     Args:
@@ -82,15 +90,21 @@ def grid_search(
     scaling: str = "none",
     features: Sequence[str] = FEATURES,
 ) -> dict[str, Result]:
-    """Each task's best leave-one-out accuracy over 1 to 20 components and k (section IV-A)."""
+    """Each task's best leave-one-out accuracy over 1 to 20 components and k (section
+    IV-A)."""
     rows = neighbours(
-        X, scaling=scaling, features=features, max_components=min(MAX_COMPONENTS, len(X) - 1)
+        X,
+        scaling=scaling,
+        features=features,
+        max_components=min(MAX_COMPONENTS, len(X) - 1),
     )
     results = {}
     for task, labels in y.items():
         table = accuracies(rows, labels)
         # Of equal accuracies the fewest components, then the smallest k.
-        components, k = (int(i) + 1 for i in np.unravel_index(table.argmax(), table.shape))
+        components, k = (
+            int(i) + 1 for i in np.unravel_index(table.argmax(), table.shape)
+        )
         results[task] = voted(rows, labels, components, k)
     return results
 
@@ -101,10 +115,12 @@ def transfer(
     chosen: Mapping[str, Result],
     changed: NDArray[np.float64],
 ) -> dict[str, Result]:
-    """Each task's accuracy when a classifier is trained on trials and tested on changed ones.
+    """Each task's accuracy when a classifier is trained on trials and tested on changed
+    ones.
 
-    A trial and its changed version have the same random draws, so one would recognise the other.
-    As in leave-one-out, the training set never has the test trial's own version.
+    A trial and its changed version have the same random draws, so one would recognise
+    the other. As in leave-one-out, the training set never has the test trial's own
+    version.
 
     Args:
         X: (n, p) training trials.
@@ -113,7 +129,10 @@ def transfer(
         changed: (n, p) the same trials, changed.
     """
     rows = neighbours(X, changed)
-    return {task: voted(rows, y[task], best.components, best.k) for task, best in chosen.items()}
+    return {
+        task: voted(rows, y[task], best.components, best.k)
+        for task, best in chosen.items()
+    }
 
 
 def majority(y: NDArray[np.str_]) -> Result:
@@ -122,17 +141,25 @@ def majority(y: NDArray[np.str_]) -> Result:
     return Result(int(counts.max()), len(y))
 
 
-def paired(before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """The change of accuracy on the same trials in percentage points, and its 95 % interval.
+def paired(
+    before: NDArray[np.bool_], after: NDArray[np.bool_]
+) -> tuple[float, float, float]:
+    """The change of accuracy on the same trials in percentage points, and its 95 %
+    interval.
 
-    The interval is Wald's after half a trial is added to each cell of the two-by-two table (Agresti
-    and Min, Simple improved confidence intervals for comparing matched proportions, 2005).
+    The interval is Wald's after half a trial is added to each cell of the two-by-two
+    table (Agresti and Min, Simple improved confidence intervals for comparing matched
+    proportions, 2005).
     """
     gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
     total = len(before) + 2.0
     gap = (gained - lost) / total
     reach = 1.96 * float(np.sqrt(((gained + lost + 1.0) / total - gap**2) / total))
-    return 100.0 * (gained - lost) / len(before), 100.0 * (gap - reach), 100.0 * (gap + reach)
+    return (
+        100.0 * (gained - lost) / len(before),
+        100.0 * (gap - reach),
+        100.0 * (gap + reach),
+    )
 
 
 def points(gain: tuple[float, float, float]) -> str:

@@ -15,11 +15,12 @@ class Table:
     Attributes:
         name: name of its file.
         title: heading above it.
-        rows: its rows, with the most important columns first. A cell that a row lacks is empty. A
-            table without rows is left out of the report.
-        timed: columns measured by a clock, which differ from run to run; they go to a CSV file of
-            their own, beside the first column.
-        narrow: number of columns, from the first, that a phone shows; the CSV has them all.
+        rows: its rows, with the most important columns first. A cell that a row lacks
+            is empty. A table without rows is left out of the report.
+        timed: columns measured by a clock, which differ from run to run; they go to a
+            CSV file of their own, beside the first column.
+        narrow: number of columns, from the first, that a phone shows; the CSV has them
+            all.
     """
 
     name: str

@@ -34,14 +34,17 @@ def follow(
 def vectors(series: Sequence[FeatureSeries | None]) -> NDArray[np.float64]:
     """(n, width) vectors of the paper's features; zeros for trials without contact."""
     nothing = np.zeros(len(FEATURES) * SAMPLES)
-    return np.stack([nothing if c is None else feature_vector(c, WINDOW_S) for c in series])
+    return np.stack(
+        [nothing if c is None else feature_vector(c, WINDOW_S) for c in series]
+    )
 
 
 def pooled_layout(layout: SkinLayout) -> SkinLayout:
     """The skin with taxels that each cover 2 x 2 of this one's.
 
-    The centre of a larger taxel lies midway between the taxels that it covers. An odd last row or
-    column stays as it is. The threshold stays the same, because it is a force.
+    The centre of a larger taxel lies midway between the taxels that it covers. An odd
+    last row or column stays as it is. The threshold stays the same, because it is a
+    force.
     """
     (rows, cols), (along, around), angles = pool(layout.alive).shape, layout.pitch, None
     if layout.radius_m is not None:
@@ -60,13 +63,15 @@ def pooled_layout(layout: SkinLayout) -> SkinLayout:
 
 
 def pool(frames: NDArray[Any], by: np.ufunc = np.add) -> NDArray[Any]:
-    """2 x 2 taxels combined, by default summed: (..., rows, cols) to (..., rows / 2, cols / 2)."""
+    """2 x 2 taxels combined, by default summed: (..., rows, cols) to (..., rows / 2,
+    cols / 2)."""
     rows = by.reduceat(frames, np.arange(0, frames.shape[-2], 2), axis=-2)
     return np.asarray(by.reduceat(rows, np.arange(0, rows.shape[-1], 2), axis=-1))
 
 
 def pooled(recording: Recording, layout: SkinLayout) -> Recording:
-    """The recording of a skin with larger taxels, each of which reads all the force on its area.
+    """The recording of a skin with larger taxels, each of which reads all the force on
+    its area.
 
     Args:
         recording: invalid taxels in it count as zero.
@@ -85,7 +90,8 @@ def pooled(recording: Recording, layout: SkinLayout) -> Recording:
 def coarser(
     layout: SkinLayout, recordings: Sequence[Recording]
 ) -> Iterator[tuple[SkinLayout, list[Recording]]]:
-    """Skins with ever larger taxels, down to a single one, and the recordings they would make."""
+    """Skins with ever larger taxels, down to a single one, and the recordings they
+    would make."""
     recordings = list(recordings)
     while layout.rows * layout.cols > 1:
         layout = pooled_layout(layout)

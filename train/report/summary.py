@@ -32,21 +32,35 @@ Prices = Sequence[tuple[float, float]]
 
 
 def summary(fitted: Fitted, prices: Prices) -> str:
-    """The candidates, the choice for each task, notes and warnings, as lines of text."""
+    """The candidates, the choice for each task, notes and warnings, as lines of
+    text."""
     table = candidates(fitted, prices)
     cells = [[str(cell) for cell in row] for row in (table.columns, *table.cells)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = [
-        "  ".join(f"{row[i]:{'<' if i < 2 else '>'}{width}}" for i, width in enumerate(widths))
+        "  ".join(
+            f"{row[i]:{'<' if i < 2 else '>'}{width}}" for i, width in enumerate(widths)
+        )
         for row in cells
     ]
-    lines += ["* chosen; in brackets, the 95 % interval of the accuracy on other trials", ""]
+    lines += [
+        "* chosen; in brackets, the 95 % interval of the accuracy on other trials",
+        "",
+    ]
     for task, chosen in fitted.chosen.items():
-        lines += [f"{task}: {accuracy(chosen)}", f"  {_described(chosen.choice, fitted)}"]
+        lines += [
+            f"{task}: {accuracy(chosen)}",
+            f"  {_described(chosen.choice, fitted)}",
+        ]
     units: dict[str, list[str]] = {}
     for name, unit in fitted.dataset.units.items():
-        units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(name)
-    lines += ["", *(f"{unit}: {', '.join(features)}" for unit, features in units.items())]
+        units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(
+            name
+        )
+    lines += [
+        "",
+        *(f"{unit}: {', '.join(features)}" for unit, features in units.items()),
+    ]
     if any(moves(measures.feature(name)) for name in fitted.dataset.names):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
@@ -54,13 +68,18 @@ def summary(fitted: Fitted, prices: Prices) -> str:
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
-    """A row for each candidate, with the nested accuracy of its own settings and its price."""
+    """A row for each candidate, with the nested accuracy of its own settings and its
+    price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
         own = {(grid.features, grid.projection) for grid in candidate.grids}
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
-            star = "*" if (chosen.choice.features, chosen.choice.projection) in own else " "
+            star = (
+                "*"
+                if (chosen.choice.features, chosen.choice.projection) in own
+                else " "
+            )
             result = chosen.candidates[i]
             row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
@@ -83,7 +102,9 @@ def accuracy(chosen: Chosen) -> str:
 
 def _described(choice: Choice, fitted: Fitted) -> str:
     """The settings of a choice as text."""
-    combinations = {grid.features: c.name for c in fitted.candidates[::-1] for grid in c.grids}
+    combinations = {
+        grid.features: c.name for c in fitted.candidates[::-1] for grid in c.grids
+    }
     name = combinations.get(choice.features, " ".join(choice.features))
     how = f"{choice.projection} of {name}, scaling {choice.scaling}"
     if choice.projection == "lda":
@@ -96,11 +117,16 @@ def _described(choice: Choice, fitted: Fitted) -> str:
 def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that make a model worse, or make it look better than it is."""
     dataset, lines = fitted.dataset, []
-    untouched = [path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()]
+    untouched = [
+        path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
+    ]
     if untouched:
         line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
         line += _files(untouched)
-        if len(untouched) / (len(dataset.trials) + len(dataset.untouched)) > MISSING_SHARE:
+        if (
+            len(untouched) / (len(dataset.trials) + len(dataset.untouched))
+            > MISSING_SHARE
+        ):
             line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
         lines.append(line)
     for lacking, paths in dataset.left_out.items():
@@ -114,20 +140,35 @@ def warnings(fitted: Fitted) -> list[str]:
             f"warning: only the first of several contacts is used in {_files(dataset.unused)}; "
             "`python -m train split` makes a recording of each contact"
         )
-    longest = max(float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials)
+    longest = max(
+        float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
+    )
     if fitted.window_s > longest + 1e-9:
         lines.append(
             f"warning: the window of {fitted.window_s:g} s is too long: every recording ends "
             f"within {longest:.2f} s of the onset"
         )
-    return [*lines, *(line for task in fitted.chosen for line in _task_warnings(fitted, task))]
+    return [
+        *lines,
+        *(line for task in fitted.chosen for line in _task_warnings(fitted, task)),
+    ]
 
 
 def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     """The sentences that concern a single task."""
-    dataset, classifier, choice = fitted.dataset, fitted.classifier, fitted.chosen[task].choice
-    space, components, lines = classifier.spaces_[task], classifier.components_[task], []
-    if any(measures.feature(name).quantity == "joint_angle" for name in choice.features):
+    dataset, classifier, choice = (
+        fitted.dataset,
+        fitted.classifier,
+        fitted.chosen[task].choice,
+    )
+    space, components, lines = (
+        classifier.spaces_[task],
+        classifier.components_[task],
+        [],
+    )
+    if any(
+        measures.feature(name).quantity == "joint_angle" for name in choice.features
+    ):
         share = posture_accuracy(dataset, task)
         lines.append(
             f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
@@ -172,24 +213,29 @@ def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> 
 
 
 def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
-    """The coarseness of a model's grid for its trials, judged by at most a thousand of them.
+    """The coarseness of a model's grid for its trials, judged by at most a thousand of
+    them.
 
     Args:
         rows: (n, c) projected trials.
         unit: of their coordinates.
 
     Returns:
-        The median distance, in units, from a trial to the nearest one that differs from it, or
-        infinity if all are equal; and the number of the trial that lies farthest out.
+        The median distance, in units, from a trial to the nearest one that differs from
+        it, or infinity if all are equal; and the number of the trial that lies farthest
+        out.
     """
     squares = squared_distances(rows[:: -(-len(rows) // 1000)], rows)
     squares[squares == 0.0] = np.inf
     nearest = float(np.sqrt(np.median(squares.min(axis=1)))) if rows.size else np.inf
-    return nearest / unit, int(squared_distances(rows, np.zeros_like(rows[:1])).argmax())
+    return nearest / unit, int(
+        squared_distances(rows, np.zeros_like(rows[:1])).argmax()
+    )
 
 
 def posture_accuracy(dataset: DataSet, task: str) -> float:
-    """Leave-one-out accuracy of a task with the joint angles at onset alone and one neighbour."""
+    """Leave-one-out accuracy of a task with the joint angles at onset alone and one
+    neighbour."""
     at_onset = []
     for trial in dataset.trials:
         joints = trial.series.joints
@@ -198,18 +244,26 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
         at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
     angles, labels = np.array(at_onset)[labels != ""], labels[labels != ""]
-    nearest = NearestNeighbors(n_neighbors=1).fit(angles).kneighbors(return_distance=False)[:, 0]
+    nearest = (
+        NearestNeighbors(n_neighbors=1)
+        .fit(angles)
+        .kneighbors(return_distance=False)[:, 0]
+    )
     return float((labels[nearest] == labels).mean())
 
 
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     """The name of the folder that holds all recordings, and each trial's path in it.
 
-    The paths have no suffix. If a recording has several trials, they are numbered from 1. Names
-    that are no text have escapes.
+    The paths have no suffix. If a recording has several trials, they are numbered from
+    1. Names that are no text have escapes.
     """
-    folder = Path(os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials]))
-    paths = [t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials]
+    folder = Path(
+        os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials])
+    )
+    paths = [
+        t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials
+    ]
     counts, seen = Counter(paths), Counter[Path]()
     trials = []
     for path in paths:
@@ -222,4 +276,6 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
 def _files(paths: Sequence[Path]) -> str:
     """The first paths, and the number of the others."""
     rest = len(paths) - NAMED
-    return ", ".join(map(str, paths[:NAMED])) + (f" and {rest} more" if rest > 0 else "")
+    return ", ".join(map(str, paths[:NAMED])) + (
+        f" and {rest} more" if rest > 0 else ""
+    )

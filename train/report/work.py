@@ -16,7 +16,8 @@ class Workers:
 
     Attributes:
         jobs: number of processes.
-        cluster: name of the joblib backend to use in place of this machine's processes, if any.
+        cluster: name of the joblib backend to use in place of this machine's processes,
+            if any.
         progress: show progress bars on stderr.
     """
 
@@ -25,16 +26,28 @@ class Workers:
     progress: bool = True
 
     def map(
-        self, heading: str, function: Callable[..., Any], cases: Sequence[tuple[Any, ...]]
+        self,
+        heading: str,
+        function: Callable[..., Any],
+        cases: Sequence[tuple[Any, ...]],
     ) -> list[Any]:
-        """The results of function(*case) in the order of the cases; the bar has the heading."""
+        """The results of function(*case) in the order of the cases; the bar has the
+        heading."""
         # Memory maps would make arrays read-only files, which pays only for large ones.
         run = Parallel(
-            n_jobs=self.jobs, backend=self.cluster, return_as="generator", max_nbytes=None
+            n_jobs=self.jobs,
+            backend=self.cluster,
+            return_as="generator",
+            max_nbytes=None,
         )
         results = run(delayed(_single)(function, case) for case in cases)
         return list(
-            bar(results, total=len(cases), desc=f"{heading:<22}", disable=not self.progress)
+            bar(
+                results,
+                total=len(cases),
+                desc=f"{heading:<22}",
+                disable=not self.progress,
+            )
         )
 
 

@@ -1,4 +1,5 @@
-"""Kinematics of an arm, for many trials at once: arrays whose last axis is the trial."""
+"""Kinematics of an arm, for many trials at once: arrays whose last axis is the
+trial."""
 
 import math
 from dataclasses import replace
@@ -21,7 +22,8 @@ class Link(NamedTuple):
         shift: (3,) metres.
         turn: (3, 3), or None if the step does not turn.
         axis: (3,) of the joint, a unit vector in the frame that the step reaches.
-        main: the axis of that frame about which the joint turns, or None for a skew one.
+        main: the axis of that frame about which the joint turns, or None for a skew
+            one.
     """
 
     shift: Array
@@ -52,7 +54,8 @@ class Kinematics:
     Attributes:
         links: one for each joint.
         tail: the constant step behind the last joint.
-        limits: (2, dof, 1) radians, the lower and the upper limit of each joint, or infinite.
+        limits: (2, dof, 1) radians, the lower and the upper limit of each joint, or
+            infinite.
     """
 
     def __init__(self, chain: Chain) -> None:
@@ -62,12 +65,18 @@ class Kinematics:
         for joint in chain.joints:
             fixed.append(replace(joint, kind="fixed", translate=ZERO))
             if joint.kind != "fixed":
-                self.links.append(_link(fixed, np.array(joint.axis) / math.hypot(*joint.axis)))
+                self.links.append(
+                    _link(fixed, np.array(joint.axis) / math.hypot(*joint.axis))
+                )
                 fixed = []
-            fixed.append(Joint(joint.name, joint.axis, "fixed", origin_xyz=joint.translate))
+            fixed.append(
+                Joint(joint.name, joint.axis, "fixed", origin_xyz=joint.translate)
+            )
         self.tail = _link(fixed, np.zeros(3))
         unlimited = (-math.inf, math.inf)
-        self.limits = np.array([pair or unlimited for pair in chain.limits]).T[:, :, None]
+        self.limits = np.array([pair or unlimited for pair in chain.limits]).T[
+            :, :, None
+        ]
 
     def pose(self, q: Array) -> Pose:
         """The arms' poses at joint angles (dof, n)."""
@@ -98,7 +107,8 @@ def _link(fixed: list[Joint], axis: Array) -> Link:
 
 
 def _combined(weights: Array, rotation: Array) -> Array:
-    """(3, n) the sum of axes (3, 3, n) times weights (3,); axes of weight 0 are left out."""
+    """(3, n) the sum of axes (3, 3, n) times weights (3,); axes of weight 0 are left
+    out."""
     out = np.zeros(rotation.shape[1:])
     for weight, axis in zip(weights.tolist(), rotation, strict=True):
         if weight != 0.0:
@@ -115,7 +125,8 @@ def _moved(link: Link, origin: Array, rotation: Array) -> tuple[Array, Array]:
 
 
 def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
-    """The axes after a turn about the link's axis (Rodrigues): I + sin K + (1 - cos) K^2."""
+    """The axes after a turn about the link's axis (Rodrigues): I + sin K + (1 - cos)
+    K^2."""
     out = np.empty_like(rotation)
     if link.main is not None:
         # A turn about an axis of the frame turns the other two in their plane.
@@ -144,5 +155,9 @@ def dot(a: Array, b: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """(3, ...): the cross products of vectors (3, ...)."""
     return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
     )

@@ -24,19 +24,22 @@ Kind = tuple[str, ...]
 HALVINGS = 4
 """Most halvings of a frame."""
 FIRST_HALVINGS = 3
-"""Halvings at which every kind of trials runs; a kind outside the tolerance runs at one more."""
+"""Halvings at which every kind of trials runs; a kind outside the tolerance runs at one
+more."""
 MOST_OBJECTS = 8
 """Most objects of a kind whose steps are measured; they are spread over its list."""
 MOST_STEPS = 20_000
 """Most steps of a trial of the reference run."""
 REFERENCE_PART = 0.5
-"""Step of the reference run, as a part of the shortest step tried; a swing may need less."""
+"""Step of the reference run, as a part of the shortest step tried; a swing may need
+less."""
 SWING_PART = 0.2
 """A step of this part of sqrt(m / k) resolves how a mass m swings on a stiffness k."""
 PRESSED_M = 0.002
 """Depth to which a swinging object is pressed: it swings on the springs met by then."""
 LITTLE_GAIN = 2.0
-"""Largest error of the step chosen where no step is within the tolerance, in smallest errors."""
+"""Largest error of the step chosen where no step is within the tolerance, in smallest
+errors."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +47,15 @@ class Convergence:
     """The errors of the steps tried on a scene's middle trials, and the step chosen.
 
     Attributes:
-        steps_s: the steps tried, each half of the one before, then the step of the reference run.
-        errors: the error of each step but the last, as a part of the peak force: root mean square
-            over time of the force's distance from the reference run, or from the extrapolated limit
-            where that is larger; of the worst trial.
+        steps_s: the steps tried, each half of the one before, then the step of the
+            reference run.
+        errors: the error of each step but the last, as a part of the peak force: root
+            mean square over time of the force's distance from the reference run, or
+            from the extrapolated limit where that is larger; of the worst trial.
         order: the error is about proportional to the step to this power.
-        step_s: the largest step whose error is within the scene's tolerance. Where none is, as
-            where an object bounces differently at each step, the largest step whose error is at
-            most `LITTLE_GAIN` times the smallest.
+        step_s: the largest step whose error is within the scene's tolerance. Where none
+            is, as where an object bounces differently at each step, the largest step
+            whose error is at most `LITTLE_GAIN` times the smallest.
         error: the error of that step.
         within: whether it is within the tolerance.
     """
@@ -67,20 +71,28 @@ class Convergence:
 def kinds(
     scene: Scene, convergences: Mapping[Kind, Convergence] | None = None
 ) -> dict[Kind, list[TrialSpec]]:
-    """{effects: the trials that call for them}, at measured steps or those that the scene gives.
+    """{effects: the trials that call for them}, at measured steps or those that the
+    scene gives.
 
-    A scene gives a kind the smallest step of its effects in `step_s`, or a frame where it is empty.
+    A scene gives a kind the smallest step of its effects in `step_s`, or a frame where
+    it is empty.
     """
     out: dict[Kind, list[TrialSpec]] = {}
     for item in scene.objects:
         for condition in item.conditions:
             effects = tuple(required_effects(scene, item, condition))
-            given = [scene.step_s[name] for name in ("base", *effects) if name in scene.step_s]
+            given = [
+                scene.step_s[name]
+                for name in ("base", *effects)
+                if name in scene.step_s
+            ]
             step_s = min(given, default=1.0 / scene.trials["rate_hz"])
             if convergences and effects in convergences:
                 step_s = convergences[effects].step_s
             trials = out.setdefault(effects, [])
-            trials += [TrialSpec(item, condition, k, step_s) for k in range(scene.count)]
+            trials += [
+                TrialSpec(item, condition, k, step_s) for k in range(scene.count)
+            ]
     return out
 
 
@@ -88,13 +100,16 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
     """{kind: the errors of the steps tried}; empty where the scene gives its steps.
 
     Raises:
-        InputError: an object touches the arm from the start. This is checked before anything else.
+        InputError: an object touches the arm from the start. This is checked before
+            anything else.
     """
     if scene.step_s:
         return {}
     trials_by_kind = kinds(scene)
     begin(scene, tuple(spec for specs in trials_by_kind.values() for spec in specs))
-    return dict(zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True))
+    return dict(
+        zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True)
+    )
 
 
 def at_middle(scene: Scene) -> Scene:
@@ -113,36 +128,46 @@ def at_middle(scene: Scene) -> Scene:
 
 @dataclass
 class _Kind:
-    """One trial of each object and condition of a kind, the steps tried and their forces."""
+    """One trial of each object and condition of a kind, the steps tried and their
+    forces."""
 
     specs: list[TrialSpec]
     steps_s: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
 
     def errors(self, count: int | None = None) -> list[float]:
-        """The extrapolated error of each step but the last, from the first `count` runs."""
+        """The extrapolated error of each step but the last, from the first `count`
+        runs."""
         changes = [_distance(a, b) for a, b in pairwise(self.forces[:count])]
         return [change / (1.0 - 2.0 ** -_order(changes)) for change in changes]
 
 
 def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Convergence]:
-    """The error of each step on middle trials of each kind, one for each of its objects.
+    """The error of each step on middle trials of each kind, one for each of its
+    objects.
 
-    The differences between neighbouring steps give the order p and, summed as a geometric series,
-    the error of each step (Richardson). Where even the shortest step is too long to resolve how a
-    light object swings, its halves agree and are all wrong; so the forces are also compared with
-    those of a reference run that resolves the swing. Trials end with the window in which labels are
-    judged.
+    The differences between neighbouring steps give the order p and, summed as a
+    geometric series, the error of each step (Richardson). Where even the shortest step
+    is too long to resolve how a light object swings, its halves agree and are all
+    wrong; so the forces are also compared with those of a reference run that resolves
+    the swing. Trials end with the window in which labels are judged.
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
     scene = at_middle(replace(scene, trials={**scene.trials, "after_s": after_s}))
     tolerance, frame_s = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
     objects = {item.slug: item for item in scene.objects}
     kinds = [
-        _Kind([replace(spec, object=objects[spec.object.slug]) for spec in _spread_out(specs)])
+        _Kind(
+            [
+                replace(spec, object=objects[spec.object.slug])
+                for spec in _spread_out(specs)
+            ]
+        )
         for specs in groups
     ]
-    first = [(kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)]
+    first = [
+        (kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)
+    ]
     _run(scene, first)
     rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
     _run(scene, [(kind, frame_s / 2**HALVINGS) for kind in rough])
@@ -162,15 +187,20 @@ def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
 
 
 def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:
-    """Run each kind at a further step, all side by side; `paced` shortens steps near a jolt."""
+    """Run each kind at a further step, all side by side; `paced` shortens steps near a
+    jolt."""
     if not work:
         return
-    specs = tuple(replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs)
+    specs = tuple(
+        replace(spec, step_s=step_s) for kind, step_s in work for spec in kind.specs
+    )
     plan = make_plan(scene, specs)
     if not paced:
         plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
     forces = run_physics(scene, specs, plan=plan, images=False).force
-    for (kind, step_s), force in zip(work, _by_kind(forces, [k for k, _ in work]), strict=True):
+    for (kind, step_s), force in zip(
+        work, _by_kind(forces, [k for k, _ in work]), strict=True
+    ):
         kind.steps_s.append(step_s)
         kind.forces.append(force)
 
@@ -187,41 +217,49 @@ def _judged(kind: _Kind, tolerance: float) -> Convergence:
     errors = (*map(max, zip(distances, extrapolated, strict=False)), distances[-1])
     smallest = min(errors)
     limit = tolerance if smallest <= tolerance else LITTLE_GAIN * smallest
-    step_s, error = next((s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit)
+    step_s, error = next(
+        (s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit
+    )
     order = _order([_distance(a, b) for a, b in pairwise(forces)])
-    return Convergence(tuple(kind.steps_s), errors, order, step_s, error, error <= tolerance)
+    return Convergence(
+        tuple(kind.steps_s), errors, order, step_s, error, error <= tolerance
+    )
 
 
 def _distance(forces: Array, reference: Array) -> float:
-    """Root mean square over time of the difference of two runs' forces (n, frames), as a part of
-    the second run's peak; of the worst trial."""
+    """Root mean square over time of the difference of two runs' forces (n, frames), as
+    a part of the second run's peak; of the worst trial."""
     peak = reference.max(axis=1)
     change = np.sqrt(np.mean((forces - reference) ** 2, axis=1))
     return float(np.max(change / np.where(peak > 0.0, peak, 1.0)))
 
 
 def _order(changes: list[float]) -> float:
-    """log2 of the factor by which a halving shrinks the change: the smaller of the last two, from
-    0.25 to 1, the order of an implicit Euler step."""
+    """log2 of the factor by which a halving shrinks the change: the smaller of the last
+    two, from 0.25 to 1, the order of an implicit Euler step."""
     factors = [a / b for a, b in pairwise(changes[-3:]) if b > 0.0]
     return float(np.clip(math.log2(max(min(factors, default=2.0), 1e-9)), 0.25, 1.0))
 
 
 def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
-    """For each kind, the step that resolves how its lightest object swings on the skin."""
+    """For each kind, the step that resolves how its lightest object swings on the
+    skin."""
     specs = tuple(spec for kind in kinds for spec in kind.specs)
     t = begin(scene, specs)
     stiffness = total(t.weight) * total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
     if "stems" in t.own:
         stems = total(t.own["stems"].stiffness)
         stiffness = np.where(stems > 0.0, stems, stiffness)
-    steps = SWING_PART * np.sqrt(t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness)
+    steps = SWING_PART * np.sqrt(
+        t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness
+    )
     steps = np.where(t.plan.also("sliding", ALL), steps, np.inf)
     return [float(of_kind.min()) for of_kind in _by_kind(steps, kinds)]
 
 
 def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
-    """{effect, or `base`: microseconds for each trial that calls for it}, all trials side by side.
+    """{effect, or `base`: microseconds for each trial that calls for it}, all trials
+    side by side.
 
     The time of a hook that another hook calls counts for its own effect alone.
     """
@@ -241,19 +279,30 @@ def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
         return replace(call, function=run)
 
     plan = make_plan(scene, specs)
-    stages = {stage: [timed(call) for call in calls] for stage, calls in plan.stages.items()}
-    for reading in readings(run_physics(scene, specs, plan=replace(plan, stages=stages))):
+    stages = {
+        stage: [timed(call) for call in calls] for stage, calls in plan.stages.items()
+    }
+    for reading in readings(
+        run_physics(scene, specs, plan=replace(plan, stages=stages))
+    ):
         reading.frames()
     trials = {name: int(mask.sum()) for name, mask in plan.calls.items()}
-    return {name: taken / trials.get(name, len(specs)) * 1e6 for name, taken in spent.items()}
+    return {
+        name: taken / trials.get(name, len(specs)) * 1e6
+        for name, taken in spent.items()
+    }
 
 
 def explain(scene: Scene) -> str:
     """The account that `simulate --explain` prints."""
     trials_by_kind = kinds(scene)
-    measured = dict(zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True))
+    measured = dict(
+        zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True)
+    )
     trials_by_kind = kinds(scene, None if scene.step_s else measured)
-    first_trials = {spec.key: spec for specs in trials_by_kind.values() for spec in reversed(specs)}
+    first_trials = {
+        spec.key: spec for specs in trials_by_kind.values() for spec in reversed(specs)
+    }
     spent = costs(scene, tuple(first_trials.values()))
     lines = [f"{scene.name}: {sum(map(len, trials_by_kind.values()))} trials"]
     for effects, specs in trials_by_kind.items():
@@ -263,9 +312,18 @@ def explain(scene: Scene) -> str:
         lines.append(f"  {'effect':<16}{'us/trial':>9}  called for by")
         lines.append(f"  {'(base)':<16}{spent['base']:>9.0f}")
         for effect in effects:
-            why = {required_effects(scene, s.object, s.condition)[effect] for s in first.values()}
-            lines.append(f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  {', '.join(sorted(why))}")
-    unused = [name for name in EFFECTS if not any(name in effects for effects in trials_by_kind)]
+            why = {
+                required_effects(scene, s.object, s.condition)[effect]
+                for s in first.values()
+            }
+            lines.append(
+                f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  {', '.join(sorted(why))}"
+            )
+    unused = [
+        name
+        for name in EFFECTS
+        if not any(name in effects for effects in trials_by_kind)
+    ]
     lines += ["", "not called for, not loaded: " + (", ".join(unused) or "none")]
     return "\n".join(lines)
 
@@ -276,7 +334,10 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
         f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
         for s, e in zip(measured.steps_s, measured.errors, strict=False)
     )
-    goal, best = f"{100.0 * scene.trials['tolerance']:g} %", f"{1e3 * measured.step_s:g} ms"
+    goal, best = (
+        f"{100.0 * scene.trials['tolerance']:g} %",
+        f"{1e3 * measured.step_s:g} ms",
+    )
     verdict = f"{best} is enough for {goal}"
     if not measured.within:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"

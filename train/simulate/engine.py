@@ -1,8 +1,9 @@
-"""Runs trials side by side: draws their values, sets them up, steps them and reads their sensors.
+"""Runs trials side by side: draws their values, sets them up, steps them and reads
+their sensors.
 
-Each trial has its own clock. A round of the loop takes one step of every unfinished trial, and each
-trial ends a frame after as many steps as that frame has. So only the trials near a jolt take finer
-steps, and trials of different steps share one loop.
+Each trial has its own clock. A round of the loop takes one step of every unfinished
+trial, and each trial ends a frame after as many steps as that frame has. So only the
+trials near a jolt take finer steps, and trials of different steps share one loop.
 """
 
 from collections.abc import Iterator
@@ -41,15 +42,19 @@ SCALED = {
     "mass": ("mass_kg",),
     "cover": ("taxel_n_m", "cover_n_m"),
 }
-"""{spread: the values that it scales}; any other spread is added to the value of its name."""
+"""{spread: the values that it scales}; any other spread is added to the value of its
+name."""
 PLACED = dict.fromkeys(("place_m", "yaw_deg", "roll_deg"), Value(0.0, 0.0))
-"""Where the forearm meets an object: spreads around 0 for which objects have no value."""
+"""Where the forearm meets an object: spreads around 0 for which objects have no
+value."""
 
 
 def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
-    """{name: (n,)} of every value and spread; a trial's draws depend on nothing but itself.
+    """{name: (n,)} of every value and spread; a trial's draws depend on nothing but
+    itself.
 
-    A value that an object does not have, such as the mass of a fixed one, is NaN and never read.
+    A value that an object does not have, such as the mass of a fixed one, is NaN and
+    never read.
     """
     streamed = [(trial.key, trial.attempt) for trial in specs]
     out: dict[str, Array] = {}
@@ -61,9 +66,15 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
 
 
 def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
-    """The values of trials that share streams: same object, condition and number of redraws."""
+    """The values of trials that share streams: same object, condition and number of
+    redraws."""
     first, numbers = trials[0], np.array([trial.number for trial in trials])
-    values = {**first.object.values, "lead_s": scene.lead, "taxel_n_m": scene.taxel_n_m, **PLACED}
+    values = {
+        **first.object.values,
+        "lead_s": scene.lead,
+        "taxel_n_m": scene.taxel_n_m,
+        **PLACED,
+    }
     again = f".{first.attempt}" if first.attempt else ""
 
     def drawn(name: str, kind: str) -> Array:
@@ -72,7 +83,9 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     out: dict[str, Any] = {name: value.low for name, value in values.items()}
     for name, value in values.items():
         if value.high > value.low:
-            out[name] = value.low + (value.high - value.low) * drawn(f"value.{name}", "random")
+            out[name] = value.low + (value.high - value.low) * drawn(
+                f"value.{name}", "random"
+            )
     for spread, deviation in scene.spread.items():
         if deviation:
             away = deviation * drawn(f"spread.{spread}", "standard_normal")
@@ -84,11 +97,16 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
 
 
 def frame_count(scene: Scene) -> int:
-    """Number of frames of a trial: the longest lead, the time after it, and the frame at t = 0."""
-    return round((scene.lead.high + scene.trials["after_s"]) * scene.trials["rate_hz"]) + 1
+    """Number of frames of a trial: the longest lead, the time after it, and the frame
+    at t = 0."""
+    return (
+        round((scene.lead.high + scene.trials["after_s"]) * scene.trials["rate_hz"]) + 1
+    )
 
 
-def begin(scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None) -> Trials:
+def begin(
+    scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None
+) -> Trials:
     """Trials before their first step, with the hooks of a plan (None makes it).
 
     Raises:
@@ -118,8 +136,8 @@ class PhysicsRun:
         joints: (n, frames, dof) radians.
         force: (n, frames) newtons.
         traces: {name: (n, frames)} that effects keep, such as `slide_m`.
-        window: (n, frames, rows, C) counts on the columns that can touch; no frames where the
-            run made no images.
+        window: (n, frames, rows, C) counts on the columns that can touch; no frames
+            where the run made no images.
         trials: their state after the last step.
     """
 
@@ -132,7 +150,11 @@ class PhysicsRun:
 
 
 def run_physics(
-    scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None, images: bool = True
+    scene: Scene,
+    specs: tuple[TrialSpec, ...],
+    *,
+    plan: Plan | None = None,
+    images: bool = True,
 ) -> PhysicsRun:
     """The physics of trials run side by side, each with the same bits as it has alone.
 
@@ -152,7 +174,9 @@ def run_physics(
         for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
             sources[name] = t.own[effect], attribute
     traces = {name: np.zeros((t.n, frames)) for name in sources}
-    window = np.zeros((t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32)
+    window = np.zeros(
+        (t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32
+    )
     joints[:, 0] = t.q.T
     scale, active = scene.skin.counts_per_newton, np.arange(t.n)
     while active.size:
@@ -176,7 +200,9 @@ def run_physics(
         if images:
             touched = t.force[ends] > 0.0
             counts = t.image.take(ends[touched], -1) * scale
-            window[ends[touched], k[touched]] = np.moveaxis(np.minimum(counts, FULL), -1, 0)
+            window[ends[touched], k[touched]] = np.moveaxis(
+                np.minimum(counts, FULL), -1, 0
+            )
         if (k == frames - 1).any():
             active = active[t.frame[active] < frames - 1]
     if t.lost.any():
@@ -204,10 +230,11 @@ def start_frames(t: Trials, starts: Places) -> None:
 def check_energy(t: Trials, joints: Array, times: Array) -> None:
     """Check that no trial gains energy.
 
-    Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq. The joints'
-    damping takes at least d (dq)^2 / dt of it in each frame. So the arm's springs store at most the
-    rest, plus the energy of the arm's motion at the start. A contact may give back the energy
-    that it has taken, but no more. A step that makes energy breaks this bound at once.
+    Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq.
+    The joints' damping takes at least d (dq)^2 / dt of it in each frame. So the arm's
+    springs store at most the rest, plus the energy of the arm's motion at the start. A
+    contact may give back the energy that it has taken, but no more. A step that makes
+    energy breaks this bound at once.
 
     Args:
         joints: (n, frames, dof) radians.
@@ -217,11 +244,17 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
         EdgeError: a trial gains energy; the sentence names the first one.
     """
     scene, k = t.scene, t.joint_k.T
-    moving = 0.5 * sum(i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False))
-    targets = t.start.T[:, None] + t.rate.T * np.minimum(times[:, None], t.travel_s.T[:, None])
+    moving = 0.5 * sum(
+        i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False)
+    )
+    targets = t.start.T[:, None] + t.rate.T * np.minimum(
+        times[:, None], t.travel_s.T[:, None]
+    )
     torque = k * (targets - joints)
     stored = (0.5 * torque * (targets - joints)).sum(axis=2)
-    put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(axis=2)
+    put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(
+        axis=2
+    )
     turned = t.damping.T * np.diff(joints, axis=1) ** 2 / np.diff(times)[:, None]
     work, both_ways, lost = (
         np.pad(np.add.accumulate(energy, axis=1), ((0, 0), (1, 0)))

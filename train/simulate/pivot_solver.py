@@ -1,10 +1,10 @@
 """Finds the loads on pivoting forearms, for many trials at once.
 
-Rows press to different depths, a + lever * tilt, and the loads are a force and a moment. The
-energy of arm and bed is convex and piecewise quadratic in (a, tilt), so it has one minimum, which
-is the answer. Newton's method finds it in a few rounds, with the Hessian of the springs touched
-(Qi and Sun, Math. Programming 58, 1993). In the few trials where it cycles, a line search on the
-slope takes over.
+Rows press to different depths, a + lever * tilt, and the loads are a force and a
+moment. The energy of arm and bed is convex and piecewise quadratic in (a, tilt), so it
+has one minimum, which is the answer. Newton's method finds it in a few rounds, with the
+Hessian of the springs touched (Qi and Sun, Math. Programming 58, 1993). In the few
+trials where it cycles, a line search on the slope takes over.
 """
 
 from dataclasses import dataclass
@@ -19,14 +19,17 @@ from train.simulate.plan import Index
 from train.simulate.trials import pick
 
 ROUNDS = 8
-"""Plain Newton rounds before the line search takes over; most searches need two or three."""
+"""Plain Newton rounds before the line search takes over; most searches need two or
+three."""
 CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
 """A step below both is rounding error."""
 CUTS = 40
 GUARDED_ROUNDS = 5000
-"""A bed of 1e11 N/m takes some hundred rounds, one for each spring that comes or goes."""
+"""A bed of 1e11 N/m takes some hundred rounds, one for each spring that comes or
+goes."""
 NO_DIGITS = 1e-9
-"""A determinant of C smaller than this part of its terms has too few digits to divide by."""
+"""A determinant of C smaller than this part of its terms has too few digits to divide
+by."""
 
 
 class Loads(NamedTuple):
@@ -54,12 +57,16 @@ class Pivots:
     Attributes:
         at: index of the contacts' trials in the next two.
         gaps: (S, 1, trials) metres at which each spring is touched.
-        stiffness: (S, 1, trials) newtons a metre, or (S, rows, trials) where it differs by row.
-        nearest: (S,) ascending; no trial's springs from s on are touched above nearest[s].
-        weight, line_gap, lever: (rows, n) the part of each row that the face covers, metres by
-            which the face draws back there, metres from the contact's middle.
-        gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load (`viscous`).
-        free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in them.
+        stiffness: (S, 1, trials) newtons a metre, or (S, rows, trials) where it differs
+            by row.
+        nearest: (S,) ascending; no trial's springs from s on are touched above
+            nearest[s].
+        weight, line_gap, lever: (rows, n) the part of each row that the face covers,
+            metres by which the face draws back there, metres from the contact's middle.
+        gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load
+            (`viscous`).
+        free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in
+            them.
     """
 
     at: Index
@@ -76,8 +83,8 @@ class Pivots:
 
     @cached_property
     def det(self) -> Array:
-        """(n,) the determinant of C, and 0 where it is only rounding error: an arm of one joint
-        pushes and tilts in one motion, so its C has no inverse."""
+        """(n,) the determinant of C, and 0 where it is only rounding error: an arm of
+        one joint pushes and tilts in one motion, so its C has no inverse."""
         det = self.c[0] * self.c[2] - self.c[1] * self.c[1]
         return np.where(det > NO_DIGITS * self.c[0] * self.c[2], det, 0.0)
 
@@ -94,18 +101,23 @@ class Pivots:
         if not isinstance(self.load, float):
             borne = self.gain * force + self.load
             bears = (force > 0.0) & (borne > 0.0)
-            force, held = np.where(bears, borne, 0.0), np.where(bears, self.gain * held, 0.0)
+            force, held = (
+                np.where(bears, borne, 0.0),
+                np.where(bears, self.gain * held, 0.0),
+            )
         stiffness = total(held)
         mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
         off = self.lever - mean
         spread = total(off * off * held)
-        return Loads(total(force), total(force * self.lever), stiffness, mean, spread, force)
+        return Loads(
+            total(force), total(force * self.lever), stiffness, mean, spread, force
+        )
 
     def step(self, y: Array, loads: Loads) -> Array:
         """(2, n) the Newton step p of (I + C H) p = y - (free - C f).
 
-        In coordinates about the mean lever of the stiffness, H is diagonal and the determinant is a
-        sum of positive terms, so no digits are lost at 1e15 N/m.
+        In coordinates about the mean lever of the stiffness, H is diagonal and the
+        determinant is a sum of positive terms, so no digits are lost at 1e15 N/m.
         """
         c00, c01, c11 = self.c
         force, moment, k, mean, spread, _ = loads
@@ -129,7 +141,8 @@ class Pivots:
         return p
 
     def arm(self, y: Array) -> tuple[Array, Mask]:
-        """The loads of the arm at y, and (n,) whether C has an inverse that gives both of them."""
+        """The loads of the arm at y, and (n,) whether C has an inverse that gives both
+        of them."""
         c00, c01, c11 = self.c
         invertible, d = self.det > 0.0, self.free - y
         divisor = np.where(invertible, self.det, 1.0)
@@ -139,7 +152,10 @@ class Pivots:
     def slope(self, y: Array, loads: Loads, p: Array) -> Array:
         """(n,) the slope of the energy at y along -p."""
         given, invertible = self.arm(y)
-        single = p[0] * ((y[0] - self.free[0]) / self.c[0] + loads.force) + p[1] * loads.moment
+        single = (
+            p[0] * ((y[0] - self.free[0]) / self.c[0] + loads.force)
+            + p[1] * loads.moment
+        )
         double = p[0] * (loads.force - given[0]) + p[1] * (loads.moment - given[1])
         return np.asarray(np.where(invertible, -double, -single))
 
@@ -150,7 +166,9 @@ class Pivots:
         """
         c00, c01, _ = self.c
         given, invertible = self.arm(y)
-        single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(c00 > 0.0, c00, 1.0)
+        single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(
+            c00 > 0.0, c00, 1.0
+        )
         stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
         force = np.where(stiff, np.where(invertible, given[0], single), loads.force)
         moment = np.where(stiff & invertible, given[1], loads.moment)
@@ -160,11 +178,11 @@ class Pivots:
 def search(
     pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS
 ) -> tuple[Array, Array, Mask]:
-    """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of them; the
-    force on each row (rows, n), and (n,) whether the search failed.
+    """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of
+    them; the force on each row (rows, n), and (n,) whether the search failed.
 
-    The slope of the energy rises steadily along a step. Where it ends uphill by more than half of
-    its value at the start, the step is cut back along its secant.
+    The slope of the energy rises steadily along a step. Where it ends uphill by more
+    than half of its value at the start, the step is cut back along its secant.
     """
     c = pivots.c
     y = pivots.free - np.array(

@@ -1,8 +1,9 @@
 """The effects that trials call for, and the order in which their hooks run.
 
-An effect is a module of `train.simulate.effects` with some of the hooks named below. It is imported
-only where a trial calls for it. Each hook gets the trials and the index of those that call for its
-effect. `base` has the hooks of all trials, which run first in their stage.
+An effect is a module of `train.simulate.effects` with some of the hooks named below. It
+is imported only where a trial calls for it. Each hook gets the trials and the index of
+those that call for its effect. `base` has the hooks of all trials, which run first in
+their stage.
 """
 
 from collections.abc import Callable
@@ -58,13 +59,15 @@ SENSOR = (
 ANSWER = "answer"
 """The solver of a contact, which `press` calls."""
 INSTEAD = ("lay", "law", "locate", ANSWER, "bear", "image")
-"""Stages in which a trial runs a single hook: that of the last of its effects with such a hook."""
+"""Stages in which a trial runs a single hook: that of the last of its effects with such
+a hook."""
 STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
 
 
 @dataclass
 class Call:
-    """A hook, the effect that owns it, and (n,) whether each trial calls for that effect."""
+    """A hook, the effect that owns it, and (n,) whether each trial calls for that
+    effect."""
 
     owner: str
     function: Callable[..., Any]
@@ -118,7 +121,9 @@ def make_plan(scene: Scene, specs: tuple[TrialSpec, ...]) -> Plan:
     by_kind: dict[str, tuple[str, ...]] = {}
     for spec in specs:
         if spec.key not in by_kind:
-            by_kind[spec.key] = tuple(required_effects(scene, spec.object, spec.condition))
+            by_kind[spec.key] = tuple(
+                required_effects(scene, spec.object, spec.condition)
+            )
     return plan_of(tuple(by_kind[spec.key] for spec in specs))
 
 
@@ -147,14 +152,19 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
 
 
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
-    """{effect: the reason for it} of an object in a condition, in the order of `EFFECTS`."""
+    """{effect: the reason for it} of an object in a condition, in the order of
+    `EFFECTS`."""
     required = dict.fromkeys(FAMILIES[item.family].effects, f"family {item.family}")
     for name, info in EFFECTS.items():
         if info.condition == condition:
             required[name] = condition
         elif info.keys and item.given.issuperset(info.keys):
             required[name] = " and ".join(info.keys)
-        elif name in scene.add and name not in required and _supports(item, condition, name):
+        elif (
+            name in scene.add
+            and name not in required
+            and _supports(item, condition, name)
+        ):
             required[name] = "effects.add"
     for name in scene.leave_out:
         required.pop(name, None)
@@ -167,7 +177,11 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
 def _supports(item: SceneObject, condition: str, name: str) -> bool:
     info = EFFECTS[name]
     suits = not info.families or item.family in info.families
-    return suits and info.condition in ("", condition) and item.values.keys() >= {*info.keys}
+    return (
+        suits
+        and info.condition in ("", condition)
+        and item.values.keys() >= {*info.keys}
+    )
 
 
 def check_supported(scene: Scene, where: str) -> None:
@@ -188,7 +202,9 @@ def check_supported(scene: Scene, where: str) -> None:
     required_by_object = [
         required_effects(scene, o, c) for o in scene.objects for c in o.conditions
     ]
-    if not scene.inertia and any("inertia" in required for required in required_by_object):
+    if not scene.inertia and any(
+        "inertia" in required for required in required_by_object
+    ):
         raise InputError(
             f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one number a joint"
         )

@@ -43,7 +43,9 @@ class Readings:
 
     def stream(self, effect: str) -> np.random.Generator:
         """An effect's random numbers in this trial."""
-        return streams.stream(self.scene.seed, effect, self.trial.key, self.trial.number)
+        return streams.stream(
+            self.scene.seed, effect, self.trial.key, self.trial.number
+        )
 
     def frames(self) -> NDArray[np.uint16]:
         """(frames, rows, cols) whole counts within the converter's range."""

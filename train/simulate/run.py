@@ -20,8 +20,8 @@ from train.simulate.schema import FAMILIES
 from train.simulate.truth import true_runs
 
 BATCH = 400
-"""Most trials simulated side by side. Larger batches save little, as their arrays no longer fit
-into a processor's cache; each trial takes about 0.4 MB of memory."""
+"""Most trials simulated side by side. Larger batches save little, as their arrays no
+longer fit into a processor's cache; each trial takes about 0.4 MB of memory."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,9 @@ class Written:
         paths: the files.
         redrawn: number of trials that were drawn again.
         unfelt: number of trials in which no taxel rises above the skin's onset.
-        rough: {the first object and condition of a kind: the error of its step, as a part of the
-            peak force} where the step was measured and none is within the scene's tolerance.
+        rough: {the first object and condition of a kind: the error of its step, as a
+            part of the peak force} where the step was measured and none is within the
+            scene's tolerance.
     """
 
     paths: list[Path]
@@ -50,14 +51,17 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 def recordings(
     physics: PhysicsRun, which: Places | None = None, scene: Scene | None = None
 ) -> Iterator[tuple[str, Recording]]:
-    """(file name, recording) of each trial of a run, or of some; arguments as of `readings`."""
+    """(file name, recording) of each trial of a run, or of some; arguments as of
+    `readings`."""
     trials = physics.trials
     scene = scene or trials.scene
     arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
     for seen in readings(physics, which, scene):
         trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
-        drawn = {name: float(value[seen.which]) for name, value in trials.values.items()}
+        drawn = {
+            name: float(value[seen.which]) for name, value in trials.values.items()
+        }
         soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
         file = file_name(scene, trial)
         meta: dict[str, Any] = {
@@ -81,10 +85,17 @@ def recordings(
             },
         }
         frames, joints = seen.frames()[kept], seen.joints[kept]
-        yield file, Recording(t=t[kept], frames=frames, joints=joints, valid=seen.valid, meta=meta)
+        yield (
+            file,
+            Recording(
+                t=t[kept], frames=frames, joints=joints, valid=seen.valid, meta=meta
+            ),
+        )
 
 
-def simulate_trials(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[str, Recording]]:
+def simulate_trials(
+    scene: Scene, specs: tuple[TrialSpec, ...]
+) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of trials, each drawn until it fits its label."""
     for physics, true in true_runs(scene, specs):
         yield from recordings(physics, true)
@@ -132,7 +143,8 @@ def write(
     Args:
         batch: most trials simulated side by side.
         jobs: processes on this machine (joblib).
-        address: of a Dask scheduler that runs the batches and sends the recordings back.
+        address: of a Dask scheduler that runs the batches and sends the recordings
+            back.
         progress: called with the number of trials just written.
 
     Raises:
@@ -141,7 +153,9 @@ def write(
     target = Path(folder)
     check_writable(target)
     convergences = measured(scene)
-    work = batches_of(scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1)
+    work = batches_of(
+        scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1
+    )
     paths, redrawn, unfelt = [], 0, 0
     for name, trial in _simulated(scene, work, jobs, address):
         recording.save(target / name, trial, lasting=False)
@@ -173,7 +187,9 @@ def _simulated(
             yield from batch
 
 
-def _simulate_batch(scene: Scene, specs: tuple[TrialSpec, ...]) -> list[tuple[str, Recording]]:
+def _simulate_batch(
+    scene: Scene, specs: tuple[TrialSpec, ...]
+) -> list[tuple[str, Recording]]:
     return list(simulate_trials(scene, specs))
 
 

@@ -1,4 +1,5 @@
-"""Reads and checks a scene's TOML file: arm, motion, skin, objects, trials, spreads and effects."""
+"""Reads and checks a scene's TOML file: arm, motion, skin, objects, trials, spreads and
+effects."""
 
 import math
 import os
@@ -23,20 +24,20 @@ CODY_STIFFNESS = (20.0, 50.0, 15.0, 25.0, 0.69)
 CODY_DAMPING = (1.11, 4.62, 0.43, 1.04, 0.014)
 """Nm/rad and Nms/rad of j0 to j4, the gains of the lab's impedance controller."""
 CODY_INERTIA = (0.36, 0.33, 0.03, 0.047, 0.003)
-"""kg m^2 about j0 to j4, for upper arm and forearm as rods of 2 kg with the elbow bent as below.
-The arm's masses are not published."""
+"""kg m^2 about j0 to j4, for upper arm and forearm as rods of 2 kg with the elbow bent
+as below. The arm's masses are not published."""
 CODY_START_DEG = (-44.0, 5.0, 0.0, 42.0, 0.0)
 CODY_RATE_DEG_S = (20.0, 0.0, 0.0, 0.0, 0.0)
-"""The shoulder swings at the lab's 20 deg/s with the elbow bent to 42 degrees. In this posture the
-gains above give the lab arm's 115 N/m at mid-forearm."""
+"""The shoulder swings at the lab's 20 deg/s with the elbow bent to 42 degrees. In this
+posture the gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
 """The middle of Cody's 16 rows, rounded to a millimetre."""
 
 PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
 DRAWS = 1000
 PRESSED_M = 0.06
-"""How deep the forearm presses a soft object early enough to move it within the window [derived]:
-the arm moves 0.15 m in a second, and gives way itself."""
+"""How deep the forearm presses a soft object early enough to move it within the window
+[derived]: the arm moves 0.15 m in a second, and gives way itself."""
 CODY_SKIN: dict[str, Any] = dict(read_toml(shipped()).raw["skin"])
 del CODY_SKIN["name"]
 
@@ -47,8 +48,8 @@ def load(
     """The scene of a file; `seed` and `count` (trials) replace the file's.
 
     Raises:
-        InputError: the file cannot be read, a key is unknown, a value is not allowed, or an effect
-            suits none of the objects.
+        InputError: the file cannot be read, a key is unknown, a value is not allowed,
+            or an effect suits none of the objects.
     """
     table = _as_another(path)
     if seed is not None:
@@ -59,7 +60,8 @@ def load(
 
 
 def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The table of a scene's file, completed from the scene that `like` names in its folder."""
+    """The table of a scene's file, completed from the scene that `like` names in its
+    folder."""
     table = dict(read_toml(path).raw)
     if "like" not in table:
         return table
@@ -141,7 +143,8 @@ def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
 
 
 def _arm(table: SceneTable) -> dict[str, Any]:
-    """The chain, and each joint's stiffness, damping and inertia, which may be unknown."""
+    """The chain, and each joint's stiffness, damping and inertia, which may be
+    unknown."""
     name = table.text("chain", "cody")
     path = Path(table.where).parent / name
     links = {key: table.text(key) for key in ("base", "tip") if path.suffix == ".urdf"}
@@ -166,14 +169,24 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     return out
 
 
-def _motion(table: SceneTable, chain: Chain, skin: Cylinder, lead: Value) -> dict[str, Any]:
-    """Start and rate of each joint in radians, seconds of travel, and the place of the contact."""
+def _motion(
+    table: SceneTable, chain: Chain, skin: Cylinder, lead: Value
+) -> dict[str, Any]:
+    """Start and rate of each joint in radians, seconds of travel, and the place of the
+    contact."""
     start, rate = (
-        table.numbers(key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0)
-        for key, cody in (("start_deg", CODY_START_DEG), ("rate_deg_s", CODY_RATE_DEG_S))
+        table.numbers(
+            key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0
+        )
+        for key, cody in (
+            ("start_deg", CODY_START_DEG),
+            ("rate_deg_s", CODY_RATE_DEG_S),
+        )
     )
     if not any(rate):
-        raise table.fail("rate_deg_s", "not all 0, so that the arm reaches an object", rate)
+        raise table.fail(
+            "rate_deg_s", "not all 0, so that the arm reaches an object", rate
+        )
     for joint, limits, angle in zip(chain.names, chain.limits, start, strict=True):
         if limits is not None:
             low, high = (math.degrees(limit) for limit in limits)
@@ -215,9 +228,13 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
         angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
         given["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
         if not table.has("pitch_m"):
-            radius = table.number("radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True)
+            radius = table.number(
+                "radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True
+            )
             given["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
-    table.number("counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True)
+    table.number(
+        "counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True
+    )
     taxel = table.value("taxel_n_m", schema.TAXEL)
     table.done()
     skin = Cylinder.from_dict(given, where=table.where)
@@ -307,14 +324,15 @@ def draw_family(
 ) -> Iterator[dict[str, Any]]:
     """The objects of one [[family]], as [[object]] tables.
 
-    Each object draws every range of the family once, uniformly in its logarithm (uniformly where
-    the range begins at 0), from a stream of the family's name. `kinetic_part` gives
-    `friction_kinetic`. An object that may be movable is drawn again until `push_n` newtons, or the
-    force that it passes on to its foot if that is less, move it. A family may give its own
-    `push_n`.
+    Each object draws every range of the family once, uniformly in its logarithm
+    (uniformly where the range begins at 0), from a stream of the family's name.
+    `kinetic_part` gives `friction_kinetic`. An object that may be movable is drawn
+    again until `push_n` newtons, or the force that it passes on to its foot if that is
+    less, move it. A family may give its own `push_n`.
 
     Raises:
-        InputError: a key is missing, a range makes no sense, or nothing in it can be moved.
+        InputError: a key is missing, a range makes no sense, or nothing in it can be
+            moved.
     """
     name = table.text("name")
     family = table.choice("family", tuple(schema.FAMILIES))
@@ -322,41 +340,58 @@ def draw_family(
     count = table.whole("count", allowed=range(1, 1001))
     part = table.value("kinetic_part", PART, [0.8, 0.95])
     push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
-    given = [key for key in schema.keys_of(family) if key != "friction_kinetic" and table.has(key)]
+    given = [
+        key
+        for key in schema.keys_of(family)
+        if key != "friction_kinetic" and table.has(key)
+    ]
     table.done()
     # The draws follow the order of the keys in the file.
     ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
     movable = "movable" in conditions
     shared = {"family": family, "conditions": list(conditions)}
-    usual = {key: default for key, default in schema.keys_of(family).items() if default is not None}
+    usual = {
+        key: default
+        for key, default in schema.keys_of(family).items()
+        if default is not None
+    }
     generator = stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
             drawn = {key: _draw(generator, value) for key, value in ranges.items()}
             if "friction_static" in drawn:
-                drawn["friction_kinetic"] = drawn["friction_static"] * _draw(generator, part)
+                drawn["friction_kinetic"] = drawn["friction_static"] * _draw(
+                    generator, part
+                )
             floor = drawn.get("friction_static", 0.0)
             hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
             # Through skin friction the push may also press the object down.
             level = 1.0 - floor * drawn.get("skin_friction", 0.0)
-            if not movable or hold <= level * min(push_n, passed_on({**usual, **drawn}, skin)):
+            if not movable or hold <= level * min(
+                push_n, passed_on({**usual, **drawn}, skin)
+            ):
                 break
         else:
             wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", wanted)
-        counts = {key: round(value) for key, value in drawn.items() if OBJECT[key].integer}
+        counts = {
+            key: round(value) for key, value in drawn.items() if OBJECT[key].integer
+        }
         yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
 
 
 def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
-    """Newtons that an object passes on to its foot: the force that presses its stems or its elastic
-    layer (`effects.foundation`) `PRESSED_M` deep; infinite for other objects."""
+    """Newtons that an object passes on to its foot: the force that presses its stems or
+    its elastic layer (`effects.foundation`) `PRESSED_M` deep; infinite for other
+    objects."""
     if "stem_n_m" in drawn:
         return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
     if "modulus_pa" in drawn:
         length = min(drawn["width_m"], skin.rows * skin.pitch[0])
         half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)
-        per_length = 4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
+        per_length = (
+            4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
+        )
         return length * per_length
     return math.inf
 

@@ -1,4 +1,5 @@
-"""A checked scene: its objects, the values that its trials share, and the table it is read from."""
+"""A checked scene: its objects, the values that its trials share, and the table it is
+read from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -48,18 +49,26 @@ class SceneTable(ConfigTable):
         if len(ends) != 2:
             raise self.fail(key, "one number or a range [low, high]")
         low, high = (
-            self.number(key, 0, field.low, field.high, open_low=field.open_low, value=end)
+            self.number(
+                key, 0, field.low, field.high, open_low=field.open_low, value=end
+            )
             for end in ends
         )
         if low > high:
-            raise self.fail(key, f"a range with its lower limit first, [{high:g}, {low:g}]")
+            raise self.fail(
+                key, f"a range with its lower limit first, [{high:g}, {low:g}]"
+            )
         return Value(low, high)
 
-    def names(self, key: str, allowed: tuple[str, ...], default: object = ()) -> tuple[str, ...]:
+    def names(
+        self, key: str, allowed: tuple[str, ...], default: object = ()
+    ) -> tuple[str, ...]:
         """A list of different names, each of which is allowed."""
         names = self.texts(key, default)
         if not set(names) <= set(allowed) or len(set(names)) != len(names):
-            raise self.fail(key, f"a list of different names out of {', '.join(allowed)}")
+            raise self.fail(
+                key, f"a list of different names out of {', '.join(allowed)}"
+            )
         return names
 
 
@@ -77,7 +86,9 @@ class SceneObject:
     @cached_property
     def slug(self) -> str:
         """The name in a form that suits a file name."""
-        return "-".join("".join(c if c.isalnum() else " " for c in self.name.lower()).split())
+        return "-".join(
+            "".join(c if c.isalnum() else " " for c in self.name.lower()).split()
+        )
 
 
 @dataclass(frozen=True)
@@ -115,7 +126,8 @@ class Scene:
     seed: int
     trials: dict[str, float]
     step_s: dict[str, float]
-    """{effect, or `base`: the longest step of its trials}; empty where the step is measured."""
+    """{effect, or `base`: the longest step of its trials}; empty where the step is
+    measured."""
     lead: Value
     arm: Chain
     stiffness: tuple[float, ...]
@@ -152,4 +164,6 @@ class Scene:
 
     def setting(self, effect: str, key: str) -> float:
         """A setting of an effect, or its default."""
-        return self.settings.get(effect, {}).get(key, EFFECTS[effect].settings[key].default or 0.0)
+        return self.settings.get(effect, {}).get(
+            key, EFFECTS[effect].settings[key].default or 0.0
+        )

@@ -1,11 +1,13 @@
-"""The keys of a scene file with their limits and defaults, and the table of all effects."""
+"""The keys of a scene file with their limits and defaults, and the table of all
+effects."""
 
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene: its limits, and its default where the file does not give it."""
+    """A number of a scene: its limits, and its default where the file does not give
+    it."""
 
     low: float
     high: float
@@ -19,10 +21,12 @@ class Field:
 
 @dataclass(frozen=True)
 class Effect:
-    """When a trial calls for an effect; the module of its name, loaded only then, computes it."""
+    """When a trial calls for an effect; the module of its name, loaded only then,
+    computes it."""
 
     stage: str
-    """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their times)."""
+    """`contact` (acts in the step), `sensor` (on the frames) or `clock` (on their
+    times)."""
     settings: dict[str, Field] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     """Effects that it builds upon."""
@@ -37,19 +41,31 @@ class Effect:
 CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
-    "count": Field(1, 1_000_000, 5, "trials of each object in each condition", integer=True),
+    "count": Field(
+        1, 1_000_000, 5, "trials of each object in each condition", integer=True
+    ),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
-    "tolerance": Field(1e-5, 0.5, 0.01, "error allowed to the step, as a part of the peak force"),
+    "tolerance": Field(
+        1e-5, 0.5, 0.01, "error allowed to the step, as a part of the peak force"
+    ),
 }
 LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
 TAXEL = Field(0.0, 1e15, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
 """At 1e16 N/m the depth of a touch is below the rounding error of a metre."""
 LABELS = {
-    "window_s": Field(0.01, 60.0, 1.2, "time after the first touch in which labels are judged"),
-    "push_n": Field(0.1, 1e6, 6.0, "push that moves every movable object of a [[family]]"),
-    "slides_m": Field(0.0, 1.0, 0.02, "a movable object moves at least this far by then"),
-    "yields": Field(0.0, 1.0, 0.01, "a soft object yields by then, as a part of its thickness"),
+    "window_s": Field(
+        0.01, 60.0, 1.2, "time after the first touch in which labels are judged"
+    ),
+    "push_n": Field(
+        0.1, 1e6, 6.0, "push that moves every movable object of a [[family]]"
+    ),
+    "slides_m": Field(
+        0.0, 1.0, 0.02, "a movable object moves at least this far by then"
+    ),
+    "yields": Field(
+        0.0, 1.0, 0.01, "a soft object yields by then, as a part of its thickness"
+    ),
 }
 SPREAD = {
     "place_m": Field(0.0, 0.08, 0.0, "place along the forearm where the object is met"),
@@ -58,13 +74,15 @@ SPREAD = {
     "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
     "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
     "stiffness": Field(0.0, 1.0, 0.0, "of the object, as a part of its value"),
-    "friction": Field(0.0, 1.0, 0.0, "of both coefficients together, as a part of their value"),
+    "friction": Field(
+        0.0, 1.0, 0.0, "of both coefficients together, as a part of their value"
+    ),
     "mass": Field(0.0, 1.0, 0.0, "as a part of its value"),
     "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
 }
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
-"""{spread around 0: the other key that a movable object needs for it}; the object need not give
-a value for the spread itself."""
+"""{spread around 0: the other key that a movable object needs for it}; the object need
+not give a value for the spread itself."""
 OBJECT = {
     "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
@@ -74,26 +92,42 @@ OBJECT = {
     "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
     "radius_m": Field(1e-3, 1e6, 1e6, "how the face curves along the forearm"),
     "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
-    "base_m": Field(0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True),
+    "base_m": Field(
+        0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True
+    ),
     "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
     "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
-    "slope_deg": Field(-20.0, 20.0, None, "of the surface under the object, uphill along the push"),
-    "stribeck_m_s": Field(0.0, 10.0, None, "speed at which friction has fallen", open_low=True),
+    "slope_deg": Field(
+        -20.0, 20.0, None, "of the surface under the object, uphill along the push"
+    ),
+    "stribeck_m_s": Field(
+        0.0, 10.0, None, "speed at which friction has fallen", open_low=True
+    ),
     "modulus_pa": Field(0.0, 1e18, 12e3, "of the elastic foundation", open_low=True),
     "depth_m": Field(0.0, 10.0, 0.10, "of the elastic foundation", open_low=True),
     "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
     "relax_s": Field(0.0, 1e6, 0.5, "its time", open_low=True),
     "stem_count": Field(1, 200, 12, "stems the forearm can meet", integer=True),
-    "stem_n_m": Field(0.0, 1e12, 15.0, "stiffness of a stem, 3 E I / L^3", open_low=True),
+    "stem_n_m": Field(
+        0.0, 1e12, 15.0, "stiffness of a stem, 3 E I / L^3", open_low=True
+    ),
     "stem_spread_m": Field(0.0, 1.0, 0.06, "depth over which the stems stand"),
-    "stem_slip_m": Field(0.0, 10.0, 0.12, "bend at which a stem slips off", open_low=True),
+    "stem_slip_m": Field(
+        0.0, 10.0, 0.12, "bend at which a stem slips off", open_low=True
+    ),
     "stem_damping": Field(0.0, 1.0, 0.15, "damping ratio of a stem"),
-    "stem_deviation": Field(0.0, 2.0, 0.3, "of the logarithm of the stems' stiffnesses"),
+    "stem_deviation": Field(
+        0.0, 2.0, 0.3, "of the logarithm of the stems' stiffnesses"
+    ),
     "stem_kg": Field(0.0, 10.0, 0.02, "moving mass of a stem", open_low=True),
-    "bubble_n_m": Field(0.0, 1e12, 2000.0, "stiffness of a bubble at rest", open_low=True),
+    "bubble_n_m": Field(
+        0.0, 1e12, 2000.0, "stiffness of a bubble at rest", open_low=True
+    ),
     "bubble_m": Field(0.0, 0.1, 0.004, "height of a bubble", open_low=True),
     "pop_n": Field(0.0, 1e6, 10.0, "force at which a bubble bursts", open_low=True),
-    "cover_n_m": Field(0.0, 1e12, None, "stiffness of a sleeve, per taxel", open_low=True),
+    "cover_n_m": Field(
+        0.0, 1e12, None, "stiffness of a sleeve, per taxel", open_low=True
+    ),
     "cover_spread": Field(0.0, 0.2, 0.1, "part of a taxel's load each neighbour takes"),
 }
 STIFFNESSES = ("modulus_pa", "stem_n_m", "bubble_n_m")
@@ -104,10 +138,13 @@ class Family:
     """A kind of objects.
 
     Attributes:
-        effects: effects that each of its objects calls for; the first makes the objects soft.
-        thickness: the key of the depth to which a soft object can yield; empty for a rigid one.
+        effects: effects that each of its objects calls for; the first makes the objects
+            soft.
+        thickness: the key of the depth to which a soft object can yield; empty for a
+            rigid one.
         own: keys that objects of other families do not have.
-        defaults: {key: the family's typical value}, in place of the default in `OBJECT`.
+        defaults: {key: the family's typical value}, in place of the default in
+            `OBJECT`.
     """
 
     effects: tuple[str, ...] = ()
@@ -133,7 +170,9 @@ def keys_of(family: str) -> dict[str, float | None]:
     """{key of `OBJECT` that an object of a family may have: its default, or None}."""
     known = FAMILIES[family]
     others = {key for other in FAMILIES.values() for key in other.own} - {*known.own}
-    defaults = {key: field.default for key, field in OBJECT.items() if key not in others}
+    defaults = {
+        key: field.default for key, field in OBJECT.items() if key not in others
+    }
     return {**defaults, **known.defaults}
 
 
@@ -148,10 +187,16 @@ EFFECTS: dict[str, Effect] = {
     "stems": Effect("contact", families=("foliage",)),
     "tilt": Effect("contact", families=("rigid", "foam", "pillow", "bubbles")),
     "relaxation": Effect("contact", families=ELASTIC),
-    "inertia": Effect("contact", {"loss_s": Field(0.0, 1.0, 0.0015, "dashpot by stiffness")}),
+    "inertia": Effect(
+        "contact", {"loss_s": Field(0.0, 1.0, 0.0015, "dashpot by stiffness")}
+    ),
     "friction": Effect(
         "contact",
-        {"shear_n_m": Field(0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True)},
+        {
+            "shear_n_m": Field(
+                0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True
+            )
+        },
         keys=("skin_friction",),
     ),
     "sliding": Effect("contact", condition="movable"),
@@ -159,21 +204,37 @@ EFFECTS: dict[str, Effect] = {
     "turning": Effect("contact", needs=("sliding",), keys=("aside_m", "foot_m")),
     "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
     "tipping": Effect("contact", needs=("sliding",), keys=("base_m", "height_m")),
-    "crosstalk": Effect("sensor", {"part": Field(0.0, 0.2, 0.02, "of each of four neighbours")}),
-    "hysteresis": Effect("sensor", {"counts": Field(0.0, 65535, 30.0, "half the loop's width")}),
-    "drift": Effect("sensor", {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of slopes")}),
+    "crosstalk": Effect(
+        "sensor", {"part": Field(0.0, 0.2, 0.02, "of each of four neighbours")}
+    ),
+    "hysteresis": Effect(
+        "sensor", {"counts": Field(0.0, 65535, 30.0, "half the loop's width")}
+    ),
+    "drift": Effect(
+        "sensor", {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of slopes")}
+    ),
     "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0, "standard deviation")}),
-    "saturation": Effect("sensor", {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)}),
-    "dead_band": Effect("sensor", {"counts": Field(0.0, 65535, 50.0, "readings below are zero")}),
-    "quantisation": Effect("sensor", {"counts": Field(1.0, 65535, 4.0, "size of a step")}),
+    "saturation": Effect(
+        "sensor", {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)}
+    ),
+    "dead_band": Effect(
+        "sensor", {"counts": Field(0.0, 65535, 50.0, "readings below are zero")}
+    ),
+    "quantisation": Effect(
+        "sensor", {"counts": Field(1.0, 65535, 4.0, "size of a step")}
+    ),
     "dead_taxels": Effect(
         "sensor",
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
-            "known": Field(0, 1, 1, "1: marked invalid; 0: they read zero", integer=True),
+            "known": Field(
+                0, 1, 1, "1: marked invalid; 0: they read zero", integer=True
+            ),
         },
     ),
-    "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001, "deviation, cut at 0.45 of a frame")}),
+    "jitter": Effect(
+        "clock", {"s": Field(0.0, 1.0, 0.001, "deviation, cut at 0.45 of a frame")}
+    ),
     "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02, "of all frames")}),
 }
 STEP = Field(1e-6, 1.0, None, "the physics' step")

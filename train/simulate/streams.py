@@ -18,14 +18,19 @@ def key(name: str) -> tuple[int, int]:
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
 
 
-def stream(seed: int, name: str, condition: str, trial: int | None = None) -> np.random.Generator:
-    """The stream of `name` in one trial of `condition`; without `trial`, of the condition.
+def stream(
+    seed: int, name: str, condition: str, trial: int | None = None
+) -> np.random.Generator:
+    """The stream of `name` in one trial of `condition`; without `trial`, of the
+    condition.
 
-    A stream depends on its name, never on its position: a further effect, object or trial changes
-    no draw of the others.
+    A stream depends on its name, never on its position: a further effect, object or
+    trial changes no draw of the others.
     """
     words = (*key(name), *key(condition), *(() if trial is None else (trial,)))
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=words)))
+    return np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence(seed, spawn_key=words))
+    )
 
 
 def draws(
@@ -43,16 +48,23 @@ def draws(
 
 @cache
 def quantiles(deviation: float = 1.0) -> NDArray[np.float32]:
-    """The normal quantiles of 65,536 equally likely intervals, from -4.3 to 4.3 deviations."""
+    """The normal quantiles of 65,536 equally likely intervals, from -4.3 to 4.3
+    deviations."""
     upper = map(NormalDist().inv_cdf, ((np.arange(32768) + 32768.5) / 65536.0).tolist())
     positive = np.array(list(upper), dtype=np.float32)
     return np.concatenate([-positive[::-1], positive]) * np.float32(deviation)
 
 
-def add_normal(generator: np.random.Generator, deviation: float, to: NDArray[np.float32]) -> None:
-    """Add to each number a normal draw, one of 65,536 `quantiles` that 16 random bits choose.
+def add_normal(
+    generator: np.random.Generator, deviation: float, to: NDArray[np.float32]
+) -> None:
+    """Add to each number a normal draw, one of 65,536 `quantiles` that 16 random bits
+    choose.
 
-    This is several times faster than `standard_normal`, and finer than any taxel's reading.
+    This is several times faster than `standard_normal`, and finer than any taxel's
+    reading.
     """
-    words = generator.bit_generator.random_raw(-(-to.size // 4)).astype("<u8", copy=False)
+    words = generator.bit_generator.random_raw(-(-to.size // 4)).astype(
+        "<u8", copy=False
+    )
     to += quantiles(deviation)[words.view("<u2")[: to.size]].reshape(to.shape)

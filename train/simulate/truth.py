@@ -1,8 +1,9 @@
 """Draws a trial again where its course contradicts its label.
 
-Labels are judged in a window after the first touch. In it an object labelled movable has to slide,
-and an object labelled soft has to yield. So it was in the paper ("For an object to be considered
-movable in our experiments, it needed to be moved by the robot's stereotyped motion", section IV-C).
+Labels are judged in a window after the first touch. In it an object labelled movable
+has to slide, and an object labelled soft has to yield. So it was in the paper ("For an
+object to be considered movable in our experiments, it needed to be moved by the robot's
+stereotyped motion", section IV-C).
 """
 
 from collections.abc import Iterator
@@ -18,9 +19,11 @@ from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import FAMILIES
 
 REDRAWS = 40
-"""Draws of one trial after which the scene is refused, if each contradicts the label."""
+"""Draws of one trial after which the scene is refused, if each contradicts the
+label."""
 AHEAD = 4
-"""Further draws of a trial simulated side by side; the first that fits its label is taken."""
+"""Further draws of a trial simulated side by side; the first that fits its label is
+taken."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,8 @@ class Contradiction:
 
     Attributes:
         label: `soft`, or the trial's condition.
-        course: the end of a sentence that begins with the trial, such as "was never touched".
+        course: the end of a sentence that begins with the trial, such as "was never
+            touched".
         remedy: a change of the scene that may help.
     """
 
@@ -40,7 +44,11 @@ class Contradiction:
 
 def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     """For each trial of a run, how it contradicts its label, or None."""
-    trials, labels, touched = physics.trials, physics.trials.scene.labels, physics.force > 0.0
+    trials, labels, touched = (
+        physics.trials,
+        physics.trials.scene.labels,
+        physics.force > 0.0,
+    )
     onset, every = np.argmax(touched, axis=1), np.arange(trials.n)
     last = onset + round(labels["window_s"] * trials.rate_hz)
     last = np.minimum(last, touched.shape[1] - 1)
@@ -59,7 +67,9 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
             course = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
         elif trial.condition == "movable" and slide[i] < labels["slides_m"]:
-            course = f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
+            course = (
+                f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
+            )
             remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
         elif depth[i] < labels["yields"] * thickness:
             label = "soft"
@@ -74,7 +84,8 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
 
 
 def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
-    """The cause in words, if trial i ended before its window, and the remedy; else empty texts."""
+    """The cause in words, if trial i ended before its window, and the remedy; else
+    empty texts."""
     trials = physics.trials
     scene, moves = trials.scene, trials.rate[:, 0] != 0.0
     stroke_s = float(trials.travel_s[moves, i].max())
@@ -85,14 +96,21 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     if ends_s < stroke_s:
         return f", and the trial {ended}", "give trials.after_s more, or "
     short = stroke_s < scene.travel_s
-    remedy = "start_deg more room before the joint's limit" if short else "travel_s more time"
+    remedy = (
+        "start_deg more room before the joint's limit"
+        if short
+        else "travel_s more time"
+    )
     return f", as the arm's stroke {ended}", f"give motion.{remedy}, or "
 
 
-def true_runs(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[PhysicsRun, Places]]:
+def true_runs(
+    scene: Scene, specs: tuple[TrialSpec, ...]
+) -> Iterator[tuple[PhysicsRun, Places]]:
     """Runs of trials, and which trials of each run fit their labels.
 
-    Each trial fits its label in exactly one of the runs; its draws depend on nothing but itself.
+    Each trial fits its label in exactly one of the runs; its draws depend on nothing
+    but itself.
 
     Raises:
         InputError: a trial contradicts its label in every draw.
@@ -101,7 +119,9 @@ def true_runs(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[Phys
         physics = run_physics(scene, specs)
         fits: dict[tuple[str, int], int] = {}
         wrong: dict[tuple[str, int], tuple[TrialSpec, Contradiction]] = {}
-        for i, (spec, contradiction) in enumerate(zip(specs, contradictions(physics), strict=True)):
+        for i, (spec, contradiction) in enumerate(
+            zip(specs, contradictions(physics), strict=True)
+        ):
             if contradiction is None:
                 fits.setdefault((spec.key, spec.number), i)
             else:
@@ -111,7 +131,9 @@ def true_runs(scene: Scene, specs: tuple[TrialSpec, ...]) -> Iterator[tuple[Phys
         specs = tuple(spec for last in again for spec in _next_draws(scene, *last))
 
 
-def _next_draws(scene: Scene, last: TrialSpec, wrong: Contradiction) -> Iterator[TrialSpec]:
+def _next_draws(
+    scene: Scene, last: TrialSpec, wrong: Contradiction
+) -> Iterator[TrialSpec]:
     """The next draws of a trial whose last draw contradicted its label."""
     first = last.attempt + 1
     if first >= REDRAWS:

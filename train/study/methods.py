@@ -1,4 +1,5 @@
-"""The study's findings: the accuracy of each method on new contacts with known and new objects."""
+"""The study's findings: the accuracy of each method on new contacts with known and new
+objects."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -26,7 +27,8 @@ GUESS = "always the most frequent label"
 OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda"))
 """Feature sets and their projections."""
 PAPERS_GRID = SearchGrid(
-    components=tuple(range(1, MAX_COMPONENTS + 1)), neighbours=tuple(range(1, MAX_K + 1))
+    components=tuple(range(1, MAX_COMPONENTS + 1)),
+    neighbours=tuple(range(1, MAX_K + 1)),
 )
 TREES = 100
 TIMES = 10
@@ -40,12 +42,15 @@ Answers = Mapping[str, Result]
 def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> Answers:
     """The accuracy of extra trees, a widely used method, on X (n, taxels over time)."""
     trees, split = ExtraTreesClassifier(TREES, random_state=0), PredefinedSplit(folds)
-    hits = {task: cross_val_predict(trees, X, y[task], cv=split) == y[task] for task in y}
+    hits = {
+        task: cross_val_predict(trees, X, y[task], cv=split) == y[task] for task in y
+    }
     return {task: Result(int(right.sum()), len(X)) for task, right in hits.items()}
 
 
 def taxels(context: Context) -> NDArray[np.float64]:
-    """(n, times * taxels) counts at evenly spaced times; the last frame stays until the end."""
+    """(n, times * taxels) counts at evenly spaced times; the last frame stays until the
+    end."""
     wanted = np.linspace(0.0, WINDOW_S, TIMES)
     alive = context.dataset.layout.alive.reshape(-1)
     rows = []
@@ -57,26 +62,32 @@ def taxels(context: Context) -> NDArray[np.float64]:
 
 
 def methods(context: Context) -> dict[str, Callable[..., Answers]]:
-    """{name: function of labels and folds that gives the method's accuracy} to compare."""
+    """{name: function of labels and folds that gives the method's accuracy} to
+    compare."""
     data = context.dataset
     compared: dict[str, Callable[..., Answers]] = {
         PAPER: partial(nested, context.vectors(), grid=PAPERS_GRID, features=FEATURES)
     }
     for name, projection in OURS:
         taken = data.of(SETS[name])
-        compared[f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"] = partial(
+        compared[
+            f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"
+        ] = partial(
             nested,
             taken.features(WINDOW_S, SAMPLES // 2),
             grid=SearchGrid("IV", projection),
             features=taken.names,
             widths=taken.widths(SAMPLES // 2),
         )
-    compared[f"{TREES} extra trees on every taxel"] = partial(extra_trees, taxels(context))
+    compared[f"{TREES} extra trees on every taxel"] = partial(
+        extra_trees, taxels(context)
+    )
     return compared
 
 
 def section(context: Context) -> Section:
-    """Each method's accuracy on trials that were left out, and on objects that were left out."""
+    """Each method's accuracy on trials that were left out, and on objects that were
+    left out."""
     y = context.labels
     others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
     compared, splits = methods(context), [(y, stratified_folds(y[finest(y)]))]
@@ -90,7 +101,11 @@ def section(context: Context) -> Section:
     known[SEARCHED] = grid_search(context.vectors(), y)
     known[GUESS] = {task: majority(labels) for task, labels in y.items()}
     never = {
-        task: {m: percent(result[task].accuracy) for m, result in unseen.items() if task in result}
+        task: {
+            m: percent(result[task].accuracy)
+            for m, result in unseen.items()
+            if task in result
+        }
         for task in y
     }
     rows: list[Row] = [
@@ -127,14 +142,25 @@ def section(context: Context) -> Section:
     )  # fmt: skip
 
 
-def sentence(task: str, known: Mapping[str, Answers], unseen: Mapping[str, Answers]) -> str:
-    """The accuracy of the paper's method and of the best one, with objects known and never met."""
+def sentence(
+    task: str, known: Mapping[str, Answers], unseen: Mapping[str, Answers]
+) -> str:
+    """The accuracy of the paper's method and of the best one, with objects known and
+    never met."""
 
     def share(method: str) -> str:
         result, new = known[method][task], unseen.get(method, {}).get(task)
-        beside = "" if new is None else f"; {100 * new.accuracy:.0f} % with objects never met"
+        beside = (
+            ""
+            if new is None
+            else f"; {100 * new.accuracy:.0f} % with objects never met"
+        )
         return f"{100 * result.accuracy:.0f} % of the contacts right ({interval(result)}{beside})"
 
     best = max(known, key=lambda method: known[method][task].accuracy)
-    better = "No method here does better" if best == PAPER else f"The best is {best}: {share(best)}"
+    better = (
+        "No method here does better"
+        if best == PAPER
+        else f"The best is {best}: {share(best)}"
+    )
     return f"{task}: the paper's method gets {share(PAPER)}. {better}."

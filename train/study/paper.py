@@ -20,7 +20,8 @@ Numbers = dict[tuple[str, str, str], float]
 PAPER = Path(__file__).with_name("paper.csv")
 TRIALS = 140
 REPLICATIONS = 4000
-"""Draws of the bootstrap that tells how a perfect replication would order the settings."""
+"""Draws of the bootstrap that tells how a perfect replication would order the
+settings."""
 LISTED = 12
 """The text lists at most so many of the numbers outside the interval."""
 
@@ -52,8 +53,8 @@ class Entry:
     def headline(self) -> bool:
         """Whether it is one of the three accuracies of section IV-A.
 
-        They use all taxels without scaling. Table III repeats them for force and area alone,
-        because unscaled motion in metres has no weight beside these.
+        They use all taxels without scaling. Table III repeats them for force and area
+        alone, because unscaled motion in metres has no weight beside these.
         """
         settings = {"I": "384", "II": "none", "III": "max_force contact_area"}
         return self.setting == settings[self.table]
@@ -70,15 +71,17 @@ def entries() -> list[Entry]:
 
 def papers(table: str, task: str) -> dict[str, float]:
     """{setting: the paper's percent} for a task in one of its tables."""
-    return {e.setting: e.percent for e in entries() if (e.table, e.task) == (table, task)}
+    return {
+        e.setting: e.percent for e in entries() if (e.table, e.task) == (table, task)
+    }
 
 
 def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
     """95 % interval of our accuracy minus the paper's, in percentage points.
 
-    Two studies of the same thing differ by chance in both. An interval around one of them alone
-    would exclude a perfect replication one time in six (Newcombe, Statistics in Medicine 17, 1998,
-    method 10, for two samples).
+    Two studies of the same thing differ by chance in both. An interval around one of
+    them alone would exclude a perfect replication one time in six (Newcombe, Statistics
+    in Medicine 17, 1998, method 10, for two samples).
 
     Args:
         paper: percent of `TRIALS`.
@@ -98,15 +101,19 @@ def difference(paper: float, ours: float, tested: int) -> tuple[float, float]:
 def mean_of(data_sets: Sequence[Numbers]) -> Numbers:
     """The mean over several data sets of each number that all of them have."""
     shared = set.intersection(*(set(numbers) for numbers in data_sets))
-    return {key: float(np.mean([numbers[key] for numbers in data_sets])) for key in shared}
+    return {
+        key: float(np.mean([numbers[key] for numbers in data_sets])) for key in shared
+    }
 
 
 def negative_by_chance(percents: Sequence[float], tested: int) -> float:
-    """Percent of perfect replications whose rank correlation with the paper would be negative.
+    """Percent of perfect replications whose rank correlation with the paper would be
+    negative.
 
-    This is a parametric bootstrap. It takes the paper's percents as true, and draws the trials of
-    the paper and of the replication anew, independently for each setting. In fact the settings of a
-    table share their trials, so the result is more likely too high than too low.
+    This is a parametric bootstrap. It takes the paper's percents as true, and draws the
+    trials of the paper and of the replication anew, independently for each setting. In
+    fact the settings of a table share their trials, so the result is more likely too
+    high than too low.
 
     Args:
         percents: the paper's, for each setting.
@@ -115,16 +122,20 @@ def negative_by_chance(percents: Sequence[float], tested: int) -> float:
     rng = np.random.default_rng(0)
     truth = np.array(percents) / 100.0
     size = (REPLICATIONS, len(truth))
-    pair = rng.binomial(TRIALS, truth, size) / TRIALS, rng.binomial(tested, truth, size) / tested
+    pair = (
+        rng.binomial(TRIALS, truth, size) / TRIALS,
+        rng.binomial(tested, truth, size) / tested,
+    )
     paper, ours = (rankdata(x, axis=1) - (len(truth) + 1) / 2.0 for x in pair)
     return round(100.0 * float(np.mean((paper * ours).sum(axis=1) < 0.0)), 1)
 
 
 def right_despite_the_object(numbers: Numbers) -> float:
-    """Percent of the trials with a wrong object whose category is right, as a mean over settings.
+    """Percent of the trials with a wrong object whose category is right, as a mean over
+    settings.
 
-    The right object nearly implies the right category. So the trials by which the category's
-    accuracy exceeds the object's are trials with a wrong object.
+    The right object nearly implies the right category. So the trials by which the
+    category's accuracy exceeds the object's are trials with a wrong object.
 
     Args:
         numbers: percent, with category and object of each setting.
@@ -153,11 +164,15 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """
     mean = mean_of(data_sets)
     known = {
-        entry: _beside(entry, mean[entry.key], tested) for entry in entries() if entry.key in mean
+        entry: _beside(entry, mean[entry.key], tested)
+        for entry in entries()
+        if entry.key in mean
     }
     rows = list(known.values())
     by_task = groupby(known, key=lambda entry: (entry.table, entry.task))
-    ranks = [_ranks(list(settings), known, data_sets, tested) for _, settings in by_task]
+    ranks = [
+        _ranks(list(settings), known, data_sets, tested) for _, settings in by_task
+    ]
     inside = [row for row in rows if row["within"] == "yes"]
     others = [row for row in rows if not row["headline"]]
     others_inside = sum(not row["headline"] for row in inside)
@@ -183,7 +198,12 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
         ],
         [
             Table("paper", "The paper's accuracies and ours", rows),
-            Table("paper_ranks", "Spearman's rank correlation with the paper", ranks, narrow=5),
+            Table(
+                "paper_ranks",
+                "Spearman's rank correlation with the paper",
+                ranks,
+                narrow=5,
+            ),
         ],
         [_against(known, title)],
     )
@@ -212,7 +232,10 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
 
 
 def _ranks(
-    settings: Sequence[Entry], known: Mapping[Entry, Row], data_sets: Sequence[Numbers], tested: int
+    settings: Sequence[Entry],
+    known: Mapping[Entry, Row],
+    data_sets: Sequence[Numbers],
+    tested: int,
 ) -> Row:
     """The row of rank correlations for one task in one of the paper's tables.
 
@@ -225,7 +248,9 @@ def _ranks(
     theirs = [entry.percent for entry in settings]
     ours = [[numbers[entry.key] for entry in settings] for numbers in data_sets]
     rank = rank_correlation(theirs, np.mean(ours, axis=0))
-    positive = sum((rank_correlation(theirs, percents) or 0.0) > 0.0 for percents in ours)
+    positive = sum(
+        (rank_correlation(theirs, percents) or 0.0) > 0.0 for percents in ours
+    )
     within = sum(known[entry]["within"] == "yes" for entry in settings)
     return {
         "table": settings[0].table,
@@ -238,8 +263,11 @@ def _ranks(
 
 
 def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
-    """A paragraph on the category in trials with a wrong object; none if a task is missing."""
-    paper, here = (right_despite_the_object({k: n[k] for k in theirs}) for n in (theirs, ours))
+    """A paragraph on the category in trials with a wrong object; none if a task is
+    missing."""
+    paper, here = (
+        right_despite_the_object({k: n[k] for k in theirs}) for n in (theirs, ours)
+    )
     if np.isnan(paper) or np.isnan(here):
         return []
     return [
@@ -256,7 +284,9 @@ def _disagreements(outside: Sequence[Row]) -> str:
     if not outside:
         return "No accuracy disagrees."
     largest = sorted(outside, key=lambda row: -abs(row["difference"]))[:LISTED]
-    listed = [f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in largest]
+    listed = [
+        f"{r['place']} ({r['task']}) {r['difference']:+.1f} points" for r in largest
+    ]
     higher = sum(row["difference"] > 0 for row in outside)
     return (
         f"{len(outside)} disagree; {higher} of them are higher here than in the paper. The largest "
@@ -268,10 +298,14 @@ def _disagreements(outside: Sequence[Row]) -> str:
 
 
 def _against(known: Mapping[Entry, Row], title: str) -> Figure:
-    """Our accuracies against the paper's; a point is hollow if its interval misses the diagonal."""
+    """Our accuracies against the paper's; a point is hollow if its interval misses the
+    diagonal."""
     marks = dict(zip(dict.fromkeys(e.table for e in known), "os^", strict=False))
     strokes = dict(zip(sorted({e.task for e in known}), STROKES, strict=False))
-    ends = min(min(row["paper %"], row["ours %"]) for row in known.values()) - 4.0, 102.0
+    ends = (
+        min(min(row["paper %"], row["ours %"]) for row in known.values()) - 4.0,
+        102.0,
+    )
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
@@ -281,13 +315,20 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
             x, face = entry.percent, colour if row["within"] == "yes" else "white"
             bar = [x + row["from"], x + row["to"]]
             axes.plot([x, x], bar, color=colour, lw=1, alpha=0.6, ls=dashes)
-            axes.plot(x, row["ours %"], marks[entry.table], color=colour, mfc=face, ms=6)
+            axes.plot(
+                x, row["ours %"], marks[entry.table], color=colour, mfc=face, ms=6
+            )
         for task, (colour, _, dashes) in strokes.items():
             axes.plot([], [], ls=dashes, color=colour, lw=2, label=task)
         for table, mark in marks.items():
             axes.plot([], [], mark, color="0.3", label=f"Table {table}")
         axes.plot([], [], "o", color="0.3", mfc="white", label="disagrees")
-        axes.set(xlim=ends, ylim=ends, xlabel="the paper's accuracy, %", ylabel="our accuracy, %")
+        axes.set(
+            xlim=ends,
+            ylim=ends,
+            xlabel="the paper's accuracy, %",
+            ylabel="our accuracy, %",
+        )
         legend(canvas, axes, 3 if phone else 4)
 
     return picture("paper", title, draw, (5.6, 4.4))

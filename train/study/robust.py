@@ -20,17 +20,22 @@ from train.simulate.truth import REDRAWS
 from train.study.context import Context
 
 FACTORS = (0.5, 2.0)
-SENSOR_EFFECTS = tuple(name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock"))
+SENSOR_EFFECTS = tuple(
+    name for name, info in EFFECTS.items() if info.stage in ("sensor", "clock")
+)
 """Effects that change the readings and leave the contact as it is."""
 TRAINING = "trained with the change", "trained without it"
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
-    """{name: the scene with one thing changed}: the speed, the arm, or an effect of the sensor."""
+    """{name: the scene with one thing changed}: the speed, the arm, or an effect of the
+    sensor."""
     changed = {}
     for factor in FACTORS:
         # The equilibrium point travels the same distance.
-        rate, stiffness = (tuple(factor * x for x in xs) for xs in (scene.rate, scene.stiffness))
+        rate, stiffness = (
+            tuple(factor * x for x in xs) for xs in (scene.rate, scene.stiffness)
+        )
         faster = replace(scene, rate=rate, travel_s=scene.travel_s / factor)
         changed[f"speed x {factor:g}"] = faster
         changed[f"arm stiffness x {factor:g}"] = replace(scene, stiffness=stiffness)
@@ -44,7 +49,8 @@ def variants(scene: Scene) -> dict[str, Scene]:
 
 
 def attempt_of(trial: Trial) -> int:
-    """How often a trial was drawn again until it fitted its label; 0 where the file has no count.
+    """How often a trial was drawn again until it fitted its label; 0 where the file has
+    no count.
 
     Raises:
         InputError: `meta.simulation` is damaged; the sentence names the file.
@@ -57,9 +63,10 @@ def attempt_of(trial: Trial) -> int:
 def simulated_again(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
     """The contacts of a data set's trials, in its order, simulated again from a scene.
 
-    A trial has the same random draws in every scene: those with which it fitted its label when it
-    was recorded. A weaker arm that no longer moves an object does not change its label. A trial
-    that the scene does not have counts as one without contact.
+    A trial has the same random draws in every scene: those with which it fitted its
+    label when it was recorded. A weaker arm that no longer moves an object does not
+    change its label. A trial that the scene does not have counts as one without
+    contact.
 
     Raises:
         InputError: `meta.simulation` of a trial is damaged.
@@ -90,7 +97,9 @@ def section(context: Context) -> Section | None:
         )
     changed = [vectors(contacts) for contacts in series]
     plain = grid_search(X, y)
-    retrained = context.workers.map("trained with", grid_search, [(x, y) for x in changed])
+    retrained = context.workers.map(
+        "trained with", grid_search, [(x, y) for x in changed]
+    )
     transferred = context.workers.map(
         "trained without", transfer, [(X, y, plain, x) for x in changed]
     )
@@ -107,8 +116,13 @@ def section(context: Context) -> Section | None:
             f"robustness_{task}",
             f"{task}: accuracy after a change",
             list(changes),
-            {name: [answer[task] for answer in answers] for name, answers in results.items()},
-            reference={f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy},
+            {
+                name: [answer[task] for answer in answers]
+                for name, answers in results.items()
+            },
+            reference={
+                f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy
+            },
         )
         for task in y
     ]

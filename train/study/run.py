@@ -1,4 +1,5 @@
-"""The study: every analysis of the paper, repeated on one data set and written as a report."""
+"""The study: every analysis of the paper, repeated on one data set and written as a
+report."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -33,7 +34,8 @@ ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
     sweeps.features,
     robust.section,
 )
-"""The report's analyses, in its order; one that does not apply to the data set gives None."""
+"""The report's analyses, in its order; one that does not apply to the data set gives
+None."""
 LONGEST_S = 2.0
 FEWEST = 20
 """Smallest number of trials, because the grid has 20 components."""
@@ -53,12 +55,12 @@ def study(
     Args:
         data: recordings and folders of them.
         out: folder of the report.
-        scene: the scene that the recordings were simulated from; without it, the analyses that
-            simulate again are left out.
+        scene: the scene that the recordings were simulated from; without it, the
+            analyses that simulate again are left out.
         jobs: processes on this machine.
         address: address of a Dask scheduler that runs the sweeps instead.
-        seeds: number of data sets of the scene, including these recordings, whose mean is compared
-            with the paper's numbers.
+        seeds: number of data sets of the scene, including these recordings, whose mean
+            is compared with the paper's numbers.
 
     Raises:
         InputError: the data set cannot be used, or there is no scheduler.
@@ -73,7 +75,9 @@ def study(
         raise InputError(
             f"{counted(len(dataset.trials), 'trial')} are too few to study; give {FEWEST} or more"
         )
-    context = Context(dataset, source, Workers(jobs, None if address is None else "dask"))
+    context = Context(
+        dataset, source, Workers(jobs, None if address is None else "dask")
+    )
     constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
         raise InputError(
@@ -81,21 +85,33 @@ def study(
             "distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
-        # The last comes first, because it notices when the recordings are of another scene.
+        # The last comes first, because it notices when the recordings are of another
+        # scene.
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
         shown = [section for section in sections if section]
         if source is not None:
             numbers = [_numbers(shown)]
-            numbers += [_again(context, source, i) for i in bar(range(1, seeds), desc="data sets")]
+            numbers += [
+                _again(context, source, i)
+                for i in bar(range(1, seeds), desc="data sets")
+            ]
             shown.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
     name = source.name if source is not None else Path(data[0]).name
-    return write(out, f"The paper's analyses, repeated on {name}", _lead(context, constant), shown)
+    return write(
+        out,
+        f"The paper's analyses, repeated on {name}",
+        _lead(context, constant),
+        shown,
+    )
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
-    """The paragraphs below the title: the data set, and the labels and recordings left out."""
+    """The paragraphs below the title: the data set, and the labels and recordings left
+    out."""
     dataset, scene, layout = context.dataset, context.scene, context.dataset.layout
-    tasks = ", ".join(f"{task} ({len(set(y))} classes)" for task, y in context.labels.items())
+    tasks = ", ".join(
+        f"{task} ({len(set(y))} classes)" for task, y in context.labels.items()
+    )
     frame = "skin" if dataset.chain is None else "world"
     source = "The trials were recorded, or simulated elsewhere."
     if scene is not None:
@@ -108,15 +124,24 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
         "intervals."
     ]
     if constant:
-        lead.append(f"Left out, because every trial has the same label: {', '.join(constant)}.")
+        lead.append(
+            f"Left out, because every trial has the same label: {', '.join(constant)}."
+        )
     if dataset.untouched:
-        lead.append(f"Left out: {counted(len(dataset.untouched), 'recording')} without a contact.")
+        lead.append(
+            f"Left out: {counted(len(dataset.untouched), 'recording')} without a contact."
+        )
     return lead
 
 
 def _numbers(sections: Sequence[Section]) -> paper.Numbers:
     """Our accuracies in percent, under the names of the paper's tables."""
-    tables = [table for section in sections for table in section.tables if table.name in TABLES]
+    tables = [
+        table
+        for section in sections
+        for table in section.tables
+        if table.name in TABLES
+    ]
     return {
         (TABLES[table.name], str(setting), task): accuracy
         for table in tables
@@ -125,9 +150,12 @@ def _numbers(sections: Sequence[Section]) -> paper.Numbers:
 
 
 def _again(context: Context, scene: Scene, i: int) -> paper.Numbers:
-    """The accuracies to compare with the paper's, on the scene simulated with another seed."""
+    """The accuracies to compare with the paper's, on the scene simulated with another
+    seed."""
     with tempfile.TemporaryDirectory() as folder:
         simulate(replace(scene, seed=scene.seed + i), folder, jobs=context.workers.jobs)
         dataset = load_trials([folder], horizon_s=LONGEST_S)
-    quiet = replace(context, dataset=dataset, workers=replace(context.workers, progress=False))
+    quiet = replace(
+        context, dataset=dataset, workers=replace(context.workers, progress=False)
+    )
     return _numbers([analysis(quiet) for analysis in COMPARED])

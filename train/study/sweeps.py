@@ -17,7 +17,24 @@ from train.scaling import SCALINGS
 from train.study.context import Context
 from train.study.paper import papers
 
-WINDOWS_S = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.6, 1.8, 2.0)
+WINDOWS_S = (
+    0.1,
+    0.2,
+    0.3,
+    0.4,
+    0.5,
+    0.6,
+    0.7,
+    0.8,
+    0.9,
+    1.0,
+    1.1,
+    1.2,
+    1.4,
+    1.6,
+    1.8,
+    2.0,
+)
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
 
 Results = Mapping[Any, Mapping[str, Result]]
@@ -31,7 +48,8 @@ def by_task(results: Results) -> dict[str, list[Result]]:
 
 
 def rows(column: str, results: Results, table: str = "") -> list[Row]:
-    """A row for each setting and task, with the accuracy in a table of the paper, if given."""
+    """A row for each setting and task, with the accuracy in a table of the paper, if
+    given."""
     return [
         {column: setting, "task": task, **score(result)}
         | ({"paper %": papers(table, task).get(str(setting), "")} if table else {})
@@ -50,7 +68,9 @@ def confusion(context: Context) -> Section:
         size = {"task": task, "classes": len(set(truth)), "trials": result.total}
         best.append(size | score(result))
         title = f"{task}: the label that each touch was given, by leave-one-out"
-        pictures.append(figures.confusion(f"confusion_{task}", title, truth, result.said))
+        pictures.append(
+            figures.confusion(f"confusion_{task}", title, truth, result.said)
+        )
     return Section(
         "Classification (Figs. 6 to 8)",
         [
@@ -59,7 +79,13 @@ def confusion(context: Context) -> Section:
             "smallest of equally accurate models. The accuracy shown is the one that the search "
             "maximised, so it is too high."
         ],
-        [Table("classification", "The best number of components and k for each task", best)],
+        [
+            Table(
+                "classification",
+                "The best number of components and k for each task",
+                best,
+            )
+        ],
         pictures,
     )
 
@@ -102,17 +128,23 @@ def scaling(context: Context) -> Section:
         "trials, or its PCA did not subtract the mean."
     )
     cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
-    return _compared(context, "scaling", "Effect of feature scaling (Table II)", "II", cases, text)
+    return _compared(
+        context, "scaling", "Effect of feature scaling (Table II)", "II", cases, text
+    )
 
 
 def features(context: Context) -> Section:
     """Accuracy with each combination of features (Table III)."""
-    text = "Each feature alone, each pair, and all three together; unscaled, over 1.2 s."
+    text = (
+        "Each feature alone, each pair, and all three together; unscaled, over 1.2 s."
+    )
     cases = {
         " ".join(names): (context.vectors(names=names), context.labels, "none", names)
         for names in SUBSETS
     }
-    return _compared(context, "features", "Effect of the features (Table III)", "III", cases, text)
+    return _compared(
+        context, "features", "Effect of the features (Table III)", "III", cases, text
+    )
 
 
 def _compared(
@@ -135,9 +167,15 @@ def _compared(
     """
     answers = context.workers.map(column, grid_search, list(cases.values()))
     results = dict(zip(cases, answers, strict=True))
-    theirs = {task: papers(table, task) for task in context.labels} if context.scene else None
+    theirs = (
+        {task: papers(table, task) for task in context.labels}
+        if context.scene
+        else None
+    )
     png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
-    cells = Table(column, f"Accuracy with each choice of {column}", rows(column, results, table))
+    cells = Table(
+        column, f"Accuracy with each choice of {column}", rows(column, results, table)
+    )
     return Section(title, [text], [cells], [png])
 
 
@@ -164,12 +202,17 @@ def resolution(context: Context) -> Section:
         dict(zip(taxels, values, strict=True)) for values in zip(*answers, strict=True)
     )
     title = "Effect of taxel resolution (Table I, Fig. 9)"
-    theirs = {task: {float(n): p for n, p in papers("I", task).items()} for task in labels}
+    theirs = {
+        task: {float(n): p for n, p in papers("I", task).items()} for task in labels
+    }
     png = figures.lines(
         "resolution", title, taxels, by_task(results), label="taxels",
         paper=theirs if context.scene else None, ticks=list(map(str, taxels)),
     )  # fmt: skip
-    cells = [row | {"without contact": lost[row["taxels"]]} for row in rows("taxels", results, "I")]
+    cells = [
+        row | {"without contact": lost[row["taxels"]]}
+        for row in rows("taxels", results, "I")
+    ]
     return Section(
         title,
         [

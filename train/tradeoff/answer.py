@@ -17,7 +17,9 @@ TITLE_S = (0.4, 1.2)
 """Windows with their accuracy in a panel's title."""
 ACROSS = 3
 """At most so many panels stand side by side."""
-EARLY = f"make export EXPORT='--quick --decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1'"
+EARLY = (
+    f"make export EXPORT='--quick --decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1'"
+)
 """The command that exports a model for early decisions."""
 
 
@@ -29,9 +31,16 @@ def answers(measured: Measured, task: str) -> list[Row]:
         if window in TABLE_S:
             unmet = unseen(tasks[task])
             rows.append(
-                {"decision": f"after {window:g} s", "time s": round(window + after_s, 3)}
+                {
+                    "decision": f"after {window:g} s",
+                    "time s": round(window + after_s, 3),
+                }
                 | shares(tasks[task].by_trial)
-                | {"objects never met %": "" if unmet is None else percent(unmet.accuracy)}
+                | {
+                    "objects never met %": ""
+                    if unmet is None
+                    else percent(unmet.accuracy)
+                }
                 | {"command": f"`make export EXPORT='--quick --window {window:g}'`"}
             )
     for rule in distinct(measured.comparisons[task]):
@@ -48,16 +57,23 @@ def answers(measured: Measured, task: str) -> list[Row]:
 
 
 def distinct(compared: StoppingComparison) -> list[Certified]:
-    """The rules that most folds certify; one that serves two error rates stands at the smaller."""
-    able = [certified for certified in compared.certified if certified.folds > FOLDS // 2]
-    return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[::-1]
+    """The rules that most folds certify; one that serves two error rates stands at the
+    smaller."""
+    able = [
+        certified for certified in compared.certified if certified.folds > FOLDS // 2
+    ]
+    return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[
+        ::-1
+    ]
 
 
 def section(measured: Measured) -> Section:
     """The accuracy of each task after each time, as tables, a picture and a slider."""
     return Section(
         "Accuracy after each time",
-        tables=[Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y],
+        tables=[
+            Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y
+        ],
         figures=[drawn(measured)],
         widget=slider(measured.points),
     )
@@ -82,7 +98,9 @@ def early(measured: Measured) -> Section:
         for task, compared in measured.comparisons.items()
         for rule in compared.certified
     ]
-    gaps = (f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items())
+    gaps = (
+        f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items()
+    )
     return Section(
         "Early decisions",
         [
@@ -104,7 +122,8 @@ def early(measured: Measured) -> Section:
 
 
 def prices(measured: Measured) -> Section:
-    """The cheapest window, by the price of a wrong decision and of waiting for a second."""
+    """The cheapest window, by the price of a wrong decision and of waiting for a
+    second."""
     rows: list[Row] = []
     for task in measured.y:
         paid = {
@@ -154,7 +173,9 @@ def reasons(measured: Measured) -> Section:
         "they can. Leave a margin above that rate. Early decisions were not measured on objects "
         "never met.",
     ]
-    rows: list[Row] = [{"object": name, "time until it moves s": round(at, 2)} for name, at in slow]
+    rows: list[Row] = [
+        {"object": name, "time until it moves s": round(at, 2)} for name, at in slow
+    ]
     table = Table("breakaway", "Time until each movable object moves", rows)
     return Section("Reasons and commands", notes, [table])
 
@@ -184,14 +205,17 @@ GLOSSARY = {
 
 
 def drawn(measured: Measured) -> Figure:
-    """The picture: accuracy against time in a panel for each task, and the parts of the time."""
+    """The picture: accuracy against time in a panel for each task, and the parts of the
+    time."""
     compared, m = measured.comparisons, len(measured.comparisons)
     wide = m if m <= ACROSS else -(-m // 2)
     heights = 3.0 * -(-m // wide) + 2.2, 2.6 * m + 2.2
 
     def draw(canvas: Any, phone: bool) -> None:
         across = 1 if phone else wide
-        upper, lower = canvas.subfigures(2, 1, height_ratios=[heights[phone] - 1.8, 1.8])
+        upper, lower = canvas.subfigures(
+            2, 1, height_ratios=[heights[phone] - 1.8, 1.8]
+        )
         grid = upper.subplots(-(-m // across), across, squeeze=False, sharey=True)
         for axes, (task, comparison) in zip(grid.flat, compared.items(), strict=False):
             _panel(axes, task, comparison, measured)
@@ -199,7 +223,9 @@ def drawn(measured: Measured) -> Figure:
             axes.set_visible(False)
         for axes in grid[:, 0]:
             axes.set_ylabel("decisions that are right, %")
-        fullest = max(grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[0]))
+        fullest = max(
+            grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[0])
+        )
         legend(upper, fullest, 2 if phone else 3)
         _split(lower, measured)
 
@@ -207,12 +233,22 @@ def drawn(measured: Measured) -> Figure:
     return picture("tradeoff", title, draw, heights, max(PHONE * wide, PHONE + 2.0))
 
 
-def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measured) -> None:
+def _panel(
+    axes: Any, task: str, compared: StoppingComparison, measured: Measured
+) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
     results, after_s = measured.results(task), measured.after_s
     chance = 100 * majority(measured.y[task]).accuracy
-    axes.axhline(chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label")
-    curve(axes, 0, "after a fixed time", [w + after_s for w in results], list(results.values()))
+    axes.axhline(
+        chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label"
+    )
+    curve(
+        axes,
+        0,
+        "after a fixed time",
+        [w + after_s for w in results],
+        list(results.values()),
+    )
     colour, marker, dashes = STROKES[1]
     rules = distinct(compared)
     if rules:
@@ -221,14 +257,19 @@ def _panel(axes: Any, task: str, compared: StoppingComparison, measured: Measure
             [rule.mean_s + after_s for rule in rules], share, arms, color=colour, marker=marker,
             ls=dashes, ms=4, elinewidth=0.8, label="early decision, mean time",
         )  # fmt: skip
-    named = [f"{100 * results[w].accuracy:.0f} % after {w:g} s" for w in TITLE_S if w in results]
+    named = [
+        f"{100 * results[w].accuracy:.0f} % after {w:g} s"
+        for w in TITLE_S
+        if w in results
+    ]
     axes.set(xlim=(0, compared.decision_points_s[-1] + 0.08), ylim=(0, 103))
     axes.set(yticks=range(0, 101, 20), xlabel="seconds from first contact")
     axes.set_title(f"{task}: {', '.join(named)}", fontsize="medium")
 
 
 def _split(figure: Any, measured: Measured) -> None:
-    """Draw the parts of the time until a decision after the full window, and the end magnified."""
+    """Draw the parts of the time until a decision after the full window, and the end
+    magnified."""
     window, after_ms = max(measured.points), 1e3 * measured.after_s
     wire_ms, arithmetic_ms = 1e3 * measured.wire_s, 1e3 * measured.board.arithmetic_s
     stages = [
@@ -241,13 +282,26 @@ def _split(figure: Any, measured: Measured) -> None:
     ends = (0.0, 1e3 * window + after_ms), (start, 1e3 * window + 1.02 * after_ms)
     for axes, limits in zip(rows, ends, strict=True):
         left = 0.0
-        for (name, length), (colour, *_), hatch in zip(stages, STROKES, HATCHES, strict=False):
-            axes.barh(0, length, left=left, color=colour, hatch=hatch, ec="white", lw=0, label=name)
+        for (name, length), (colour, *_), hatch in zip(
+            stages, STROKES, HATCHES, strict=False
+        ):
+            axes.barh(
+                0,
+                length,
+                left=left,
+                color=colour,
+                hatch=hatch,
+                ec="white",
+                lw=0,
+                label=name,
+            )
             left += length
         axes.set(xlim=limits, yticks=[])
         axes.grid(visible=False)
         axes.spines["left"].set_visible(False)
         axes.locator_params("x", nbins=7)
     rows[0].axvline(start, color="0.2", lw=0.8)
-    rows[1].set_xlabel(f"milliseconds; below, the last {ends[1][1] - start:.0f} magnified")
+    rows[1].set_xlabel(
+        f"milliseconds; below, the last {ends[1][1] - start:.0f} magnified"
+    )
     legend(figure, rows[0], 3)

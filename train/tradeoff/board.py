@@ -9,7 +9,8 @@ from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")
 INSTRUCTIONS = {"a frame in contact": 219_768, "the frame that decides": 1_708_087}
-"""Instructions on aarch64 for the model of `edge-classify demo`, counted by `make board-test`."""
+"""Instructions on aarch64 for the model of `edge-classify demo`, counted by `make
+board-test`."""
 ESTIMATED = {"Raspberry Pi Zero 2 W": 1.0, "Raspberry Pi 4": 1.5, "Raspberry Pi 5": 2.4}
 """{board: clock of one core in GHz}."""
 
@@ -36,7 +37,8 @@ class Board:
 
     @property
     def arithmetic_s(self) -> float:
-        """Seconds from the window's last frame to the decision, for the measured model."""
+        """Seconds from the window's last frame to the decision, for the measured
+        model."""
         return sum(self.stages_us[stage][0] for stage in STAGES) / 1e6
 
 
@@ -66,11 +68,18 @@ def read(path: str | os.PathLike[str]) -> Board:
 
 
 def estimated_s(board: str, step: str = "the frame that decides") -> float:
-    """Estimated seconds of a step on a board of `ESTIMATED`, at one instruction a cycle."""
+    """Estimated seconds of a step on a board of `ESTIMATED`, at one instruction a
+    cycle."""
     return INSTRUCTIONS[step] / (1e9 * ESTIMATED[board])
 
 
-FORMAT = ("format", "decision us", "size kB", "other labels %", "other distances alone %")
+FORMAT = (
+    "format",
+    "decision us",
+    "size kB",
+    "other labels %",
+    "other distances alone %",
+)
 
 
 def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
@@ -86,13 +95,17 @@ def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
     mend = f"make one with `python -m export.arithmetic --out {name}`"
     with json_file(name, "a file of number formats", mend) as content:
         return [
-            {"format": str(row["format"]), **{key: float(row[key]) for key in FORMAT[1:]}}
+            {
+                "format": str(row["format"]),
+                **{key: float(row[key]) for key in FORMAT[1:]},
+            }
             for row in content
         ]
 
 
 def section(board: Board) -> Section:
-    """The figures in the board file, and estimates for boards that were not measured."""
+    """The figures in the board file, and estimates for boards that were not
+    measured."""
     rows = [
         {"stage": name, "median us": median, "99th percentile us": p99}
         for name, (median, p99) in board.stages_us.items()

@@ -1,4 +1,5 @@
-"""The time until an object that can move does: the physical limit of an early decision."""
+"""The time until an object that can move does: the physical limit of an early
+decision."""
 
 import numpy as np
 
@@ -11,12 +12,13 @@ G = 9.80665
 def breakaway_times(scene: Scene) -> dict[str, float]:
     """{object: seconds} until a movable object moves: mu_s m g / (k v).
 
-    A tall and narrow object tips before it slides: if its base over twice the contact's height is
-    less than mu_s, that ratio takes the place of mu_s. All values are the middles of their ranges.
+    A tall and narrow object tips before it slides: if its base over twice the contact's
+    height is less than mu_s, that ratio takes the place of mu_s. All values are the
+    middles of their ranges.
 
-    k is the arm's stiffness at the contact along its motion, and v the speed of the arm's
-    equilibrium point there; nothing else pushes than the spring between arm and equilibrium point.
-    A soft cover delays the motion further, which is left out.
+    k is the arm's stiffness at the contact along its motion, and v the speed of the
+    arm's equilibrium point there; nothing else pushes than the spring between arm and
+    equilibrium point. A soft cover delays the motion further, which is left out.
     """
     pose = Kinematics(scene.arm).pose(np.array(scene.start)[:, None])
     contact = pose.origin + scene.place_m * pose.rotation[2]
@@ -31,6 +33,8 @@ def breakaway_times(scene: Scene) -> dict[str, float]:
             values = {key: value.middle for key, value in thing.values.items()}
             ratio = values["friction_static"]
             if values.get("base_m", 0.0) > 0.0 and values.get("height_m", 0.0) > 0.0:
-                ratio = min(ratio, values["base_m"] / (2.0 * values["height_m"]))  # it tips
+                ratio = min(
+                    ratio, values["base_m"] / (2.0 * values["height_m"])
+                )  # it tips
             times[thing.name] = ratio * values["mass_kg"] * G / (stiffness * speed)
     return times

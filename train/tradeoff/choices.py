@@ -18,20 +18,37 @@ Points = Mapping[float, Mapping[str, Chosen]]
 
 
 def followed(
-    raw: Recordings, features: Sequence[str] = (), *, quick: bool = True, progress: bool = False
+    raw: Recordings,
+    features: Sequence[str] = (),
+    *,
+    quick: bool = True,
+    progress: bool = False,
 ) -> DataSet:
-    """The trials of recordings, with the features of all candidates and further ones by name."""
+    """The trials of recordings, with the features of all candidates and further ones by
+    name."""
     drawn = kinds_of(raw.recordings) is not None
     tried = candidates({}, joints=raw.joints, drawn=drawn, quick=quick)
     sets = [name for candidate in tried for name in candidate.sets]
     return load_trials(
-        raw, horizon_s=WINDOWS_S[-1], features=expand([*sets, *features]), progress=progress
+        raw,
+        horizon_s=WINDOWS_S[-1],
+        features=expand([*sets, *features]),
+        progress=progress,
     )
 
 
-def chosen(dataset: DataSet, window_s: float = WINDOW_S, **given: Any) -> dict[str, Chosen]:
-    """Each task's choice, as `python -m export --quick --window` makes it with options `given`."""
-    form = {"window_s": window_s, "quick": True, "decision_points_s": (), "jobs": 1, **given}
+def chosen(
+    dataset: DataSet, window_s: float = WINDOW_S, **given: Any
+) -> dict[str, Chosen]:
+    """Each task's choice, as `python -m export --quick --window` makes it with options
+    `given`."""
+    form = {
+        "window_s": window_s,
+        "quick": True,
+        "decision_points_s": (),
+        "jobs": 1,
+        **given,
+    }
     return fit(dataset, **form).chosen
 
 

@@ -45,8 +45,8 @@ class Change:
         price: its saving, or its cost other than accuracy.
         source: the trials, or recordings to follow again.
         given: options of the choice.
-        fewer: whether trials are left out on purpose; otherwise a contact that is no longer
-            noticed counts as wrong.
+        fewer: whether trials are left out on purpose; otherwise a contact that is no
+            longer noticed counts as wrong.
     """
 
     name: str
@@ -69,7 +69,8 @@ def every_nth(recording: Recording, n: int) -> Recording:
 
 
 def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
-    """The changes for which a choice is made again; the shorter windows are measured anyway.
+    """The changes for which a choice is made again; the shorter windows are measured
+    anyway.
 
     Args:
         raw: the recordings.
@@ -78,11 +79,18 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     """
     # The longest first: it runs beside the others.
     cases = [
-        Change("all candidates (`make export`)", "longer training", raw, given={"quick": False})
+        Change(
+            "all candidates (`make export`)",
+            "longer training",
+            raw,
+            given={"quick": False},
+        )
     ]
     for n in EVERY:
         carried = [w.name for w in wires(dataset.layout) if w.every(rate_hz) == n]
-        price = f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
+        price = (
+            f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
+        )
         source = replace(raw, recordings=tuple(every_nth(r, n) for r in raw.recordings))
         cases.append(Change(f"{rate_hz / n:.0f} frames a second", price, source))
     full = _slowest(wires(dataset.layout))
@@ -92,21 +100,30 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         name = counted(skin.rows * skin.cols, "taxel")
         cases.append(Change(name, price, replace(raw, recordings=tuple(recordings))))
     cases.append(
-        Change("the paper's features", "only 3 features", dataset, given={"features": ["paper"]})
+        Change(
+            "the paper's features",
+            "only 3 features",
+            dataset,
+            given={"features": ["paper"]},
+        )
     )
     y = {task: dataset.labels(task) for task in dataset.tasks}
     for part in PARTS:
         kept = dataset.part(stratified_folds(y[finest(y)], part) == 0)
         if len(kept.trials) >= FEWEST:
             name = f"{len(kept.trials)} of {len(dataset.trials)} trials"
-            price = f"{counted(len(dataset.trials) - len(kept.trials), 'recording')} fewer"
+            price = (
+                f"{counted(len(dataset.trials) - len(kept.trials), 'recording')} fewer"
+            )
             cases.append(Change(name, price, kept, fewer=True))
     return cases
 
 
 def _slowest(choices: Sequence[Wire]) -> Wire:
     """The slowest wiring of AD7147, which has the fewest buses."""
-    return max((w for w in choices if w.name.startswith("AD7147")), key=lambda w: w.frame_s)
+    return max(
+        (w for w in choices if w.name.startswith("AD7147")), key=lambda w: w.frame_s
+    )
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
@@ -116,13 +133,16 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
         contacts.append((trial.path, numbers[trial.path]))
         numbers[trial.path] += 1
     return {
-        task: dict(zip(contacts, np.asarray(choice.by_trial.hits).tolist(), strict=True))
+        task: dict(
+            zip(contacts, np.asarray(choice.by_trial.hits).tolist(), strict=True)
+        )
         for task, choice in choices.items()
     }
 
 
 def answered(change: Change) -> tuple[dict[str, Hits], float]:
-    """{task: hits of the choice made with a change}, and the seconds of one core that it took."""
+    """{task: hits of the choice made with a change}, and the seconds of one core that
+    it took."""
     began = time.process_time()
     source, quick = change.source, change.given.get("quick", True)
     dataset = source if isinstance(source, DataSet) else followed(source, quick=quick)
@@ -131,7 +151,8 @@ def answered(change: Change) -> tuple[dict[str, Hits], float]:
 
 
 def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
-    """The percentage points gained by a change on the same trials, and their 95 % interval."""
+    """The percentage points gained by a change on the same trials, and their 95 %
+    interval."""
     trials = list(after if fewer else before)
     return paired(
         np.array([before[trial] for trial in trials]),
@@ -142,7 +163,8 @@ def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float,
 def measure(
     raw: Recordings, dataset: DataSet, windows: Points, rate_hz: float, workers: Workers
 ) -> list[Row]:
-    """A row for each change, beside the choice at `WINDOW_S` on the recordings as they are.
+    """A row for each change, beside the choice at `WINDOW_S` on the recordings as they
+    are.
 
     Args:
         raw: the recordings.
@@ -152,14 +174,19 @@ def measure(
         workers: the processes.
     """
     base = hits(dataset, windows[WINDOW_S])
-    waits = [Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset) for w in WAITS_S]
+    waits = [
+        Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
+        for w in WAITS_S
+    ]
     cases = changes(raw, dataset, rate_hz)
     afters = [(hits(dataset, windows[w]), 0.0) for w in WAITS_S]
     afters += workers.map("costs", answered, [(case,) for case in cases])
     return [
         {"change": case.name, "saves or costs": case.price}
         | {
-            f"{task}, points": points(difference(base[task], after[task], fewer=case.fewer))
+            f"{task}, points": points(
+                difference(base[task], after[task], fewer=case.fewer)
+            )
             for task in base
             if task in after
         }
@@ -201,5 +228,13 @@ def section(measured: Measured) -> Section:
             "decided alone. Only whole numbers give the same bits in any order of summation, and "
             "so on every machine. The boards' times are estimates; see the section on the board.",
         ],
-        [Table("costs", "Accuracy gained or lost by each change", rows, timed=(TIME,), narrow=3)],
+        [
+            Table(
+                "costs",
+                "Accuracy gained or lost by each change",
+                rows,
+                timed=(TIME,),
+                narrow=3,
+            )
+        ],
     )

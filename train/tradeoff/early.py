@@ -29,8 +29,8 @@ class Certified:
     Attributes:
         asked: the error rate.
         folds: number of folds, out of `FOLDS`, that certified it.
-        right: (m,) whether each contact of these folds is decided rightly. A contact unlike all
-            trained ones gets no label, which counts as wrong.
+        right: (m,) whether each contact of these folds is decided rightly. A contact
+            unlike all trained ones gets no label, which counts as wrong.
         waited: (m,) whether the same contact is decided rightly at the full window.
         unknown: share of decisions without a label.
         early: share of contacts decided before the full window.
@@ -57,7 +57,8 @@ class Certified:
 
     @property
     def gain(self) -> tuple[float, float, float]:
-        """The points gained over waiting for the full window, and their 95 % interval."""
+        """The points gained over waiting for the full window, and their 95 %
+        interval."""
         return paired(self.waited, self.right)
 
 
@@ -69,8 +70,8 @@ class StoppingComparison:
         decision_points_s: the windows.
         right: (decision points, n) whether each fixed window's decision is right.
         confidence: (decision points, n) calibrated.
-        course: of all held-out trials, whose labels count even where the contact is unlike all
-            trained ones.
+        course: of all held-out trials, whose labels count even where the contact is
+            unlike all trained ones.
         certified: an entry for each requested error rate that a fold certified.
     """
 
@@ -82,8 +83,8 @@ class StoppingComparison:
 
     @property
     def calibration_error(self) -> float:
-        """Expected calibration error: the mean gap between confidence and share of right decisions,
-        in equal ranges of confidence."""
+        """Expected calibration error: the mean gap between confidence and share of
+        right decisions, in equal ranges of confidence."""
         confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
         ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
         gaps = np.bincount(ranges, confidence - right)
@@ -91,12 +92,17 @@ class StoppingComparison:
 
 
 def compare_stopping(
-    dataset: DataSet, decision_points_s: Sequence[float], *, quick: bool = True, jobs: int = 1
+    dataset: DataSet,
+    decision_points_s: Sequence[float],
+    *,
+    quick: bool = True,
+    jobs: int = 1,
 ) -> dict[str, StoppingComparison]:
     """{task: early decisions compared with fixed windows}.
 
-    Each fold is held out once, and an export of the other folds decides its trials. The other folds
-    have trials of the same objects, so the export leaves out single trials too.
+    Each fold is held out once, and an export of the other folds decides its trials. The
+    other folds have trials of the same objects, so the export leaves out single trials
+    too.
 
     Args:
         dataset: the trials.
@@ -116,11 +122,17 @@ def compare_stopping(
         for test, (_, hits, sure, _) in zip(tests, held_out, strict=True):
             right[:, test], confidence[:, test] = hits[task], sure[task]
         courses = [courses[task] for *_, courses in held_out]
-        rules = list(zip(courses, (model.stopping_[task] for model, *_ in held_out), strict=True))
+        rules = list(
+            zip(courses, (model.stopping_[task] for model, *_ in held_out), strict=True)
+        )
         certified = [
             _certified(error, allowed, decision_points_s)
             for error in ERRORS
-            if (allowed := [(c, rule) for c, stopping in rules if (rule := stopping.rule(error))])
+            if (
+                allowed := [
+                    (c, rule) for c, stopping in rules if (rule := stopping.rule(error))
+                ]
+            )
         ]
         comparisons[task] = StoppingComparison(
             tuple(decision_points_s), right, confidence, _joined(courses), certified
@@ -129,15 +141,25 @@ def compare_stopping(
 
 
 def _held_out(
-    dataset: DataSet, test: NDArray[np.bool_], decision_points_s: Sequence[float], quick: bool
+    dataset: DataSet,
+    test: NDArray[np.bool_],
+    decision_points_s: Sequence[float],
+    quick: bool,
 ) -> tuple[Any, ...]:
-    """The model that was fitted without a fold, and its answers to the fold's trials (`judged`)."""
+    """The model that was fitted without a fold, and its answers to the fold's trials
+    (`judged`)."""
     given: dict[str, Any] = {"leave_out": TRIAL, "decision_points_s": decision_points_s}
     fitted = fit(dataset.part(~test), quick=quick, jobs=1, **given)
-    model, others = fitted.sequential, replace(dataset.part(test), kernels=fitted.dataset.kernels)
+    model, others = (
+        fitted.sequential,
+        replace(dataset.part(test), kernels=fitted.dataset.kernels),
+    )
     assert model is not None
     new = np.stack(
-        [others.features(s, fitted.samples, fitted.dataset.names) for s in decision_points_s]
+        [
+            others.features(s, fitted.samples, fitted.dataset.names)
+            for s in decision_points_s
+        ]
     )
     truth = {task: others.labels(task) for task in model.choices}
     return (model, *model.judged(new, truth))
@@ -145,7 +167,9 @@ def _held_out(
 
 def _joined(courses: Sequence[Course]) -> Course:
     """Courses of several folds as one that withholds no label."""
-    sure = [np.hstack(part) for part in zip(*(c.confidences for c in courses), strict=True)]
+    sure = [
+        np.hstack(part) for part in zip(*(c.confidences for c in courses), strict=True)
+    ]
     wrong = [np.hstack(part) for part in zip(*(c.wrong for c in courses), strict=True)]
     return Course(sure, wrong, np.hstack([c.unknown for c in courses]))
 
@@ -155,7 +179,8 @@ def _certified(
     folds: Sequence[tuple[Course, StoppingRule]],
     decision_points_s: Sequence[float],
 ) -> Certified:
-    """The decisions with a requested error rate, by the rule that each fold certified for it."""
+    """The decisions with a requested error rate, by the rule that each fold certified
+    for it."""
     seconds = np.array(decision_points_s)
     waiting, _ = candidates(len(seconds))
     rows = []
@@ -165,4 +190,6 @@ def _certified(
         rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
     decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
     means = [float(share.mean()) for share in shares]
-    return Certified(error, len(rows), decided.astype(bool), waited.astype(bool), *means)
+    return Certified(
+        error, len(rows), decided.astype(bool), waited.astype(bool), *means
+    )

@@ -1,4 +1,5 @@
-"""The points of `make export FRONT=`: windows, with the accuracy of the quick choice at each."""
+"""The points of `make export FRONT=`: windows, with the accuracy of the quick choice at
+each."""
 
 from __future__ import annotations
 
@@ -60,7 +61,9 @@ class ParetoFront:
             result = tasks[task].by_trial
             if not best or result.accuracy > best[-1].accuracy:
                 after = round(1e3 * (window_s + after_s), 2)
-                best.append(OperatingPoint(window_s, after, result.accuracy, *result.interval))
+                best.append(
+                    OperatingPoint(window_s, after, result.accuracy, *result.interval)
+                )
         return cls(task, tuple(best))
 
     def to_dict(self, digest: str) -> dict[str, Any]:
@@ -77,17 +80,21 @@ class ParetoFront:
             digest: SHA-256 over the recordings to export a model of.
 
         Raises:
-            InputError: the file cannot be read, is not a front.json, or belongs to other
-                recordings.
+            InputError: the file cannot be read, is not a front.json, or belongs to
+                other recordings.
         """
         mend = "make one with `make tradeoff`"
         with json_file(path, "a front.json", mend) as content:
             points = [
-                OperatingPoint(*(float(point[key.name]) for key in fields(OperatingPoint)))
+                OperatingPoint(
+                    *(float(point[key.name]) for key in fields(OperatingPoint))
+                )
                 for point in content["points"]
             ]
             task, measured = str(content["task"]), str(content["data_digest"])
-            if not points or not all(0.0 < p.window_s <= 60.0 and p.milliseconds for p in points):
+            if not points or not all(
+                0.0 < p.window_s <= 60.0 and p.milliseconds for p in points
+            ):
                 raise ValueError("no point, or one of no time")
         if measured != digest:
             raise InputError(
@@ -100,16 +107,21 @@ class ParetoFront:
         """The operating point that a user asks for.
 
         Args:
-            wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced` (the most
-                accurate with a window of at most `BALANCED_S`, or else the fastest), a number above
-                1 (the most accurate within so many milliseconds), or a number from 0 to 1 (the
-                fastest that reaches this accuracy).
+            wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced`
+                (the most accurate with a window of at most `BALANCED_S`, or else the
+                fastest), a number above 1 (the most accurate within so many
+                milliseconds), or a number from 0 to 1 (the fastest that reaches this
+                accuracy).
 
         Raises:
-            InputError: `wanted` has another form, or no point is as fast or as accurate.
+            InputError: `wanted` has another form, or no point is as fast or as
+                accurate.
         """
         first, last = self.points[0], self.points[-1]
-        balanced = [first, *(point for point in self.points if point.window_s <= BALANCED_S)][-1]
+        balanced = [
+            first,
+            *(point for point in self.points if point.window_s <= BALANCED_S),
+        ][-1]
         if wanted in NAMES:
             return dict(zip(NAMES, (first, balanced, last), strict=True))[wanted]
         try:
@@ -122,7 +134,9 @@ class ParetoFront:
                 f"(0 to 1), not {wanted!r}"
             )
         if number > 1.0:
-            able = [point for point in self.points[::-1] if point.milliseconds <= number]
+            able = [
+                point for point in self.points[::-1] if point.milliseconds <= number
+            ]
             limit = f"the fastest point takes {first.milliseconds:.0f} ms"
         else:
             able = [point for point in self.points if point.accuracy >= number]

@@ -18,11 +18,14 @@ class Measured:
         y: {task: (n,) labels}, the main task first.
         board: figures of the machine that decides.
         wire_s: from the end of the window until its last frame is read.
-        breakaways: {object: seconds} until static friction breaks; empty without a scene.
+        breakaways: {object: seconds} until static friction breaks; empty without a
+            scene.
         points: the quick choice at each window.
         comparisons: {task: early decisions compared with fixed windows}.
-        costs: a row for each change of the choice at the usual window (`costs.measure`).
-        wrong, second: an owner's price of a wrong decision, and of waiting for a second.
+        costs: a row for each change of the choice at the usual window
+            (`costs.measure`).
+        wrong, second: an owner's price of a wrong decision, and of waiting for a
+            second.
         formats: the number formats (`board.read_formats`); empty if unknown.
     """
 

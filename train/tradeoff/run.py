@@ -1,4 +1,5 @@
-"""The trade-off: its report and settings, from recordings and the figures of a board."""
+"""The trade-off: its report and settings, from recordings and the figures of a
+board."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -47,23 +48,28 @@ def tradeoff(
     second: float = 1.0,
     formats_path: str | None = None,
 ) -> Path:
-    """Measure the quick choice at each window and with each change, and write the report.
+    """Measure the quick choice at each window and with each change, and write the
+    report.
 
     Args:
         data: recordings and folders of them.
         out: folder of the report.
         board_path: board.json of a model that was fitted on these recordings.
-        scene_path: the scene that the recordings were simulated from, for the physical limit.
+        scene_path: the scene that the recordings were simulated from, for the physical
+            limit.
         jobs: processes.
         main: the task of front.json; by default `category`, or else the first.
-        wrong, second: an owner's price of a wrong decision, and of waiting for a second.
-        formats_path: the file that `python -m export.arithmetic` wrote about that model.
+        wrong, second: an owner's price of a wrong decision, and of waiting for a
+            second.
+        formats_path: the file that `python -m export.arithmetic` wrote about that
+            model.
 
     Returns:
         The path of report.html.
 
     Raises:
-        InputError: the data cannot be used, or a file is of another kind or of other recordings.
+        InputError: the data cannot be used, or a file is of another kind or of other
+            recordings.
     """
     board = boards.read(board_path)
     formats = [] if formats_path is None else boards.read_formats(formats_path)
@@ -72,10 +78,14 @@ def tradeoff(
     boards.check(board, board_path, raw.digest)
     dataset = followed(raw, progress=True)
     if len(dataset.trials) < FEWEST:
-        raise InputError(f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}")
+        raise InputError(
+            f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}"
+        )
     main = main or ("category" if "category" in dataset.tasks else dataset.tasks[0])
     if main not in dataset.tasks:
-        raise InputError(f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}")
+        raise InputError(
+            f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}"
+        )
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     y = {task: dataset.labels(task) for task in order}
     workers = Workers(jobs)

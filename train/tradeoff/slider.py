@@ -1,4 +1,5 @@
-"""The first screen: a line for each task, and a slider that sets the time of the decision."""
+"""The first screen: a line for each task, and a slider that sets the time of the
+decision."""
 
 import html
 import json
@@ -28,12 +29,15 @@ def slider(points: Points) -> str:
     windows = list(points)
     first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
     shown = {
-        task: [_texts(tasks[task]) for tasks in points.values()] for task in points[windows[0]]
+        task: [_texts(tasks[task]) for tasks in points.values()]
+        for task in points[windows[0]]
     }
     lines = [
         LINE.substitute(
             task=html.escape(task),
-            curve=_curve({w: tasks[task].by_trial for w, tasks in points.items()}, first),
+            curve=_curve(
+                {w: tasks[task].by_trial for w, tasks in points.items()}, first
+            ),
             **texts[first],
         )
         for task, texts in shown.items()
@@ -49,7 +53,8 @@ def slider(points: Points) -> str:
 
 
 def _texts(choice: Chosen) -> dict[str, str]:
-    """{class in the page: accuracy, its interval, or accuracy on objects never met, as text}."""
+    """{class in the page: accuracy, its interval, or accuracy on objects never met, as
+    text}."""
     unmet, result = unseen(choice), choice.by_trial
     return {
         "share": f"{100 * result.accuracy:.0f} %",
@@ -59,13 +64,18 @@ def _texts(choice: Chosen) -> dict[str, str]:
 
 
 def _curve(results: Mapping[float, Result], first: int) -> str:
-    """An SVG of a task's accuracy against time, with its interval and a line at the time shown."""
+    """An SVG of a task's accuracy against time, with its interval and a line at the
+    time shown."""
     x = [100 * window / max(results) for window in results]
 
     def points(heights: list[float], x: list[float] = x) -> str:
-        return " ".join(f"{a:.1f},{100 - 100 * b:.1f}" for a, b in zip(x, heights, strict=True))
+        return " ".join(
+            f"{a:.1f},{100 - 100 * b:.1f}" for a, b in zip(x, heights, strict=True)
+        )
 
-    low, high = (list(ends) for ends in zip(*(r.interval for r in results.values()), strict=True))
+    low, high = (
+        list(ends) for ends in zip(*(r.interval for r in results.values()), strict=True)
+    )
     return (
         '<svg viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
         'aria-label="accuracy, 0 to 100 %, against time">'

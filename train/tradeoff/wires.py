@@ -1,4 +1,5 @@
-"""Ways to wire a skin, and the cost of a frame on each, counted from the drivers' transactions."""
+"""Ways to wire a skin, and the cost of a frame on each, counted from the drivers'
+transactions."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,7 +34,8 @@ class Wire:
     frame_s: float
 
     def every(self, rate_hz: float) -> int:
-        """The smallest n for which this wire carries every n-th frame of the given rate."""
+        """The smallest n for which this wire carries every n-th frame of the given
+        rate."""
         return max(1, math.ceil(self.frame_s * rate_hz - 1e-9))
 
 
@@ -42,13 +44,18 @@ def wire(chips: str, file: SkinFile) -> Wire:
     bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
     clocks = [bus.clock_hz for bus in file.buses]
     buses = "1 bus" if len(clocks) == 1 else f"{len(clocks)} buses"
-    return Wire(f"{chips}, {buses} at {clocks[0] // 1000} kHz", 1.0 / frame_rate(bits, clocks))
+    return Wire(
+        f"{chips}, {buses} at {clocks[0] // 1000} kHz", 1.0 / frame_rate(bits, clocks)
+    )
 
 
 def spread(layout: SkinLayout, buses: int) -> SkinFile:
-    """A skin on AD7147 chips, spread over a number of buses at 400 kHz, each with a TCA9548A."""
+    """A skin on AD7147 chips, spread over a number of buses at 400 kHz, each with a
+    TCA9548A."""
     taxels = layout.rows * layout.cols
-    groups = [tuple(range(a, min(a + STAGES, taxels))) for a in range(0, taxels, STAGES)]
+    groups = [
+        tuple(range(a, min(a + STAGES, taxels))) for a in range(0, taxels, STAGES)
+    ]
     specs = []
     for bus in range(buses):
         chips = []
@@ -56,7 +63,13 @@ def spread(layout: SkinLayout, buses: int) -> SkinFile:
             group += (UNUSED,) * (STAGES - len(group))
             channel, chip = divmod(i, CHIPS)
             chips.append(
-                ChipSpec(ad7147.KIND, ad7147.KIND.addresses[chip], group, mux=MUX, channel=channel)
+                ChipSpec(
+                    ad7147.KIND,
+                    ad7147.KIND.addresses[chip],
+                    group,
+                    mux=MUX,
+                    channel=channel,
+                )
             )
         specs.append(BusSpec(f"fake-{bus}", tuple(chips), clock_hz=400_000))
     return SkinFile("spread", layout, tuple(specs))
@@ -65,9 +78,9 @@ def spread(layout: SkinLayout, buses: int) -> SkinFile:
 def wires(layout: SkinLayout) -> list[Wire]:
     """The wirings to compare for a skin, with the fastest chips last.
 
-    They are AD7147 on one to three buses, as far as the skin has chips for them and they fit;
-    MPR121 as in the shipped skin file, for a skin of its shape; and a microcontroller that serves
-    16-bit frames at 1 MHz.
+    They are AD7147 on one to three buses, as far as the skin has chips for them and
+    they fit; MPR121 as in the shipped skin file, for a skin of its shape; and a
+    microcontroller that serves 16-bit frames at 1 MHz.
     """
     taxels = layout.rows * layout.cols
     chips = -(-taxels // STAGES)
@@ -87,10 +100,13 @@ def wires(layout: SkinLayout) -> list[Wire]:
 def waited_s(layout: SkinLayout, rate_hz: float) -> float:
     """Seconds from the end of a window until its last frame is read.
 
-    The next frame begins after half a period on average, and takes the wire's time. The wire is
-    that of AD7147 on three buses, which carry the paper's 100 frames a second, or else the fastest.
+    The next frame begins after half a period on average, and takes the wire's time. The
+    wire is that of AD7147 on three buses, which carry the paper's 100 frames a second,
+    or else the fastest.
     """
     choices = wires(layout)
     fastest = min(choices, key=lambda choice: choice.frame_s)
-    used = next((choice for choice in choices if choice.name.startswith("AD7147, 3")), fastest)
+    used = next(
+        (choice for choice in choices if choice.name.startswith("AD7147, 3")), fastest
+    )
     return 0.5 * used.every(rate_hz) / rate_hz + used.frame_s

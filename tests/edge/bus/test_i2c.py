@@ -34,7 +34,11 @@ def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):
         (errno.EREMOTEIO, i2c.BusNack, ConnectionError),
         (errno.ENXIO, i2c.BusNack, ConnectionError),
         (errno.EIO, i2c.BusFault, OSError),
-        (errno.EPROTO, i2c.BusFault, OSError),  # as any errno that has no name of its own
+        (
+            errno.EPROTO,
+            i2c.BusFault,
+            OSError,
+        ),  # as any errno that has no name of its own
         (errno.ETIMEDOUT, i2c.BusTimeout, TimeoutError),
         (errno.EAGAIN, i2c.BusArbitration, BlockingIOError),
         (errno.EBUSY, i2c.BusBusy, OSError),
@@ -51,16 +55,22 @@ def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
     assert isinstance(raised, EdgeError)
     assert isinstance(raised, builtin)
     assert raised.errno == code
-    assert re.match(rf"/dev/i2c-1, address 0x2c: .*\({errno.errorcode[code]}\)$", str(raised))
+    assert re.match(
+        rf"/dev/i2c-1, address 0x2c: .*\({errno.errorcode[code]}\)$", str(raised)
+    )
 
 
 def test_a_hung_transfer_is_not_sent_again_and_a_broken_one_is():
-    retries = [e.retries for e in (i2c.BusTimeout, i2c.BusGone, i2c.BusFault, i2c.BusNack)]
+    retries = [
+        e.retries for e in (i2c.BusTimeout, i2c.BusGone, i2c.BusFault, i2c.BusNack)
+    ]
     assert retries == [0, 0, 2, 3]
 
 
 def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
-    with pytest.raises(i2c.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"):
+    with pytest.raises(
+        i2c.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"
+    ):
         LinuxBus("/dev/i2c-no-such")
     path = tmp_path / "i2c"
     path.touch()
@@ -69,7 +79,8 @@ def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "into", [np.zeros(4, dtype=np.int8), np.zeros(8, dtype=np.uint8)[::2], np.zeros((2, 2))]
+    "into",
+    [np.zeros(4, dtype=np.int8), np.zeros(8, dtype=np.uint8)[::2], np.zeros((2, 2))],
 )
 def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
     with pytest.raises(ValueError, match="contiguous uint8"):
@@ -100,7 +111,11 @@ def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(ad
     assert i2c.find_device("/dev/i2c-3", adapters) == "/dev/i2c-3"
 
 
-@pytest.mark.parametrize(("name", "said"), [("i801", "no such bus"), ("bcm", "several adapters")])
-def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(name, said, adapters):
+@pytest.mark.parametrize(
+    ("name", "said"), [("i801", "no such bus"), ("bcm", "several adapters")]
+)
+def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(
+    name, said, adapters
+):
     with pytest.raises(i2c.BusMissing, match=f"^{name}: {said}"):
         i2c.find_device(name, adapters)

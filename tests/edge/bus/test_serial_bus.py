@@ -1,4 +1,5 @@
-"""Frames over a serial port, whatever happens to it; the port is one end of a pseudo-terminal."""
+"""Frames over a serial port, whatever happens to it; the port is one end of a
+pseudo-terminal."""
 
 import os
 import pty
@@ -32,7 +33,8 @@ from tests.edge.skin.small import one_chip
 
 TAXELS = 6
 PATIENT_S, HASTY_S = 3.0, 0.05
-"""Timeouts: of an answer that comes, however busy the machine, and of one that does not."""
+"""Timeouts: of an answer that comes, however busy the machine, and of one that does
+not."""
 
 
 @given(st.binary(max_size=1200))
@@ -49,10 +51,16 @@ def test_a_packet_has_no_zero_but_at_its_end_and_is_read_back(data):
 
 @pytest.mark.parametrize(
     ("data", "packet"),
-    [("", "01"), ("0000", "010101"), ("11220033", "0311220233"), ("11000000", "0211010101")],
+    [
+        ("", "01"),
+        ("0000", "010101"),
+        ("11220033", "0311220233"),
+        ("11000000", "0211010101"),
+    ],
 )
 def test_the_standards_own_examples(data, packet):
-    """S. Cheshire and M. Baker, IEEE/ACM Trans. Networking 7 (1999), table of examples."""
+    """S. Cheshire and M. Baker, IEEE/ACM Trans. Networking 7 (1999), table of
+    examples."""
     assert encode(bytes.fromhex(data)).hex() == packet + "00"
 
 
@@ -70,7 +78,9 @@ class Board:
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         self.slave = slave
-        self.serving = threading.Thread(target=self._serve, args=(self.master,), daemon=True)
+        self.serving = threading.Thread(
+            target=self._serve, args=(self.master,), daemon=True
+        )
         self.serving.start()
 
     def unplug(self):
@@ -94,8 +104,12 @@ class Board:
                     self.asked += 1
                     values = np.full(TAXELS, self.asked, dtype=np.uint16)
                     served = block.sealed(b"\0\0" + block.pack(values, 16))
-                    register = {0x00: block.identity(TAXELS, 16), 0x10: served}[request[0]]
-                    os.write(master, self.change(encode(request[1:2] + register), self.asked))
+                    register = {0x00: block.identity(TAXELS, 16), 0x10: served}[
+                        request[0]
+                    ]
+                    os.write(
+                        master, self.change(encode(request[1:2] + register), self.asked)
+                    )
         except OSError:
             pass
 
@@ -134,7 +148,9 @@ def test_each_request_is_answered_by_its_own_frame(board, bus):
         (lambda a: a[: len(a) // 2], BusFault, "the transfer broke off"),
     ],
 )
-def test_silence_is_a_timeout_and_half_an_answer_a_fault(board, bus, cut, error, sentence):
+def test_silence_is_a_timeout_and_half_an_answer_a_fault(
+    board, bus, cut, error, sentence
+):
     """A fault is read again at once, a timeout after a pause."""
     chip = Block(bus, 0, taxels=TAXELS)
     board.change = lambda answer, _: cut(answer)
@@ -189,7 +205,9 @@ def test_a_register_of_another_length_is_a_fault(bus):
         fetch(bus, 0, block.FRAME, 9)  # not as many bytes as it serves
 
 
-def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(board, tmp_path, monkeypatch):
+def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(
+    board, tmp_path, monkeypatch
+):
     with pytest.raises(BusMissing, match=r"no-port: no such serial port; is the micro"):
         SerialBus(str(tmp_path / "no-port"))
     monkeypatch.setitem(sys.modules, "serial", None)
@@ -198,7 +216,9 @@ def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(board, tmp_
 
 
 def test_a_port_that_another_program_has_open_is_refused_by_name(board, bus):
-    with pytest.raises(BusError, match=f"{board.port}: another program has the port open"):
+    with pytest.raises(
+        BusError, match=f"{board.port}: another program has the port open"
+    ):
         SerialBus(board.port, boot_s=0.0)
 
 
@@ -213,7 +233,9 @@ def skin(board, tmp_path):
     """A skin whose microcontroller stands on a serial port, by a stable name."""
     path, link = tmp_path / "skin.toml", tmp_path / "port"
     link.symlink_to(board.port)
-    path.write_text(one_chip(2, 3, bus=f'serial = "{link}"', at="") + "[read]\ntimeout_s = 0.5\n")
+    path.write_text(
+        one_chip(2, 3, bus=f'serial = "{link}"', at="") + "[read]\ntimeout_s = 0.5\n"
+    )
     with Skin.open(path, calibrated=False) as skin:
         assert skin.read().valid.all()
         yield skin

@@ -1,4 +1,5 @@
-"""An unmodified smbus2 end to end: open, I2C_TIMEOUT, I2C_RDWR and errno over a C shim."""
+"""An unmodified smbus2 end to end: open, I2C_TIMEOUT, I2C_RDWR and errno over a C
+shim."""
 
 import textwrap
 
@@ -8,7 +9,8 @@ from tests.conftest import python
 from tests.edge.bus.shim import build as shim
 
 pytestmark = pytest.mark.skipif(
-    shim.compiler() is None, reason="needs Linux and a C compiler to stand in for /dev/i2c-N"
+    shim.compiler() is None,
+    reason="needs Linux and a C compiler to stand in for /dev/i2c-N",
 )
 
 
@@ -49,7 +51,8 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
 
 
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
-    """Its buffer still holds the former reading: old values must not pass for new ones."""
+    """Its buffer still holds the former reading: old values must not pass for new
+    ones."""
     done = run(
         library,
         """
@@ -63,7 +66,9 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
         """,
         I2CDEV_SHORT="0x70",
     )
-    assert done.stdout.startswith("/dev/i2c-1, address 0x70: the transfer broke off"), done.stderr
+    assert done.stdout.startswith("/dev/i2c-1, address 0x70: the transfer broke off"), (
+        done.stderr
+    )
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
@@ -74,7 +79,9 @@ def test_a_bus_that_another_program_uses_is_refused(library):
     )
 
 
-def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_named(library):
+def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_named(
+    library,
+):
     sentences = "    print(sorted({s.error.partition(': ')[2] for s in skin.status() if s.error}))"
     done = run(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
     valid, sentences = done.stdout.splitlines()

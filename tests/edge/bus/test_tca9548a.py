@@ -49,8 +49,12 @@ def test_two_muxes_on_one_bus_are_never_open_at_once():
         assert [m.connected for m in bus.chips.values()].count([2]) == 1
 
 
-@pytest.mark.parametrize(("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)])
-def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(absent, opens):
+@pytest.mark.parametrize(
+    ("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)]
+)
+def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
+    absent, opens
+):
     """One that has gone must not cost the chips of this one."""
     bus, _ = muxed()
     first, second = beside(bus)
@@ -63,7 +67,9 @@ def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
 
 
 @pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
-def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(verify, bits):
+def test_a_selection_takes_20_bits_reading_it_back_20_more_and_the_same_again_none(
+    verify, bits
+):
     bus, mux = muxed(verify=verify)
     for spent in (bits, 0):
         before = bus.bits

@@ -10,14 +10,32 @@ from tests.edge.chips.chips import parsed, sense
 
 def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
     rows = dict(ad7147.START_ROWS)
-    written = {first + i: value for first, values in rows.items() for i, value in enumerate(values)}
-    assert [written[0x80 + i] for i in range(8)] == [0xFFFE, 0x1FFF, 0, 0x2626, *[1600] * 4]
-    connections = {s: (written[0x80 + 8 * s], written[0x81 + 8 * s]) for s in (6, 7, 11)}
-    assert connections == {6: (0xEFFF, 0x1FFF), 7: (0xFFFF, 0x1FFE), 11: (0xFFFF, 0x1EFF)}
+    written = {
+        first + i: value
+        for first, values in rows.items()
+        for i, value in enumerate(values)
+    }
+    assert [written[0x80 + i] for i in range(8)] == [
+        0xFFFE,
+        0x1FFF,
+        0,
+        0x2626,
+        *[1600] * 4,
+    ]
+    connections = {
+        s: (written[0x80 + 8 * s], written[0x81 + 8 * s]) for s in (6, 7, 11)
+    }
+    assert connections == {
+        6: (0xEFFF, 0x1FFF),
+        7: (0xFFFF, 0x1FFE),
+        11: (0xFFFF, 0x1EFF),
+    }
     assert set(range(0x80, 0xE0)) <= written.keys()
     assert list(rows)[-1] == 0
     assert [written[i] for i in range(8)] == [0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400]
-    assert max(2 + 2 * len(values) for values in rows.values()) <= 61  # a CP2112's buffer
+    assert (
+        max(2 + 2 * len(values) for values in rows.values()) <= 61
+    )  # a CP2112's buffer
 
 
 def test_parses_big_endian_words_of_which_zeros_are_not_intact():
@@ -32,7 +50,8 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
     for driven in range(24):  # bytes that came before the transfer broke off
         data = np.full((1, 24), 0xFF, dtype=np.uint8)
         data[0, :driven] = 0x51
-        # A last byte alone may be a value that ends in 0xFF: its chip is read a second time.
+        # A last byte alone may be a value that ends in 0xFF: its chip is read a second
+        # time.
         intact = 12 if driven == 23 else driven // 2
         assert ad7147.parse(data)[1][0].tolist() == [i < intact for i in range(12)]
     data[:] = 0x51
@@ -41,7 +60,9 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
 
 
 def test_model_converts_in_its_own_time():
-    model = FakeAD7147(lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), refresh_s=0.009216)
+    model = FakeAD7147(
+        lambda t: np.full(12, round(t * 1e6), dtype=np.uint16), refresh_s=0.009216
+    )
     bus = FakeBus(chips={0x2C: model})
     chip = AD7147(bus, 0x2C)
     list(chip.settings())

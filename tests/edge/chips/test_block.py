@@ -12,7 +12,9 @@ from tests.edge.chips.chips import sense
 @pytest.mark.parametrize("bits", [8, 12, 16])
 @pytest.mark.parametrize("taxels", [1, 2, 7, 384])
 def test_packed_taxels_are_unpacked(bits, taxels):
-    values = np.random.default_rng(bits).integers(0, 1 << bits, taxels).astype(np.uint16)
+    values = (
+        np.random.default_rng(bits).integers(0, 1 << bits, taxels).astype(np.uint16)
+    )
     data = np.frombuffer(block.pack(values, bits), dtype=np.uint8)
     assert data.size == block.data_bytes(taxels, bits)
     np.testing.assert_array_equal(block.unpack(data[None], taxels, bits)[0], values)

@@ -1,4 +1,5 @@
-"""The list of chips: a further chip is one entry. The defaults that a skin file need not give."""
+"""The list of chips: a further chip is one entry. The defaults that a skin file need
+not give."""
 
 import numpy as np
 import pytest
@@ -25,7 +26,9 @@ def test_an_mpr121_works_without_a_single_setting():
 
 
 def test_values_of_the_file_replace_the_defaults():
-    file = parse(mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1"))
+    file = parse(
+        mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1")
+    )
     assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)
 
@@ -33,13 +36,16 @@ def test_values_of_the_file_replace_the_defaults():
 def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
     text = mpr121(skin="threshold_counts = 5").replace("rows = 3", "rows = 6")
     more = '[[bus]]\ndevice = 2\nkind = "block"\n'
-    file = parse(text + more + "chips = [{ address = 0x28, first = [3, 0], block = [3, 4] }]")
+    file = parse(
+        text + more + "chips = [{ address = 0x28, first = [3, 0], block = [3, 4] }]"
+    )
     assert [chip.sign for chip in file.chips] == [-1, 1]
     assert file.signal == Signal()
 
 
 class Toy(Chip):
-    """A chip of four taxels of 8 bits behind the pointer 0x10, with an identity at 0x00."""
+    """A chip of four taxels of 8 bits behind the pointer 0x10, with an identity at
+    0x00."""
 
     def __init__(self, bus, address, into):
         super().__init__(bus, address, b"\x10", into)
@@ -62,7 +68,9 @@ class FakeToy(FakeChip):
         self.pointer = data[0]
 
     def read(self, n, t):
-        return b"\x70" if self.pointer == 0 else self.sense(t).astype(np.uint8).tobytes()
+        return (
+            b"\x70" if self.pointer == 0 else self.sense(t).astype(np.uint8).tobytes()
+        )
 
 
 TOY = ChipKind(
@@ -76,7 +84,9 @@ TOY = ChipKind(
     rest=lambda spec: 20,
     stages=4,
     options={"speed": Option(1, (1, 2))},
-    defaults=lambda options: Defaults(threshold_counts=options["speed"] * 10, onset_counts=30),
+    defaults=lambda options: Defaults(
+        threshold_counts=options["speed"] * 10, onset_counts=30
+    ),
 )
 TOY_SKIN = """[skin]
 rows = 2
@@ -91,7 +101,8 @@ chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
 
 
 def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
-    """The file, the skin, the fake, `scan` and `calibrate` know it from its descriptor."""
+    """The file, the skin, the fake, `scan` and `calibrate` know it from its
+    descriptor."""
     monkeypatch.setitem(KINDS, "toy", TOY)
     file = parse(TOY_SKIN)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 30)
@@ -105,7 +116,9 @@ def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
     fake = ("--skin", path, "--fake", recording)
     status, events, _ = edge("scan", *fake)
     assert status == 0
-    assert [(event["kind"], event["state"]) for event in events] == [("toy", "running")] * 2
+    assert [(event["kind"], event["state"]) for event in events] == [
+        ("toy", "running")
+    ] * 2
     assert edge("calibrate", *fake, "--frames", 40)[0] == 0
     assert (skinfile.load(path).calibration.baseline == 20).all()
 

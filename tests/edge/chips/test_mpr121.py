@@ -47,5 +47,7 @@ def test_over_current_is_named_with_its_resistor_and_later_shows_as_lost_setting
     model.over_current = True
     model.write(b"\x00", 0.0)
     assert not chip.healthy()
-    with pytest.raises(WrongChip, match="over-current; check the resistor at its pin REXT"):
+    with pytest.raises(
+        WrongChip, match="over-current; check the resistor at its pin REXT"
+    ):
         list(chip.settings())

@@ -1,4 +1,5 @@
-"""`edge-classify calibrate`: exact means and deviations, and a skin that must be at rest."""
+"""`edge-classify calibrate`: exact means and deviations, and a skin that must be at
+rest."""
 
 from pathlib import Path
 
@@ -30,7 +31,9 @@ def test_a_taxel_is_restless_beyond_the_limit_and_not_at_it():
 
 def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin, quiet):
     before = skin.read_text()
-    status, (event,), _ = edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
+    status, (event,), _ = edge(
+        "calibrate", "--skin", skin, "--fake", quiet, "--frames", 50
+    )
     assert (status, event["frames"], event["kept"]) == (0, 50, 0)
     assert Path(event["backup"]).read_text() == before
     file = skinfile.load(skin)
@@ -48,29 +51,47 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
     edge, skin, quiet, options, deviation
 ):
     fake = ("--skin", skin, "--fake", quiet, *options)
-    (first,), (again,) = (edge("calibrate", *fake, "--frames", 180)[1] for _ in range(2))
+    (first,), (again,) = (
+        edge("calibrate", *fake, "--frames", 180)[1] for _ in range(2)
+    )
     assert first == again
     file = skinfile.load(skin)
-    assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(deviation, rel=0.03)
+    assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
+        deviation, rel=0.03
+    )
     assert dead_band(file).min() >= 4 * deviation
-    assert edge("calibrate", *fake, "--frames", 180, "--noise", 0)[1][0]["noise_largest"] == 0.0
+    assert (
+        edge("calibrate", *fake, "--frames", 180, "--noise", 0)[1][0]["noise_largest"]
+        == 0.0
+    )
 
 
 def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
     touched = tmp_path / "touched.npz"
     recording.save(touched, make_touch(arm=False))
     before = skin.read_text()
-    status, _, err = edge("calibrate", "--skin", skin, "--fake", touched, "--frames", 100)
+    status, _, err = edge(
+        "calibrate", "--skin", skin, "--fake", touched, "--frames", 100
+    )
     assert status == 2
     assert "taxels that vary while they should be at rest: " in err
     assert skin.read_text() == before
-    assert edge("calibrate", "--skin", skin, "--fake", touched, "--frames", 100, "--force")[0] == 0
+    assert (
+        edge(
+            "calibrate", "--skin", skin, "--fake", touched, "--frames", 100, "--force"
+        )[0]
+        == 0
+    )
 
 
 @pytest.mark.parametrize(
     ("value", "share", "said"),
     [
-        (20946, 0.4, "the first at [0, 2], which was valid in 20 of 50 frames and rests at 20946"),
+        (
+            20946,
+            0.4,
+            "the first at [0, 2], which was valid in 20 of 50 frames and rests at 20946",
+        ),
         (0, 1.0, "was valid in 50 of 50 frames and rests at 0"),
         (65535, 1.0, "rests at 65535; check the chips"),
     ],

@@ -30,7 +30,11 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
             "no contact can begin: onset_counts is 2000, but a taxel gives at most 1022",
         ),
         (one_chip(3, 4), 0, "threshold_counts is missing: anything above the noise"),
-        (one_chip(3, 4, signal="dead_band_sigma = 0"), 1, "noise of one count begins a contact"),
+        (
+            one_chip(3, 4, signal="dead_band_sigma = 0"),
+            1,
+            "noise of one count begins a contact",
+        ),
     ],
 )
 def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, said):
@@ -45,12 +49,15 @@ def test_check_counts_what_the_wire_carries(edge, skin):
     assert status == 0
     assert (event["taxels"], event["chips"]) == (384, 32)
     assert event["frame_rate_hz"] == 124.7
-    assert event["remarks"] == [f"not calibrated yet: run `edge-classify calibrate --skin {skin}`"]
+    assert event["remarks"] == [
+        f"not calibrated yet: run `edge-classify calibrate --skin {skin}`"
+    ]
     assert err == ""
 
 
 def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin):
-    """A frame of Cody's first bus takes 12 chips, 3 channels and a check in every fourth."""
+    """A frame of Cody's first bus takes 12 chips, 3 channels and a check in every
+    fourth."""
     _, (bare,), _ = edge("check", skin)
     _, (event,), _ = edge("check", skin, "--overhead", 100)
     assert (event["buses"], event["overhead_us"]) == (bare["buses"], 100.0)
@@ -63,11 +70,20 @@ def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin)
     [
         ("", 1, 46.8, "asks for 100 Hz, but the wires carry 46.8 Hz"),
         ("verify_mux = false\n", 1, 47.7, "but the wires carry 47.7 Hz"),
-        ("region_of_interest = true\n", 0, 46.8, "the chips near a contact are read at 100 Hz"),
+        (
+            "region_of_interest = true\n",
+            0,
+            46.8,
+            "the chips near a contact are read at 100 Hz",
+        ),
     ],
 )
 def test_check_says_where_the_wires_are_too_slow(edge, skin, more, status, rate, said):
-    text = skin.read_text().replace("verify_mux = true", "").replace("[read]\n", f"[read]\n{more}")
+    text = (
+        skin.read_text()
+        .replace("verify_mux = true", "")
+        .replace("[read]\n", f"[read]\n{more}")
+    )
     skin.write_text(text.replace("clock_hz = 400_000", "clock_hz = 150_000"))
     got, (event,), err = edge("check", skin)
     assert (got, event["frame_rate_hz"], err) == (status, rate, "")
@@ -97,7 +113,9 @@ def test_a_person_is_told_each_thing_once(edge, tmp_path, monkeypatch):
 def board(tmp_path, monkeypatch):
     """A machine with the given devices, of which one belongs to another group."""
     (tmp_path / "dev").mkdir()
-    monkeypatch.setattr(board_module.os, "access", lambda device, mode: device.name != "i2c-7")
+    monkeypatch.setattr(
+        board_module.os, "access", lambda device, mode: device.name != "i2c-7"
+    )
     monkeypatch.setattr(board_module.os, "getloadavg", lambda: (0.1, 0.1, 0.1))
 
     def look(**adapters):
@@ -113,7 +131,10 @@ def board(tmp_path, monkeypatch):
 
 def test_a_board_is_told_what_it_has(board):
     rows = board(i2c_1="bcm2835")
-    assert rows["program"].value == f"edge-classify {__version__}; reads models of format {FORMAT}"
+    assert (
+        rows["program"].value
+        == f"edge-classify {__version__}; reads models of format {FORMAT}"
+    )
     assert rows["numpy"].value == numpy.__version__
     assert rows["/dev/i2c-1"].value.startswith("bcm2835, group ")
     assert not any(row.remedy for row in rows.values())
@@ -134,9 +155,16 @@ def test_what_a_board_lacks_comes_with_its_remedy(board, monkeypatch):
 
 
 def test_check_without_a_skin_prints_the_board(edge, monkeypatch):
-    rows = [board_module.Row("disk", "5 MB", "delete"), board_module.Row("python", "3.11")]
+    rows = [
+        board_module.Row("disk", "5 MB", "delete"),
+        board_module.Row("python", "3.11"),
+    ]
     monkeypatch.setattr(board_module, "look", lambda: rows)
     status, (event,), _ = edge("check")
-    assert (status, event["event"], event["rows"][0]["remedy"]) == (1, "board", "delete")
+    assert (status, event["event"], event["rows"][0]["remedy"]) == (
+        1,
+        "board",
+        "delete",
+    )
     monkeypatch.setattr(board_module, "look", lambda: rows[1:])
     assert edge("check")[0] == 0

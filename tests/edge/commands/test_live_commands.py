@@ -33,12 +33,16 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     assert err.endswith("0 of 1 chips answer; taxels without a valid value: 100\n")
     more = ("--label", "object=box", "--out", tmp_path / "trials")
     status, events, err = edge("record", *fake, *more)
-    assert (status, [(e["event"], e["invalid"]) for e in events]) == (1, [("taxels", 100)])
+    assert (status, [(e["event"], e["invalid"]) for e in events]) == (
+        1,
+        [("taxels", 100)],
+    )
     assert "no contact was saved; taxels without a valid value: 100" in err
 
 
 def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
-    """The same frames, once from the file and once through drivers, wires and threads."""
+    """The same frames, once from the file and once through drivers, wires and
+    threads."""
     model = exported / "model.onnx"
     for name in ("hard_0", "soft_3"):
         path = recordings / f"{name}.npz"
@@ -46,7 +50,8 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
         assert (status, err) == (0, "")
         _, played, _ = edge("replay", "--model", model, path)
         keys = ("event", "task", "label", "confidence", "flags", "window_s")
-        # The wires' clock shifts times by less than a microsecond, which may tell them apart.
+        # The wires' clock shifts times by less than a microsecond, which may tell them
+        # apart.
         for event in (*played, *live):
             if "as_trained" in event.get("flags", ()):
                 event["flags"].remove("as_trained")
@@ -66,7 +71,10 @@ def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted)
     model, path = exported / "model.onnx", parted
     once = edge("run", "--model", model, "--fake", path)[1]
     twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 4.6)[1]
-    assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [1, 2]
+    assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [
+        1,
+        2,
+    ]
     assert twice[-1]["frames"] == 460
 
 
@@ -85,8 +93,12 @@ def bare(make_touch, tmp_path):
         (("--without-joints", "skin"), "skin_motion"),
     ],
 )
-def test_run_flags_a_decision_whose_joints_never_came(edge, exported, bare, options, flag):
-    status, events, _ = edge("run", "--model", exported / "model.onnx", "--fake", bare, *options)
+def test_run_flags_a_decision_whose_joints_never_came(
+    edge, exported, bare, options, flag
+):
+    status, events, _ = edge(
+        "run", "--model", exported / "model.onnx", "--fake", bare, *options
+    )
     assert status == 0
     assert [e["flags"][0] for e in events if e["event"] == "decision"] == [flag] * 2
 
@@ -115,17 +127,29 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         ([], "give --skin skin.toml, or --fake REC.npz to use no hardware"),
         (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),
-        (["--fake", "REC", "--joints", "tcp:5"], "--joints: give stdin or udp:[HOST:]PORT"),
+        (
+            ["--fake", "REC", "--joints", "tcp:5"],
+            "--joints: give stdin or udp:[HOST:]PORT",
+        ),
         (
             ["--fake", "REC", "--joints", "udp:x"],
             "--joints udp:x: give HOST:PORT, for example",
         ),
-        (["--fake", "BARE"], "has no joint angles, but the model needs 5 of each frame"),
+        (
+            ["--fake", "BARE"],
+            "has no joint angles, but the model needs 5 of each frame",
+        ),
         (["--fake", "REC", "--skin", "PAD"], "this skin has 8 x 12 taxels, flat, with"),
     ],
 )
-def test_a_bad_option_is_one_sentence(edge, exported, recordings, bare, arguments, said):
-    files = {"REC": recordings / "hard_0.npz", "BARE": bare, "PAD": skinfile.shipped("mpr121")}
+def test_a_bad_option_is_one_sentence(
+    edge, exported, recordings, bare, arguments, said
+):
+    files = {
+        "REC": recordings / "hard_0.npz",
+        "BARE": bare,
+        "PAD": skinfile.shipped("mpr121"),
+    }
     given = [files.get(a, a) for a in arguments]
     status, events, err = edge("run", "--model", exported / "model.onnx", *given)
     assert (status, events) == (2, [])
@@ -149,5 +173,7 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
     options = ["--model", exported / "model.onnx"]
     if command == "record":
         options = ["--label", "object=foam", "--out", tmp_path]
-    assert edge(command, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
+    assert (
+        edge(command, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
+    )
     assert handled == [signal.SIG_DFL]

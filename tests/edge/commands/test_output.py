@@ -15,7 +15,9 @@ RUN = ["run", "--model", str(demo.MODEL), "--fake", TOUCH]
 
 @pytest.fixture
 def terminal(monkeypatch):
-    monkeypatch.setattr(Output, "of", classmethod(lambda cls, arguments: cls(arguments.json)))
+    monkeypatch.setattr(
+        Output, "of", classmethod(lambda cls, arguments: cls(arguments.json))
+    )
 
 
 def test_a_person_reads_when_what_was_decided_and_how_sure(terminal, capsys):

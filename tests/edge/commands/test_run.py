@@ -7,7 +7,10 @@ from edge.events import Decided, Onset
 def touch(number, unknown):
     flags = ("unknown",) if unknown else ()
     onset_s = float(number)
-    answers = [Decided(task, "a", 1.0, 1.2, onset_s, 0.1, flags) for task in ("object", "softness")]
+    answers = [
+        Decided(task, "a", 1.0, 1.2, onset_s, 0.1, flags)
+        for task in ("object", "softness")
+    ]
     return [Onset(onset_s), *answers]
 
 
@@ -15,7 +18,9 @@ def test_most_touches_are_unknown_and_it_is_said_once_with_the_remedy(caplog):
     touches = UnknownTouches("m.onnx")
     heard = [touches.push(touch(i, unknown=i % 4)) for i in range(3 * LAST_TOUCHES)]
     events = [event for event in heard if event is not None]
-    assert events == [{"event": "unknown_touches", "unknown": 6, "touches": FEWEST_TOUCHES}]
+    assert events == [
+        {"event": "unknown_touches", "unknown": 6, "touches": FEWEST_TOUCHES}
+    ]
     (sentence,) = caplog.messages
     assert sentence.endswith(
         "add them with `edge-classify teach --new-labels --model m.onnx REC...`"
@@ -28,5 +33,8 @@ def test_half_of_the_touches_may_be_unknown_and_old_ones_are_forgotten():
         assert touches.push(touch(i, unknown=i % 2)) is None
     for i in range(LAST_TOUCHES):
         assert touches.push(touch(1000 + i, unknown=False)) is None
-    due = [touches.push(touch(2000 + i, unknown=True)) is not None for i in range(LAST_TOUCHES)]
+    due = [
+        touches.push(touch(2000 + i, unknown=True)) is not None
+        for i in range(LAST_TOUCHES)
+    ]
     assert due.index(True) == LAST_TOUCHES // 2

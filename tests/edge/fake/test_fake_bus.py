@@ -1,4 +1,5 @@
-"""The fake refuses what real adapters refuse, and its time and faults come only when asked for."""
+"""The fake refuses what real adapters refuse, and its time and faults come only when
+asked for."""
 
 import errno
 
@@ -46,12 +47,16 @@ def test_shapes_that_some_adapter_refuses_are_refused(messages, code):
     assert caught.value.errno == code
 
 
-def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(monkeypatch):
+def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
+    monkeypatch,
+):
     fake = bus()
     mux, connected = fake.chips[0x70], []
     mux.channels[0][0x20], mux.channels[1][0x20] = Echo(0b1100), Echo(0b1010)
     plain = mux.write
-    monkeypatch.setattr(mux, "write", lambda *a: (plain(*a), connected.append(mux.connected)))
+    monkeypatch.setattr(
+        mux, "write", lambda *a: (plain(*a), connected.append(mux.connected))
+    )
     send(fake, 0x70, [3])
     assert (connected, mux.connected) == ([[]], [0, 1])
     assert fetch(fake, 0x20, b"", 1) == bytes([0b1000])

@@ -16,13 +16,18 @@ from edge.skin.loop import Loop
 
 
 def noise(shape, n=20, top=65536):
-    frames = np.random.default_rng(sum(shape)).integers(0, top, (n, *shape)).astype(np.uint16)
+    frames = (
+        np.random.default_rng(sum(shape))
+        .integers(0, top, (n, *shape))
+        .astype(np.uint16)
+    )
     return Recording(np.arange(n) / 100.0, frames)
 
 
 @pytest.mark.parametrize("shape", [(16, 24), (13, 6), (1, 1), (100, 90)])
 def test_a_skin_of_any_shape_gives_back_its_recording(shape):
-    """Cody's chips where the shape is Cody's, else microcontrollers; 9000 taxels take three."""
+    """Cody's chips where the shape is Cody's, else microcontrollers; 9000 taxels take
+    three."""
     recording = noise(shape, top=40000)
     skin, playback = play(skin_file(recording.layout), recording)
     with skin:
@@ -37,7 +42,9 @@ def test_raw_values_saturate_as_a_chip_does():
     skin, _ = play(file, recording)
     with skin:
         counts = skin.read().counts
-    np.testing.assert_array_equal(counts, np.minimum(recording.frames[0], 65534 - 20946))
+    np.testing.assert_array_equal(
+        counts, np.minimum(recording.frames[0], 65534 - 20946)
+    )
 
 
 def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
@@ -56,12 +63,17 @@ def real(monkeypatch):
     """Real time, which passes as the test says and by sleeping."""
     now = SimpleNamespace(s=1000.0)
     monkeypatch.setattr("edge.fake.clock.time.monotonic", lambda: now.s)
-    monkeypatch.setattr("edge.fake.clock.time.sleep", lambda s: setattr(now, "s", now.s + s))
+    monkeypatch.setattr(
+        "edge.fake.clock.time.sleep", lambda s: setattr(now, "s", now.s + s)
+    )
     return now
 
 
-def test_a_paced_clock_is_no_faster_than_real_time_and_goes_on_without_a_loop_that_is_late(real):
-    """It does not hurry after it: what others send at real times would seem to come too late."""
+def test_a_paced_clock_is_no_faster_than_real_time_and_goes_on_without_a_loop_that_is_late(
+    real,
+):
+    """It does not hurry after it: what others send at real times would seem to come too
+    late."""
     clock = PacedClock()
     real.s += 3.0
     clock.sleep_until(clock.now())
@@ -77,5 +89,7 @@ def test_a_paced_clock_is_no_faster_than_real_time_and_goes_on_without_a_loop_th
 
 
 def test_a_recording_of_another_shape_is_refused():
-    with pytest.raises(InputError, match="3 x 3 taxels, the skin 'cody forearm' 16 x 24"):
+    with pytest.raises(
+        InputError, match="3 x 3 taxels, the skin 'cody forearm' 16 x 24"
+    ):
         play(skinfile.load(skinfile.shipped("cody")), noise((3, 3)))

@@ -28,7 +28,10 @@ def test_the_force_of_a_contact_is_kept_whatever_the_pitch(pitch):
     for path in demo.recordings():
         source = load(path)
         recording = made(pitch, wraps="true")[f"{path.stem}-000"]
-        strength = recording.frames.sum(axis=(1, 2)).max() / source.frames.sum(axis=(1, 2)).max()
+        strength = (
+            recording.frames.sum(axis=(1, 2)).max()
+            / source.frames.sum(axis=(1, 2)).max()
+        )
         assert touches.STRENGTH[0] - 0.05 < strength < touches.STRENGTH[1] + 0.05
 
 
@@ -38,9 +41,13 @@ def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
     def spread(recording, pitch):
         rows = recording.frames.sum(axis=(0, 2)).astype(float)
         at = np.arange(len(rows)) * pitch
-        return np.sqrt(np.average((at - np.average(at, weights=rows)) ** 2, weights=rows))
+        return np.sqrt(
+            np.average((at - np.average(at, weights=rows)) ** 2, weights=rows)
+        )
 
-    coarse, fine = (made(p, wraps="true")["cardboard-box-fixed-000"] for p in (0.01, 0.005))
+    coarse, fine = (
+        made(p, wraps="true")["cardboard-box-fixed-000"] for p in (0.01, 0.005)
+    )
     assert spread(fine, 0.005) == pytest.approx(spread(coarse, 0.01), rel=0.1)
 
 
@@ -55,12 +62,18 @@ def test_every_contact_begins_and_goes_on_for_a_window_on_a_skin_whose_scale_is_
 
 
 def test_trials_differ_and_the_same_seed_gives_the_same():
-    first_set, again, other = made(0.01, trials=2), made(0.01, trials=2), made(0.01, seed=1)
+    first_set, again, other = (
+        made(0.01, trials=2),
+        made(0.01, trials=2),
+        made(0.01, seed=1),
+    )
     assert len(first_set) == 8
     for name, recording in first_set.items():
         assert np.array_equal(recording.frames, again[name].frames)
     first = first_set["pillow-movable-000"].frames
-    assert not np.array_equal(first, first_set["pillow-movable-001"].frames[: len(first)])
+    assert not np.array_equal(
+        first, first_set["pillow-movable-001"].frames[: len(first)]
+    )
     assert not np.array_equal(first, other["pillow-movable-000"].frames[: len(first)])
 
 

@@ -1,4 +1,5 @@
-"""The USB adapter: USB/IP requests in, replies out, as the kernel's driver sends them."""
+"""The USB adapter: USB/IP requests in, replies out, as the kernel's driver sends
+them."""
 
 import errno
 import struct
@@ -25,7 +26,9 @@ def submit(kind, request, value=0, index=0, length=0, data=b"", number=7):
     to_host = kind >> 7
     setup = struct.pack("<BBHHH", kind, request, value, index, len(data) or length)
     header = struct.pack(">5I", 1, number, 0x10002, to_host, 0)
-    return header + struct.pack(">Iiiii", 0, len(data) or length, 0, 0, 0) + setup + data
+    return (
+        header + struct.pack(">Iiiii", 0, len(data) or length, 0, 0, 0) + setup + data
+    )
 
 
 def answer(adapter, *request, **more):
@@ -92,7 +95,14 @@ def test_a_hung_bus_leaves_a_request_without_an_answer_until_the_kernel_gives_it
     usb = adapter(Fault(code=errno.ETIMEDOUT, at=[0]))
     assert usb.reply(submit(0x41, 7, 0, MUX, data=b"\x04")) == b""
     unlink = struct.pack(">6I", 2, 8, 0x10002, 0, 0, 7).ljust(48, b"\0")
-    assert struct.unpack_from(">5Ii", usb.reply(unlink)) == (4, 8, 0, 0, 0, -errno.ECONNRESET)
+    assert struct.unpack_from(">5Ii", usb.reply(unlink)) == (
+        4,
+        8,
+        0,
+        0,
+        0,
+        -errno.ECONNRESET,
+    )
 
 
 @pytest.mark.parametrize("request_", [(0x80, 6, 0x0300), (0x41, 99), (0x00, 3)])

@@ -12,7 +12,11 @@ FACTORS = {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)}
 def test_the_answer_has_the_smallest_sum_of_all_that_agree():
     rng = np.random.default_rng(0)
     category, mobility, softness = rng.integers(0, 9, (3, 200, 4))
-    distances = {"category": category, "mobility": mobility[:, :2], "softness": softness[:, :2]}
+    distances = {
+        "category": category,
+        "mobility": mobility[:, :2],
+        "softness": softness[:, :2],
+    }
     labels, nearest = agreed("category", FACTORS, distances)
     for i in range(200):
         sums = {
@@ -22,11 +26,17 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
         m, s = labels["mobility"][i], labels["softness"][i]
         assert sums[m, s] == min(sums.values())
         assert labels["category"][i] == 2 * s + m
-        assert nearest["softness"][i].tolist() == [min(sums[0, s], sums[1, s]) for s in (0, 1)]
+        assert nearest["softness"][i].tolist() == [
+            min(sums[0, s], sums[1, s]) for s in (0, 1)
+        ]
 
 
 def test_a_single_touch_is_answered_as_in_a_batch():
-    distances = {"category": [4.0, 0.0, 1.0, 1.0], "mobility": [0.0, 2.0], "softness": [3.0, 0.0]}
+    distances = {
+        "category": [4.0, 0.0, 1.0, 1.0],
+        "mobility": [0.0, 2.0],
+        "softness": [3.0, 0.0],
+    }
     arrays = {task: np.array(values) for task, values in distances.items()}
     labels, nearest = agreed("category", FACTORS, arrays)
     assert labels == {"category": 2, "mobility": 0, "softness": 1}

@@ -41,7 +41,11 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
     assert info.layout == forearm
     assert (info.window_s, info.samples, info.rows) == (1.2, 40, 16)
-    assert info.units == {"max_force": "newton", "contact_area": "taxel", "contact_motion": "metre"}
+    assert info.units == {
+        "max_force": "newton",
+        "contact_area": "taxel",
+        "contact_motion": "metre",
+    }
     assert info.motion_frame == "world"
     assert info.chain.dof == 5
     assert len(info.data_digest) == 64
@@ -51,7 +55,9 @@ def test_metadata_says_what_the_board_needs(model, forearm):
 def test_a_decision_is_the_graphs_answer_and_stays_so_after_further_ones(model, golden):
     task = model.info.tasks["object"]
     vectors = golden["vectors"][: len(golden["onset_s"])]
-    for i, decision in enumerate([model.decide(vector)["object"] for vector in vectors]):
+    for i, decision in enumerate(
+        [model.decide(vector)["object"] for vector in vectors]
+    ):
         assert decision.label == task.labels[golden["object_label"][i]]
         assert decision.scores.tolist() == golden["object_scores"][i].tolist()
         assert decision.confidence == golden["object_scores"][i].max()
@@ -66,7 +72,9 @@ def test_a_value_far_outside_the_training_set_is_cut_off_and_flagged(model, gold
     decision = model.decide(vector)["object"]
     assert decision.out_of_range
     vector[39] = 1e200
-    assert model.decide(vector)["object"].distances.tolist() == decision.distances.tolist()
+    assert (
+        model.decide(vector)["object"].distances.tolist() == decision.distances.tolist()
+    )
     vector[39] = 1.7e308  # which is infinite once it is scaled
     with pytest.raises(InputError, match="too large"):
         model.decide(vector)
@@ -94,15 +102,21 @@ def another_attribute(proto):
 
 
 def another_input(proto):
-    proto.graph.input.append(helper.make_tensor_value_info("more", TensorProto.DOUBLE, [1]))
+    proto.graph.input.append(
+        helper.make_tensor_value_info("more", TensorProto.DOUBLE, [1])
+    )
 
 
 def twice_as_many_neighbours(proto):
     """It is known only after a sum."""
     index, top = next(
-        (i, n) for i, n in enumerate(proto.graph.node) if "object_neighbours" in n.output
+        (i, n)
+        for i, n in enumerate(proto.graph.node)
+        if "object_neighbours" in n.output
     )
-    proto.graph.node.insert(index, helper.make_node("Add", [top.input[1]] * 2, ["twice"]))
+    proto.graph.node.insert(
+        index, helper.make_node("Add", [top.input[1]] * 2, ["twice"])
+    )
     proto.graph.node[index + 1].input[1] = "twice"
 
 
@@ -131,7 +145,9 @@ REFUSED = {
     meta(format=99): "is of format 99, but this edge-classify reads",
     meta(samples=30): "no tensor(double) features of shape [90], which its metadata",
     meta(samples=-3): "samples must be a whole number from 2 to 10000, not -3",
-    meta(window_s="soon"): "window_s must be a number above 0, at most 3600, not 'soon'",
+    meta(
+        window_s="soon"
+    ): "window_s must be a number above 0, at most 3600, not 'soon'",
     meta(skin={"rows": 16}): "cols is missing",
     meta(arm=None): "motion frame contradicts its arm",
     meta(arm=7): "its metadata: arm must be a table, not 7; export it again",
@@ -139,7 +155,9 @@ REFUSED = {
     meta(tasks=[]): "tasks must be a table",
     meta(tracking={"speed": 1}): "tracking.debounce is missing",
     meta(features=["noise"], units={"noise": "1"}): "was made for the features noise",
-    meta(units={"max_force": "newton"}): "units.contact_area is missing; export it again",
+    meta(
+        units={"max_force": "newton"}
+    ): "units.contact_area is missing; export it again",
     meta(trials=["a"]): "names 1 of 16 trials",
     edited(lambda m: m.pop("window_s")): "window_s is missing; export it again",
     edited(
@@ -148,7 +166,8 @@ REFUSED = {
     edited(
         lambda m: m["tasks"].update(mobility=m["tasks"]["category"])
     ): "no tensor(int64) mobility_label",
-    # Each pair of a rigid or soft category and one of four objects would need a label of its own.
+    # Each pair of a rigid or soft category and one of four objects would need a label
+    # of its own.
     edited(
         lambda m: m["tasks"]["object"].update(
             factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
@@ -173,14 +192,18 @@ def test_contents_are_those_that_onnx_reads(exported):
     assert contents.metadata == {p.key: p.value for p in proto.metadata_props}
     assert contents.nodes == [(n.op_type, n.input, n.output) for n in proto.graph.node]
     for tensor in proto.graph.initializer:
-        np.testing.assert_array_equal(contents.constant(tensor.name), numpy_helper.to_array(tensor))
+        np.testing.assert_array_equal(
+            contents.constant(tensor.name), numpy_helper.to_array(tensor)
+        )
     assert contents.foreign == []
 
 
 RELEASED = Path(__file__).parents[2] / "golden" / "released"
 
 
-@pytest.mark.parametrize("path", sorted(RELEASED.glob("*.onnx")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(RELEASED.glob("*.onnx")), ids=lambda path: path.stem
+)
 def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path):
     """`format-N.onnx` stays here when format N is no longer written."""
     number = int(path.stem.removeprefix("format-"))
@@ -196,7 +219,8 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
 
 
 class Underived:
-    """A session of a runtime that leaves open the sizes of the outputs it is given for."""
+    """A session of a runtime that leaves open the sizes of the outputs it is given
+    for."""
 
     def __init__(self, session, names):
         self._session, self._names = session, names
@@ -214,23 +238,31 @@ class Underived:
         return ["unknown"] if output.name in self._names else output.shape[1:]
 
 
-def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(exported, monkeypatch):
+def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(
+    exported, monkeypatch
+):
     model = Model(exported / "model.onnx")
     monkeypatch.setattr(model, "_session", Underived(model._session, {"object_scores"}))
     model._check()
     assert len(model.decide(np.zeros(model.info.width))["object"].scores) == 4
     monkeypatch.setattr(model, "_session", Underived(model._session, {"object_label"}))
-    with pytest.raises(InputError, match=r"no tensor\(int64\) object_label of shape \[\]"):
+    with pytest.raises(
+        InputError, match=r"no tensor\(int64\) object_label of shape \[\]"
+    ):
         model._check()
 
 
 def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
     def scalar(proto):
         node = next(n for n in proto.graph.node if "out_of_range" in n.output)
-        node.CopyFrom(helper.make_node("ReduceSum", [node.input[0]], ["out_of_range"], keepdims=0))
+        node.CopyFrom(
+            helper.make_node("ReduceSum", [node.input[0]], ["out_of_range"], keepdims=0)
+        )
         output = next(x for x in proto.graph.output if x.name == "out_of_range")
         del output.type.tensor_type.shape.dim[:]
 
     model = Model(altered(scalar))
-    with pytest.raises(InputError, match=r"out_of_range has the shape \(\)\); copy or export it"):
+    with pytest.raises(
+        InputError, match=r"out_of_range has the shape \(\)\); copy or export it"
+    ):
         model.decide(np.zeros(model.info.width))

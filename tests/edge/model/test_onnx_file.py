@@ -1,4 +1,5 @@
-"""A model file is refused before ONNX Runtime sees it where no exported model looks like it."""
+"""A model file is refused before ONNX Runtime sees it where no exported model looks
+like it."""
 
 import numpy as np
 import pytest
@@ -16,9 +17,14 @@ def check(data, name):
 
 def model(nodes, initial=(), **more):
     """The bytes of a graph x -> y of these nodes."""
-    sides = [helper.make_tensor_value_info(n, TensorProto.DOUBLE, [None, 2]) for n in ("x", "y")]
+    sides = [
+        helper.make_tensor_value_info(n, TensorProto.DOUBLE, [None, 2])
+        for n in ("x", "y")
+    ]
     graph = helper.make_graph(nodes, "g", sides[:1], sides[1:], list(initial))
-    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], **more)
+    proto = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", 18)], **more
+    )
     helper.set_model_props(proto, {"kind": "a test", "umlaut": "ä"})
     return proto
 
@@ -35,7 +41,9 @@ def a_function():
 
 def a_sparse_constant():
     proto = model([add()])
-    values, places = (numpy_helper.from_array(a, "w") for a in (np.ones(1), np.zeros(1, np.int64)))
+    values, places = (
+        numpy_helper.from_array(a, "w") for a in (np.ones(1), np.zeros(1, np.int64))
+    )
     sparse = helper.make_sparse_tensor(values, places, [1 << 40])
     proto.graph.sparse_initializer.append(sparse)
     return proto
@@ -53,7 +61,10 @@ TENSOR = numpy_helper.from_array(np.ones(2), "w")
 PARTS = "functions, inner graphs or sparse tensors, as no exported model has"
 REFUSED = {
     "a loop": (model([add("Loop")]), "operator Loop, as no"),
-    "a foreign domain": (model([add(domain="com.evil")]), "operator com.evil.Add, as no"),
+    "a foreign domain": (
+        model([add(domain="com.evil")]),
+        "operator com.evil.Add, as no",
+    ),
     "a known domain": (
         model([add("CDist", domain="com.microsoft")]),
         "operator com.microsoft.CDist, as no",
@@ -67,7 +78,10 @@ REFUSED = {
         weights_elsewhere(data_location=TensorProto.EXTERNAL),
         "weights in another file, as no exported model has",
     ),
-    "a path alone": (weights_elsewhere(), "weights in another file, as no exported model has"),
+    "a path alone": (
+        weights_elsewhere(),
+        "weights in another file, as no exported model has",
+    ),
 }
 
 
@@ -80,7 +94,10 @@ def test_what_no_exported_model_has_is_refused(proto, sentence):
 @pytest.mark.parametrize("value", [0.5, 3, "text", [0.5, 1.5], [1, 2]], ids=str)
 def test_an_attribute_may_be_numbers_or_a_text(value):
     contents = check(model([add(own=value)]).SerializeToString(), "m.onnx")
-    assert (contents.foreign, [node.operator for node in contents.nodes]) == ([], ["Add"])
+    assert (contents.foreign, [node.operator for node in contents.nodes]) == (
+        [],
+        ["Add"],
+    )
 
 
 OTHER_ATTRIBUTES = {
@@ -101,5 +118,7 @@ def test_an_attribute_of_another_kind_is_refused(value):
 @pytest.mark.parametrize("data", ["38 05", "3a 02 08 05", "3a 04 0a 02 20 05"])
 def test_a_number_where_bytes_belong_is_no_model(data):
     """A graph, a node and the name of an operator that are the number 5."""
-    with pytest.raises(InputError, match=r"^m.onnx: not an ONNX model; copy or export it again"):
+    with pytest.raises(
+        InputError, match=r"^m.onnx: not an ONNX model; copy or export it again"
+    ):
         onnx_file.read(bytes.fromhex(data), "m.onnx")

@@ -1,4 +1,5 @@
-"""Confidence from distances, rules by their certified error, refusals, and the unknown."""
+"""Confidence from distances, rules by their certified error, refusals, and the
+unknown."""
 
 import math
 from dataclasses import asdict, replace
@@ -7,7 +8,14 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.stopping import TEST_SHARE, Novelty, Stopping, StoppingRule, check_rate, margin
+from edge.model.stopping import (
+    TEST_SHARE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    check_rate,
+    margin,
+)
 
 
 class TestMargin:
@@ -20,9 +28,15 @@ class TestMargin:
 
     @pytest.mark.parametrize(
         ("distances", "expected"),
-        [((0.0, math.inf), math.inf), ((math.inf, 1.0), -math.inf), ((math.inf,) * 2, -math.inf)],
+        [
+            ((0.0, math.inf), math.inf),
+            ((math.inf, 1.0), -math.inf),
+            ((math.inf,) * 2, -math.inf),
+        ],
     )
-    def test_what_is_infinitely_far_is_no_evidence_for_a_label(self, distances, expected):
+    def test_what_is_infinitely_far_is_no_evidence_for_a_label(
+        self, distances, expected
+    ):
         assert margin(distances, 0) == expected
 
 
@@ -35,7 +49,11 @@ def stopping(**changes):
 
 def test_the_fastest_rule_that_is_certified_is_taken():
     assert stopping().rule(0.05) is None
-    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [1.2, 0.8, 0.4]
+    assert [stopping().rule(error).mean_s for error in (0.1, 0.2, 0.9)] == [
+        1.2,
+        0.8,
+        0.4,
+    ]
 
 
 def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
@@ -59,7 +77,9 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
     needed = int(text.split("about ")[1].split()[0])
     # So many trials with the same share of errors pass the exact binomial test.
     wrong = math.floor(needed * 7 / 140)
-    tail = sum(math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1))
+    tail = sum(
+        math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1)
+    )
     assert 0.0025 < tail <= 0.05
     # Chernoff's bound: the level over the divergence of the two shares.
     divergence = 0.95 * math.log(0.95 / 0.92) + 0.05 * math.log(0.05 / 0.08)
@@ -67,8 +87,13 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
 
 
 def test_a_refusal_asks_for_more_trials_than_there_were():
-    """However many there were: a rule may have failed that so many could have certified."""
-    assert stopping(trials=10_000, wrong=0).refusal(0.09).endswith("0.09 needs about 10001 trials")
+    """However many there were: a rule may have failed that so many could have
+    certified."""
+    assert (
+        stopping(trials=10_000, wrong=0)
+        .refusal(0.09)
+        .endswith("0.09 needs about 10001 trials")
+    )
 
 
 def test_an_error_rate_below_the_resolution_of_1_still_has_a_number_of_trials():
@@ -99,11 +124,20 @@ def test_what_is_stored_is_read_again():
     [
         ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
         ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
-        ({"intercepts": (0.0, 0.0, math.nan)}, "intercepts must be a finite number, not nan"),
+        (
+            {"intercepts": (0.0, 0.0, math.nan)},
+            "intercepts must be a finite number, not nan",
+        ),
         ({"slope": 0.0}, "slope must be a number above 0, not 0.0"),
         ({"rules": ()}, "rules must be a list of tables"),
-        ({"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)}, "rules 0: last must be .* 0 to 2, not 3"),
-        ({"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)}, "rules 0: error must be a number above 0"),
+        (
+            {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
+            "rules 0: last must be .* 0 to 2, not 3",
+        ),
+        (
+            {"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)},
+            "rules 0: error must be a number above 0",
+        ),
         ({"wrong": 141}, "wrong must be a whole number from 0 to 140, not 141"),
         ({"risk": 0.0}, "risk must be a number above 0, at most 1, not 0.0"),
     ],
@@ -117,13 +151,21 @@ def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0,)))
     with pytest.raises(InputError, match="limits must be a list of 2 numbers, not"):
         Novelty.from_table(table(novelty), 2)
-    with pytest.raises(InputError, match="limits must be 3 rows of a number for each of the rates"):
+    with pytest.raises(
+        InputError, match="limits must be 3 rows of a number for each of the rates"
+    ):
         Novelty.from_table(table(novelty), 3)
 
 
 def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
     novelty = Novelty("t", (0.2, 0.1, 0.05), ((1.0, 2.0, 3.0),))
-    assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [1.0, 1.0, 0.2, 0.1, 0.05]
+    assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [
+        1.0,
+        1.0,
+        0.2,
+        0.1,
+        0.05,
+    ]
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -0.1, math.nan])

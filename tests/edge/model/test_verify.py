@@ -1,4 +1,5 @@
-"""What counts as the golden file's value: bounds, exact integers, what is not a number."""
+"""What counts as the golden file's value: bounds, exact integers, what is not a
+number."""
 
 import numpy as np
 import onnx
@@ -44,7 +45,12 @@ def test_a_row_of_whole_numbers_that_differs_is_shown():
     seen = golden.copy()
     seen[1, 0] = 7
     check = compared("it", seen, golden, 0.0)
-    assert (check.passed, check.row, check.seen, check.expected) == (False, 1, "[7 4]", "[3 4]")
+    assert (check.passed, check.row, check.seen, check.expected) == (
+        False,
+        1,
+        "[7 4]",
+        "[3 4]",
+    )
 
 
 @pytest.mark.parametrize("bound", [0.0, 1.0])

@@ -26,7 +26,10 @@ def listener():
 
 def test_each_event_is_a_line_and_the_same_line_a_datagram(listener):
     out = io.StringIO()
-    events = [{"event": "onset", "onset_s": 1.5}, {"event": "decision", "label": "Kissen für 2"}]
+    events = [
+        {"event": "onset", "onset_s": 1.5},
+        {"event": "decision", "label": "Kissen für 2"},
+    ]
     with closing(Lines(out, udp=f"127.0.0.1:{listener.getsockname()[1]}")) as lines:
         lines.write(events)
         received = [listener.recv(65536).decode() for _ in events]
@@ -43,12 +46,22 @@ def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
     with closing(Lines(out, udp=f"127.0.0.1:{port}")) as lines:
         for n in range(20):
             lines.write([{"n": n}])
-    assert [json.loads(line)["n"] for line in out.getvalue().splitlines()] == list(range(20))
+    assert [json.loads(line)["n"] for line in out.getvalue().splitlines()] == list(
+        range(20)
+    )
     assert sum(lines.lost.values()) > 0
     lines.close()
 
 
-NO_PORT = ["", "47400", ":47400", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536", "a:b:c"]
+NO_PORT = [
+    "",
+    "47400",
+    ":47400",
+    "127.0.0.1:",
+    "127.0.0.1:0",
+    "127.0.0.1:65536",
+    "a:b:c",
+]
 NO_HOST = ["a..b:80", "nobody.invalid:80", "x" * 300 + ":80"]
 
 

@@ -1,4 +1,5 @@
-"""`edge-classify run` as a service: under a stand-in for systemd's socket, and the unit itself."""
+"""`edge-classify run` as a service: under a stand-in for systemd's socket, and the unit
+itself."""
 
 import json
 import os
@@ -24,16 +25,31 @@ TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
 def start(manager, *arguments):
     fake = ("--fake", str(TOUCH), "--loop")
     return subprocess.Popen(
-        [sys.executable, "-m", "edge", "run", "--model", str(demo.MODEL), *fake, *arguments],
+        [
+            sys.executable,
+            "-m",
+            "edge",
+            "run",
+            "--model",
+            str(demo.MODEL),
+            *fake,
+            *arguments,
+        ],
         cwd=ROOT,
-        env={**os.environ, "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"},
+        env={
+            **os.environ,
+            "NOTIFY_SOCKET": manager.getsockname(),
+            "WATCHDOG_USEC": "200000",
+        },
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
 
 
-def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(manager, tmp_path):
+def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
+    manager, tmp_path
+):
     place = tmp_path / "map.jsonl"
     with start(manager, "--map", str(place)) as process:
         assert manager.recv(4096) == f"READY=1\nSTATUS=reading fake {TOUCH}".encode()
@@ -63,18 +79,29 @@ def unit():
 
 
 def examples():
-    """The arguments in the unit's environment file: those that hold, and those in a comment."""
+    """The arguments in the unit's environment file: those that hold, and those in a
+    comment."""
     lines = UNIT.with_suffix(".env").read_text().splitlines()
-    return [line.partition("=")[2] for line in lines if line.lstrip("#").startswith("ARGUMENTS=")]
+    return [
+        line.partition("=")[2]
+        for line in lines
+        if line.lstrip("#").startswith("ARGUMENTS=")
+    ]
 
 
-def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_takes(unit):
+def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_takes(
+    unit,
+):
     program, *words = shlex.split(unit["Service"]["ExecStart"])
     assert (Path(program).name, words.pop()) == ("edge-classify", "$ARGUMENTS")
     without, arm = (
         parser().parse_args([*words, *shlex.split(*shlex.split(e))]) for e in examples()
     )
-    assert (without.udp, without.joints, arm.joints) == ("127.0.0.1:47400", None, "udp:47401")
+    assert (without.udp, without.joints, arm.joints) == (
+        "127.0.0.1:47400",
+        None,
+        "udp:47401",
+    )
     assert arm.map == f"/var/lib/{unit['Service']['StateDirectory']}/map.jsonl"
 
 
@@ -85,13 +112,23 @@ def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):
     """
     service = unit["Service"]
     assert (service["Restart"], service["RestartPreventExitStatus"]) == ("always", "2")
-    assert int(service["WatchdogSec"]) > 2  # a stuck adapter's time-out of 1 s is no dead loop
+    assert (
+        int(service["WatchdogSec"]) > 2
+    )  # a stuck adapter's time-out of 1 s is no dead loop
     assert unit["Unit"]["StartLimitIntervalSec"] == "0"
     assert int(service["RestartSec"]) < int(service["RestartMaxDelaySec"]) <= 60
 
 
-@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+@pytest.mark.skipif(
+    shutil.which("systemd-analyze") is None, reason="no systemd-analyze here"
+)
 def test_systemd_finds_the_unit_little_exposed():
-    command = ["systemd-analyze", "security", "--offline=true", "--threshold=25", str(UNIT)]
+    command = [
+        "systemd-analyze",
+        "security",
+        "--offline=true",
+        "--threshold=25",
+        str(UNIT),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-500:]

@@ -61,7 +61,9 @@ def test_a_name_in_the_abstract_namespace(clock):
     ],
 )
 def test_nobody_watches(manager, clock, environment):
-    notifier = Notifier({**environment, "NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
+    notifier = Notifier(
+        {**environment, "NOTIFY_SOCKET": manager.getsockname()}, now=clock.now
+    )
     notifier.alive()
     clock.sleep_until(1100.0)
     notifier.alive()
@@ -79,7 +81,9 @@ def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
     assert opened == []
 
 
-def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(tmp_path, clock):
+def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
+    tmp_path, clock
+):
     address = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "2000000"}
     notifier = Notifier(environment, now=clock.now)

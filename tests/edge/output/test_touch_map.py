@@ -1,4 +1,5 @@
-"""Several contacts at once, each with its own decisions and its place; the map of them."""
+"""Several contacts at once, each with its own decisions and its place; the map of
+them."""
 
 import json
 import os
@@ -24,7 +25,8 @@ FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release
 
 
 def follow(tracks, pictures, t=0.0):
-    """Pushes pictures of text ('#' 100 counts, '+' 15, '.' none); contacts after each."""
+    """Pushes pictures of text ('#' 100 counts, '+' 15, '.' none); contacts after
+    each."""
     out = []
     for i, picture in enumerate(pictures):
         counts = np.zeros(FLAT.shape, dtype=np.uint16)
@@ -43,7 +45,11 @@ FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
     ("pictures", "areas", "ended"),
     [
         # Two regions are two contacts, also where the later one is larger.
-        (["##", "##", *["##....####"] * 2, "#.....####"], [[2, 2, 2, 2, 1], [4, 4, 4]], [0, 0]),
+        (
+            ["##", "##", *["##....####"] * 2, "#.....####"],
+            [[2, 2, 2, 2, 1], [4, 4, 4]],
+            [0, 0],
+        ),
         # A region that moves by its width goes on.
         (["#", "#", ".#", "..#", "..#"], [[1] * 5], [0]),
         # Where two grow into one, the older goes on and the other ends.
@@ -57,7 +63,11 @@ FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
         # A region below the onset count begins nothing.
         (["++", "++", "++"], [], []),
         # A contact ends by itself while another goes on.
-        ([*["#....##"] * 2, *[".....##"] * 5], [[2] * 7, [1, 1, 0, 0, 0, 0, 0]], [0, 1]),
+        (
+            [*["#....##"] * 2, *[".....##"] * 5],
+            [[2] * 7, [1, 1, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
         # A skin that flickers has no more than so many contacts.
         ([FLICKER] * 3, [[1] * 3] * MAX_CONTACTS, [0] * MAX_CONTACTS),
     ],
@@ -69,13 +79,15 @@ def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
 
 
 def test_a_single_contact_is_followed_as_by_the_largest_region():
-    """One code for onset, series and decision: the same events but for number and place."""
+    """One code for onset, series and decision: the same events but for number and
+    place."""
     model = Model(demo.MODEL)
     for path in demo.recordings():
         recording = load(path)
         alone, several = Classifier(model), Classifier(model, max_contacts=8)
         expected, seen = (
-            [e.to_dict() for f in recording for e in w.push(f)] for w in (alone, several)
+            [e.to_dict() for f in recording for e in w.push(f)]
+            for w in (alone, several)
         )
         number = next(e["contact"] for e in seen if e["event"] == "decision")
         mine = [e for e in seen if e["contact"] == number]
@@ -83,20 +95,24 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
 
 
 def strip(event):
-    return {k: v for k, v in event.items() if k not in ("contact", "place", "latency_ms")}
+    return {
+        k: v for k, v in event.items() if k not in ("contact", "place", "latency_ms")
+    }
 
 
 @pytest.fixture(scope="module")
 def both():
     """Two of the demo's touches on one skin, half a turn and 0.32 s apart."""
-    a, b = (load(demo.FOLDER / f"cardboard-box-{how}.npz") for how in ("fixed", "movable"))
+    a, b = (
+        load(demo.FOLDER / f"cardboard-box-{how}.npz") for how in ("fixed", "movable")
+    )
     late = 8  # at 25 Hz
     n = min(len(a.t), len(b.t)) + late
     frames = np.zeros((n, *a.frames.shape[1:]), dtype=np.uint16)
     frames[: len(a.t)] = np.where(a.frames > 60, a.frames, 0)[:n]
-    frames[late : late + len(b.t)] += np.roll(np.where(b.frames > 60, b.frames, 0), 12, 2)[
-        : n - late
-    ]
+    frames[late : late + len(b.t)] += np.roll(
+        np.where(b.frames > 60, b.frames, 0), 12, 2
+    )[: n - late]
     t = np.arange(n) / 25.0
     joints = np.concatenate([a.joints, np.repeat(a.joints[-1:], n, axis=0)])[:n]
     return replace(a, t=t, frames=frames, joints=joints, meta={**a.meta, "labels": {}})
@@ -118,11 +134,16 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
         "mobility": "fixed",
         "object": "cardboard box",
     }
-    assert second.onset_s - first.onset_s == pytest.approx(0.36, abs=0.02)  # 0.04 their own
+    assert second.onset_s - first.onset_s == pytest.approx(
+        0.36, abs=0.02
+    )  # 0.04 their own
     for touch in touches:
         assert on_the_skin(touch.position, both)
     # Opposite sides of the forearm.
-    assert np.linalg.norm(np.subtract(first.position, second.position)) > both.layout.radius_m
+    assert (
+        np.linalg.norm(np.subtract(first.position, second.position))
+        > both.layout.radius_m
+    )
 
 
 def on_the_skin(place, recording):
@@ -182,7 +203,11 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     first, second = TouchMap(path)
     assert first == second
     assert first.position == (0.1, 0.2, 0.3)
-    assert first.labels == {"mobility": "fixed", "category": "category", "object": "object"}
+    assert first.labels == {
+        "mobility": "fixed",
+        "category": "category",
+        "object": "object",
+    }
     assert "\n\n" not in path.read_text()
 
 
@@ -191,7 +216,10 @@ ANOTHER = json.dumps({"event": "map", "frame": "another", "unit": "metre", "task
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
-    [("what I did today", "not a map"), (ANOTHER, "in the frame another .* keep a map for each")],
+    [
+        ("what I did today", "not a map"),
+        (ANOTHER, "in the frame another .* keep a map for each"),
+    ],
 )
 def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sentence):
     path = tmp_path / "notes.txt"
@@ -201,8 +229,12 @@ def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sen
     assert path.read_text() == text + "\n"
 
 
-@pytest.mark.parametrize("left", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n'])
-def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(tmp_path, left):
+@pytest.mark.parametrize(
+    "left", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n']
+)
+def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(
+    tmp_path, left
+):
     path = tmp_path / "map.jsonl"
     path.write_text(left)
     write(path, Model(demo.MODEL).info, [])
@@ -210,7 +242,8 @@ def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(tmp
 
 
 def test_a_full_disk_costs_lines_and_not_decisions():
-    """/dev/full answers each write as a full disk does; here it stands behind a map's writer."""
+    """/dev/full answers each write as a full disk does; here it stands behind a map's
+    writer."""
     with open("/dev/full", "wb", buffering=0) as full:
         writer = touchmap.LineWriter("map", full.write)
         writer.put({})

@@ -32,7 +32,10 @@ def test_the_whole_range_fits():
 def test_it_follows_valid_taxels_by_no_more_than_its_rate_up_to_its_limit():
     baseline = Baseline([1000] * 4, step_counts=0.25, limit=50)
     valid = np.array([True, True, True, False])
-    for frames, expected in ((100, [1025, 975, 1010, 1000]), (1000, [1050, 950, 1010, 1000])):
+    for frames, expected in (
+        (100, [1025, 975, 1010, 1000]),
+        (1000, [1050, 950, 1010, 1000]),
+    ):
         for _ in range(frames):
             baseline.follow(raw(3000, 0, 1010, 1200), valid)
         assert baseline.counts.tolist() == expected

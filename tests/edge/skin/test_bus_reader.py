@@ -1,4 +1,5 @@
-"""The skin meets the faults of its buses (`python -m tests.faults` plays all of them)."""
+"""The skin meets the faults of its buses (`python -m tests.faults` plays all of
+them)."""
 
 import errno
 import math
@@ -47,12 +48,17 @@ def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_rep
 ):
     for resets in (REPEATED[:1], REPEATED[:3]):
         lasts = {"seconds": (resets[-1] + 60) / SKINS[name].reading.rate_hz}
-        outcome = run(name, SKINS[name], resets=resets, overhead_s=overhead_us * 1e-6, **lasts)
+        outcome = run(
+            name, SKINS[name], resets=resets, overhead_s=overhead_us * 1e-6, **lasts
+        )
         assert outcome.wrong == 0
         assert outcome.back_s <= BACK_S
 
 
-EVERY = {"frame": {"cody": 193, "one bus": 193}, "set-up": {"cody": 401, "one bus": 401}}
+EVERY = {
+    "frame": {"cody": 193, "one bus": 193},
+    "set-up": {"cody": 401, "one bus": 401},
+}
 """Only one position in so many is tried, another for each kind."""
 
 
@@ -124,7 +130,9 @@ def test_a_damaged_stage_register_is_found_by_reading_the_stages_in_turn(running
     assert model.registers[0x81] == 0x1FFF
 
 
-def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then(running):
+def test_a_chip_that_keeps_its_settings_but_converts_nothing_is_set_up_again_now_and_then(
+    running,
+):
     skin, model, slot = running
     model._sense = lambda t: np.zeros(12, dtype=np.uint16)
     set_up_in = []
@@ -140,13 +148,17 @@ def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_sta
     refused = [Fault(code=errno.EOPNOTSUPP)]
     buses = faulty_buses(CODY, lambda t: QUIET, clock, faults=refused)
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
-        BusReader(buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12, CODY.reading).start()
+        BusReader(
+            buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12, CODY.reading
+        ).start()
 
 
 def changes(skin, seconds):
     """Time and status of each chip whose state changes."""
     frames = Loop(skin, lasts_s=seconds).frames()
-    return [(round(frame.t, 3), status) for frame in frames for status in skin.changes()]
+    return [
+        (round(frame.t, 3), status) for frame in frames for status in skin.changes()
+    ]
 
 
 def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
@@ -160,7 +172,8 @@ def test_the_user_hears_of_a_chip_that_fails_and_comes_back():
 
 
 def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
-    """A loose wire, ten times a second: the user hears of it less than seven times a second."""
+    """A loose wire, ten times a second: the user hears of it less than seven times a
+    second."""
     chip = {"bus": CODY.buses[1].device, "channel": 1, "address": 0x2E}
     loose = [Fault(**chip, during=(0.1 * k, 0.1 * k + 0.05)) for k in range(1, 31)]
     with faulty_skin(CODY, lambda t: QUIET, faults=loose) as skin:
@@ -170,13 +183,17 @@ def test_a_chip_that_fails_again_and_again_is_tried_every_0_3_s():
 
 
 def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
-    """An adapter that carries reads of at most 16 bytes: the registers, but not 12 taxels."""
+    """An adapter that carries reads of at most 16 bytes: the registers, but not 12
+    taxels."""
     with faulty_skin(CODY, lambda t: QUIET) as skin:
         chip, bus = skin.readers[1].slots[5].chip, skin.readers[1].bus
         transfer = bus.transfer
 
         def limited(prepared):
-            if len(prepared.buffer) > 16 and prepared.messages[0].address == chip.address:
+            if (
+                len(prepared.buffer) > 16
+                and prepared.messages[0].address == chip.address
+            ):
                 raise bus_error(errno.EIO, bus.name)
             transfer(prepared)
 
@@ -187,7 +204,8 @@ def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
 
 
 def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_heard():
-    """As an adapter that is unplugged for ten seconds: the kernel wants its device closed."""
+    """As an adapter that is unplugged for ten seconds: the kernel wants its device
+    closed."""
     name = CODY.buses[1].device
     gone = Fault(code=errno.EIO, bus=name, during=(0.1, 10.0))
     opened, heard = [], []
@@ -207,7 +225,8 @@ def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_hea
 
 
 def test_a_chip_that_another_program_kept_half_set_up_is_back_in_half_a_second():
-    """The mux turned away during its set-up, whose rows were read back from another chip."""
+    """The mux turned away during its set-up, whose rows were read back from another
+    chip."""
     fault, at = KINDS["another program's mux channel"], {"first": 609, "every": 1000}
     outcome = sweep("", SKINS["one bus"], fault, set_up=True, overhead_s=100e-6, **at)
     assert (outcome.met, outcome.missing, outcome.wrong) == (1, 48, 0)

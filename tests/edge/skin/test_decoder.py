@@ -39,7 +39,9 @@ def test_chips_of_different_kinds_make_one_skin():
     file = replace(
         CODY,
         buses=(
-            BusSpec("a", (ad, replace(mpr, kind=mpr121.KIND, options={}, address=0x5B))),
+            BusSpec(
+                "a", (ad, replace(mpr, kind=mpr121.KIND, options={}, address=0x5B))
+            ),
             BusSpec("b", (served(t for chip in mcu for t in chip.taxels),)),
         ),
     )
@@ -52,11 +54,16 @@ def test_chips_of_different_kinds_make_one_skin():
 @pytest.mark.parametrize(
     ("raw", "valid"), [(1, True), (52_946, True), (52_947, False), (0xFFFF, False)]
 )
-def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign, raw, valid):
-    """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are beyond."""
+def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(
+    sign, raw, valid
+):
+    """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are
+    beyond."""
     signal = replace(CODY.signal, saturation_counts=30_000)
     bus = replace(CODY.buses[0], chips=(replace(CODY.chips[0], sign=sign),))
-    file = replace(CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100))
+    file = replace(
+        CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100)
+    )
     with still(file) as skin:
         [reader] = skin.readers
         [slot], before = reader.slots, reader.bus.transactions
@@ -68,7 +75,8 @@ def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(sign
         slot.chip.read = spoiled
         frame = skin.read()
         skin.read()
-        # Two frames read the chip and its mux once each; every further transaction is a check.
+        # Two frames read the chip and its mux once each; every further transaction is a
+        # check.
         checks = reader.bus.transactions - before - 2 * 2
     assert frame.valid[1, 1] == valid
     assert frame.valid.sum() == 11 + valid
@@ -94,19 +102,25 @@ def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
     file = replace(file, calibration=replace(file.calibration, noise=noise))
     quiet = np.zeros((16, 24), dtype=np.uint16)
     draw = np.random.default_rng(1)
-    with fake_skin(file, lambda t: draw.integers(0, 14, quiet.shape, np.uint16)) as skin:
+    with fake_skin(
+        file, lambda t: draw.integers(0, 14, quiet.shape, np.uint16)
+    ) as skin:
         assert all(frame.valid.all() for frame in Loop(skin, lasts_s=1.5).frames())
     with fake_skin(file, lambda t: quiet) as skin:
         valid = [bool(skin.read().valid.all()) for _ in range(150)]
     assert valid.index(False) == file.reading.stuck_frames
 
 
-@pytest.mark.parametrize(("rest", "valid"), [(1000, False), (7999, False), (8000, True)])
+@pytest.mark.parametrize(
+    ("rest", "valid"), [(1000, False), (7999, False), (8000, True)]
+)
 def test_a_value_further_below_its_baseline_than_any_touch_is_not_valid(rest, valid):
     """By 40000 counts of the file's `saturation_counts` and 2000 of drift."""
 
     def resting_at(counts):
-        calibration = replace(calibrated(CODY).calibration, baseline=np.full((16, 24), counts))
+        calibration = replace(
+            calibrated(CODY).calibration, baseline=np.full((16, 24), counts)
+        )
         return replace(CODY, calibration=calibration)
 
     clock = VirtualClock()

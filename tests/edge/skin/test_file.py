@@ -1,4 +1,5 @@
-"""skin.toml: the shipped files, the sentence for each mistake, and calibration written into it."""
+"""skin.toml: the shipped files, the sentence for each mistake, and calibration written
+into it."""
 
 import math
 from datetime import UTC, datetime
@@ -8,7 +9,12 @@ import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
-from edge.skin.calibration import calibration_text, dead_band, save_calibration, with_calibration
+from edge.skin.calibration import (
+    calibration_text,
+    dead_band,
+    save_calibration,
+    with_calibration,
+)
 from edge.skin.file import TaxelCalibration
 from tests.edge.skin.small import SMALL, mistake
 
@@ -26,13 +32,37 @@ def test_cody_is_384_taxels_on_three_buses():
     ("old", "new", "said"),
     [
         ("rows = 4", "", "skin.rows is missing"),
-        ("rows = 4", "rows = 4\nrwos = 3", "unknown key skin.rwos; allowed: name, rows"),
+        (
+            "rows = 4",
+            "rows = 4\nrwos = 3",
+            "unknown key skin.rwos; allowed: name, rows",
+        ),
         ("sign = -1", "sign = 0", "signal.sign must be one of 1, -1, not 0"),
-        ("sign = -1", "dead = [[4, 0]]", "signal.dead names taxel [4, 0], which lies outside"),
-        ("sign = -1", "dead_band_sigma = -1", "dead_band_sigma must be a number from 0 to 100"),
-        ("sign = -1", "dead_band_sigma = nan", "dead_band_sigma must be a number from 0 to 100"),
-        ("[signal]", "[read]\nrate_hz = 0\n[signal]", "read.rate_hz must be a number from 0.1"),
-        ("[signal]", "[reed]\n[signal]", "unknown key reed; allowed: skin, signal, read, bus, cal"),
+        (
+            "sign = -1",
+            "dead = [[4, 0]]",
+            "signal.dead names taxel [4, 0], which lies outside",
+        ),
+        (
+            "sign = -1",
+            "dead_band_sigma = -1",
+            "dead_band_sigma must be a number from 0 to 100",
+        ),
+        (
+            "sign = -1",
+            "dead_band_sigma = nan",
+            "dead_band_sigma must be a number from 0 to 100",
+        ),
+        (
+            "[signal]",
+            "[read]\nrate_hz = 0\n[signal]",
+            "read.rate_hz must be a number from 0.1",
+        ),
+        (
+            "[signal]",
+            "[reed]\n[signal]",
+            "unknown key reed; allowed: skin, signal, read, bus, cal",
+        ),
         ("[[bus]]", "[bus]", "bus must be a list of tables"),
         ("[skin]", "[skin", "not TOML"),
     ],
@@ -88,7 +118,11 @@ def test_a_calibration_that_cannot_be_replaced_is_refused():
 )  # fmt: skip
 def test_a_damaged_calibration_is_refused(key, row):
     rows = {"baseline": [1] * 6, "noise": [1] * 6, key: row}
-    text = SMALL + "[calibration]\n" + "".join(f"{k} = {[v] * 4}\n" for k, v in rows.items())
+    text = (
+        SMALL
+        + "[calibration]\n"
+        + "".join(f"{k} = {[v] * 4}\n" for k, v in rows.items())
+    )
     assert f"calibration.{key}" in mistake(text)
 
 
@@ -96,7 +130,10 @@ def test_a_calibration_above_what_its_chips_tell_is_refused():
     """An MPR121 tells 10 bits, of which 1023 is saturated."""
     pad = skinfile.shipped("mpr121").read_text()
     highest = [[1022] * 12] * 8
-    for added, said in ((0, ""), (1, "calibration.baseline is 1023 for a taxel of a mpr121")):
+    for added, said in (
+        (0, ""),
+        (1, "calibration.baseline is 1023 for a taxel of a mpr121"),
+    ):
         highest = [[value + added for value in row] for row in highest]
         text = pad + f"[calibration]\nbaseline = {highest}\nnoise = {highest}\n"
         assert said in mistake(text) if said else skinfile.parse(text).calibration
@@ -108,7 +145,10 @@ def test_saving_a_calibration_keeps_the_old_file_and_leaves_a_wrong_one_alone(tm
     path.write_text(wrong)
     with pytest.raises(InputError):
         save_calibration(path, calibration())
-    assert ([p.name for p in tmp_path.iterdir()], path.read_text()) == (["skin.toml"], wrong)
+    assert ([p.name for p in tmp_path.iterdir()], path.read_text()) == (
+        ["skin.toml"],
+        wrong,
+    )
     path.write_text(SMALL)
     backup = save_calibration(path, calibration(3))
     assert backup.read_text() == SMALL

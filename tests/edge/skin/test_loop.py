@@ -58,7 +58,9 @@ def test_a_loop_ends_with_its_time_or_when_asked_after_the_frame_at_hand():
 
 def test_garbage_collection_leaves_out_the_objects_made_before_the_loop():
     with still(CODY) as skin:
-        frozen = [gc.get_freeze_count() > 10_000 for _ in Loop(skin, lasts_s=0.02).frames()]
+        frozen = [
+            gc.get_freeze_count() > 10_000 for _ in Loop(skin, lasts_s=0.02).frames()
+        ]
     assert (frozen, gc.get_freeze_count()) == ([True, True], 0)
 
 

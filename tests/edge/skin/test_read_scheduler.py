@@ -1,4 +1,5 @@
-"""Reading the chips near a contact: the choice, and its difference from reading every chip."""
+"""Reading the chips near a contact: the choice, and its difference from reading every
+chip."""
 
 from dataclasses import replace
 
@@ -45,10 +46,14 @@ def test_while_nothing_touches_13_chips_come_in_turn(scheduler):
         assert set.union(*read[k : k + 3]) == set(range(32))
 
 
-# Row 3 is the last of its chip: the next chip, one taxel away, belongs to the neighbourhood.
+# Row 3 is the last of its chip: the next chip, one taxel away, belongs to the
+# neighbourhood.
 @pytest.mark.parametrize(
     ("contact", "neighbour"),
-    [pytest.param((3, 4), (4, 4), id="next chip"), pytest.param((8, 0), (8, 23), id="seam")],
+    [
+        pytest.param((3, 4), (4, 4), id="next chip"),
+        pytest.param((8, 0), (8, 23), id="seam"),
+    ],
 )
 def test_chips_near_a_contact_are_read_in_every_frame(scheduler, contact, neighbour):
     near = chips_at(contact, neighbour)
@@ -82,7 +87,8 @@ def test_a_wire_too_slow_for_one_chip_still_reads_one():
 
 
 def test_every_plan_fits_the_period():
-    """Timed by the bits on the wire, mux and settings' checks included, no tick is late."""
+    """Timed by the bits on the wire, mux and settings' checks included, no tick is
+    late."""
     draw = np.random.default_rng(0)
     patches = np.zeros((40, 16, 24), dtype=np.uint16)
     for patch in patches:
@@ -99,7 +105,9 @@ def test_every_plan_fits_the_period():
 def test_a_taxel_keeps_its_value_and_its_own_time_until_it_is_read_again():
     flat = np.full((16, 24), 700, dtype=np.uint16)
     quiet = np.zeros((16, 24), dtype=np.uint16)
-    with fake_skin(SCHEDULED, lambda t: flat if t < 0.05 else quiet, timed=True) as skin:
+    with fake_skin(
+        SCHEDULED, lambda t: flat if t < 0.05 else quiet, timed=True
+    ) as skin:
         for frame in Loop(skin, lasts_s=0.12).frames():
             # A taxel's value was felt at its own time, a conversion ago at most.
             old = frame.valid & (frame.counts == 700)
@@ -118,13 +126,20 @@ def test_masks_grow_across_the_seam_only_where_there_is_one():
 
 
 def felt(file, recording, info):
-    """The features of the first contact, and its onset in seconds; no tick is left out."""
+    """The features of the first contact, and its onset in seconds; no tick is left
+    out."""
     playback = Playback(recording)
-    tracker = ContactTracker(recording.layout, chain=info.chain, horizon_s=info.window_s)
-    with fake_skin(replace(file, layout=recording.layout), playback, timed=True) as skin:
+    tracker = ContactTracker(
+        recording.layout, chain=info.chain, horizon_s=info.window_s
+    )
+    with fake_skin(
+        replace(file, layout=recording.layout), playback, timed=True
+    ) as skin:
         playback.start = skin.clock.now()
         loop = Loop(skin, lasts_s=playback.ends, joints=playback)
-        contacts = [contact for frame in loop.frames() for contact in tracker.push(frame)]
+        contacts = [
+            contact for frame in loop.frames() for contact in tracker.push(frame)
+        ]
     assert loop.schedule.missed_ticks == 0
     vector = feature_vector(contacts[0].series(), info.window_s)
     return vector, contacts[0].onset_s - playback.start
@@ -133,14 +148,17 @@ def felt(file, recording, info):
 @pytest.mark.parametrize("name", ["hard_0", "soft_2"])
 def test_features_and_decisions_agree_with_full_reading(recordings, model, name):
     trial = load(recordings / f"{name}.npz")
-    (full, full_onset_s), (near, onset_s) = (felt(f, trial, model.info) for f in (CODY, SCHEDULED))
+    (full, full_onset_s), (near, onset_s) = (
+        felt(f, trial, model.info) for f in (CODY, SCHEDULED)
+    )
     # While nothing touches, all chips are read once in three frames.
     assert abs(onset_s - full_onset_s) < 0.03
     force, area, motion = (
-        np.abs(near - full).reshape(3, -1) / np.ptp(full.reshape(3, -1), axis=1)[:, None]
+        np.abs(near - full).reshape(3, -1)
+        / np.ptp(full.reshape(3, -1), axis=1)[:, None]
     )
-    # With an onset as late as that, force and motion are within 5 % of their range. Area rises in
-    # steps, which may come 10 ms early or late.
+    # With an onset as late as that, force and motion are within 5 % of their range.
+    # Area rises in steps, which may come 10 ms early or late.
     assert max(force.mean(), motion.mean()) < 0.025
     assert area.mean() < 0.05
     labels = [{t: d.label for t, d in model.decide(v).items()} for v in (full, near)]

@@ -43,7 +43,8 @@ def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
     + [(mpr121.KIND, n, hz) for n, hz in ((1, 49.8), (4, 199.2))],
 )
 def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
-    """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32 MPR121."""
+    """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32
+    MPR121."""
     bits = frame_bits(on_buses(buses, kind=kind))
     assert abs(skinfile.frame_rate(bits, [400_000] * buses) - hz) <= 0.0501
 
@@ -62,7 +63,9 @@ def test_every_taxel_is_where_the_file_says(file):
     with fake_skin(file, lambda t: picture) as skin:
         frame = skin.read()
     assert frame.valid.all()
-    np.testing.assert_array_equal(frame.counts, np.where(picture < max(floor, 1), 0, picture))
+    np.testing.assert_array_equal(
+        frame.counts, np.where(picture < max(floor, 1), 0, picture)
+    )
 
 
 def test_buses_are_read_side_by_side_each_in_a_thread(monkeypatch):
@@ -71,12 +74,15 @@ def test_buses_are_read_side_by_side_each_in_a_thread(monkeypatch):
         together = threading.Barrier(3, timeout=30.0)
         for reader in skin.readers:
             chip = reader.slots[4].chip
-            monkeypatch.setattr(chip, "read", lambda r=chip.read: (together.wait(), r()))
+            monkeypatch.setattr(
+                chip, "read", lambda r=chip.read: (together.wait(), r())
+            )
         assert skin.read().valid.all()
 
 
 def test_a_frame_is_a_rolling_shutter_and_says_so():
-    """On one bus at 400 kHz the last chip is read 20 ms after the first, in wire order."""
+    """On one bus at 400 kHz the last chip is read 20 ms after the first, in wire
+    order."""
     file = on_buses(1)
     with fake_skin(file, lambda t: PICTURE, timed=True) as skin:
         frame = skin.read()
@@ -90,10 +96,13 @@ def test_a_frame_is_a_rolling_shutter_and_says_so():
 
 
 def test_the_baseline_follows_drift_until_something_touches():
-    """15 counts a second of drift, then a contact on top of it, held for two seconds."""
+    """15 counts a second of drift, then a contact on top of it, held for two
+    seconds."""
     contact = np.zeros((16, 24), dtype=np.uint16)
     contact[4:8, 5:9] = 3000
-    with fake_skin(CODY, lambda t: np.uint16(15.0 * t) + contact * (4.0 <= t < 6.0)) as skin:
+    with fake_skin(
+        CODY, lambda t: np.uint16(15.0 * t) + contact * (4.0 <= t < 6.0)
+    ) as skin:
         frames = list(Loop(skin, lasts_s=6.5).frames())
     quiet = [int(frame.counts.max()) for frame in frames if frame.t < 4.0]
     held = [int(frame.counts[5, 6]) for frame in frames if 4.0 <= frame.t < 6.0]
@@ -117,7 +126,12 @@ def test_a_skin_without_a_single_chip_says_so():
     clock, file = VirtualClock(), calibrated(PAD)
     buses = faulty_buses(file, lambda t: PICTURE, clock, faults=[Fault()])
     skin = Skin(file, buses, clock=clock)
-    with skin, pytest.raises(EdgeError, match="no chip of the skin 'mpr121 pad' answers: /dev/i2c"):
+    with (
+        skin,
+        pytest.raises(
+            EdgeError, match="no chip of the skin 'mpr121 pad' answers: /dev/i2c"
+        ),
+    ):
         skin.start()
 
 
@@ -136,7 +150,9 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
         raise BusMissing("no such bus")
 
     monkeypatch.setattr("edge.skin.skin._open", absent)
-    with pytest.raises(InputError, match="has no calibration; run `edge-classify calibrate"):
+    with pytest.raises(
+        InputError, match="has no calibration; run `edge-classify calibrate"
+    ):
         Skin.open(CODY)
     for file, wanted in ((CODY, False), (calibrated(CODY), True)):
         with pytest.raises(BusMissing):
@@ -144,7 +160,8 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
 
 
 def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
-    """A microcontroller serves one frame for 1.5 s, while its bus and its CRC are intact."""
+    """A microcontroller serves one frame for 1.5 s, while its bus and its CRC are
+    intact."""
     file = SKINS["block"]
     hangs = Fault("hold", bus=file.buses[1].device, during=(0.1, 1.6))
     heard = []
@@ -153,7 +170,10 @@ def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():
             silent = skin.silent_changes()
             heard += [] if silent is None else [(round(frame.t, 2), silent)]
     hung_s = (UNCHANGED_FRAMES + SILENT_FRAMES) * 0.01
-    assert heard == [(pytest.approx(0.1 + hung_s, abs=0.021), 128), (pytest.approx(1.6), 0)]
+    assert heard == [
+        (pytest.approx(0.1 + hung_s, abs=0.021), 128),
+        (pytest.approx(1.6), 0),
+    ]
 
 
 def test_dead_taxels_are_not_silent():

@@ -12,7 +12,12 @@ from tests.edge.skin.small import SMALL, mistake, one_chip
 def test_first_and_block_number_the_stages_row_by_row():
     chip = skinfile.parse(SMALL).buses[0].chips[1]
     assert chip.taxels == (3, 4, 5, 9, 10, 11, 15, 16, 17, 21, 22, 23)
-    assert (chip.kind.name, chip.mux, chip.channel, chip.address) == ("ad7147", 0x70, 0, 0x2D)
+    assert (chip.kind.name, chip.mux, chip.channel, chip.address) == (
+        "ad7147",
+        0x70,
+        0,
+        0x2D,
+    )
 
 
 def test_taxels_name_each_stage_and_an_empty_one_is_none():
@@ -29,23 +34,67 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rows = 4", "rows = 0", "skin.rows must be a whole number from 1 to 1024, not 0"),
+        (
+            "rows = 4",
+            "rows = 0",
+            "skin.rows must be a whole number from 1 to 1024, not 0",
+        ),
         ("device = 1", "", "bus 0: device must be the number of a bus or its path"),
-        ("device = 1", "device = 1\nclock_hz = 1000000", "a TCA9548A carries at most 400000"),
+        (
+            "device = 1",
+            "device = 1\nclock_hz = 1000000",
+            "a TCA9548A carries at most 400000",
+        ),
         ('kind = "ad7147"', 'kind = "adxl"', "bus 0: kind must be one of ad7147"),
         ("mux = 0x70", "mux = 0x60", "bus 0 chip 0: mux must be 0x70 to 0x77, not 96"),
         ("mux = 0x70", "", "bus 0 chip 0: channel needs mux"),
-        ("channel = 0, address = 0x2D", "channel = 8, address = 0x2D", "channel must be a whole"),
-        ("address = 0x2D", "address = 0x2C", "bus 0 chip 1 has the same address as chip 0"),
-        ("address = 0x2D", "address = 0x5A", "bus 0 chip 1: address must be 0x2c to 0x2f, not 90"),
+        (
+            "channel = 0, address = 0x2D",
+            "channel = 8, address = 0x2D",
+            "channel must be a whole",
+        ),
+        (
+            "address = 0x2D",
+            "address = 0x2C",
+            "bus 0 chip 1 has the same address as chip 0",
+        ),
+        (
+            "address = 0x2D",
+            "address = 0x5A",
+            "bus 0 chip 1: address must be 0x2c to 0x2f, not 90",
+        ),
         ("address = 0x2D, ", "", "bus 0 chip 1: address is missing"),
-        ("first = [0, 3]", "first = [0, 2]", "taxel [0, 2] belongs to bus 0 chip 0 already"),
-        ("first = [0, 3]", "first = [0, 4]", "first names taxel [0, 6], which lies outside"),
-        ("first = [0, 3]", "first = 3", "bus 0 chip 1: first must be [row, col], not 3"),
-        ("block = [4, 3]", "block = [4, 2]", "names 8 taxels, but an AD7147 has 12 stages"),
+        (
+            "first = [0, 3]",
+            "first = [0, 2]",
+            "taxel [0, 2] belongs to bus 0 chip 0 already",
+        ),
+        (
+            "first = [0, 3]",
+            "first = [0, 4]",
+            "first names taxel [0, 6], which lies outside",
+        ),
+        (
+            "first = [0, 3]",
+            "first = 3",
+            "bus 0 chip 1: first must be [row, col], not 3",
+        ),
+        (
+            "block = [4, 3]",
+            "block = [4, 2]",
+            "names 8 taxels, but an AD7147 has 12 stages",
+        ),
         ("chips = [", "chip = [", "bus 0: chips must be a list of tables, not []"),
-        ("device = 1", 'device = "a\\u0000b"', "device must be the number of a bus or its path"),
-        ("device = 1", "device = 1\nclock_hz = 999", "clock_hz must be a whole number from 1000"),
+        (
+            "device = 1",
+            'device = "a\\u0000b"',
+            "device must be the number of a bus or its path",
+        ),
+        (
+            "device = 1",
+            "device = 1\nclock_hz = 999",
+            "clock_hz must be a whole number from 1000",
+        ),
     ],
 )
 def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
@@ -72,15 +121,31 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("serial =", "device =", 'is a serial port, not an I2C bus; write serial = "/dev/ttyACM0"'),
+        (
+            "serial =",
+            "device =",
+            'is a serial port, not an I2C bus; write serial = "/dev/ttyACM0"',
+        ),
         ('serial = "/dev/ttyACM0"', 'device = "COM3"', "COM3 is a serial port"),
         ("[[bus]]", "[[bus]]\ndevice = 1", "give it or serial, not both"),
         ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block only"),
-        ('"block"', '"microcontroller"', "(a microcontroller that serves frames), not 'micro"),
+        (
+            '"block"',
+            '"microcontroller"',
+            "(a microcontroller that serves frames), not 'micro",
+        ),
         # An unknown kind is named before chips that are missing.
         (SERIAL[SERIAL.index('"block"') :], '"toy"', "kind must be one of"),
-        ("= [{", "= [{ first = [0, 0], block = [1, 1] }, {", "has 2; a serial port has one"),
-        ("[{ first", "[{ address = 8, first", "address has no meaning on a serial port"),
+        (
+            "= [{",
+            "= [{ first = [0, 0], block = [1, 1] }, {",
+            "has 2; a serial port has one",
+        ),
+        (
+            "[{ first",
+            "[{ address = 8, first",
+            "address has no meaning on a serial port",
+        ),
     ],
 )
 def test_a_mistake_about_a_serial_port_is_one_sentence(old, new, said):

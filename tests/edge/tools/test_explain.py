@@ -1,4 +1,5 @@
-"""`edge-classify explain`: the nearest trials by name, the features' pulls, the least changes."""
+"""`edge-classify explain`: the nearest trials by name, the features' pulls, the least
+changes."""
 
 from dataclasses import replace
 
@@ -10,7 +11,9 @@ from edge.tools.explain import text
 
 
 def test_a_program_gets_the_trials_by_name_and_the_parts(edge, exported, recordings):
-    status, lines, _ = edge("explain", exported / "model.onnx", recordings / "hard_0.npz")
+    status, lines, _ = edge(
+        "explain", exported / "model.onnx", recordings / "hard_0.npz"
+    )
     assert status == 0
     assert [line["task"] for line in lines] == ["category", "object"]
     category = lines[0]
@@ -31,7 +34,8 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
     assert "category: soft-fixed, by " in out
     assert "  soft_1: soft-fixed\n" in out
     assert (
-        ": rigid-fixed\n  Features for (+) and against (-) soft-fixed, compared with rigid-" in out
+        ": rigid-fixed\n  Features for (+) and against (-) soft-fixed, compared with rigid-"
+        in out
     )
     assert "  It would be rigid-fixed if " in out
     assert max(map(len, out.splitlines()[1:])) <= 80
@@ -47,7 +51,13 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
 )
 def test_a_change_is_a_sentence(mean, unit, sentence):
     change = {"feature": "area", "label": "soft", "size": 2.0, "mean": mean}
-    line = {"task": "t", "label": "hard", "confidence": 1.0, "nearest": [], "rival": None}
+    line = {
+        "task": "t",
+        "label": "hard",
+        "confidence": 1.0,
+        "nearest": [],
+        "rival": None,
+    }
     info = replace(Model(demo.MODEL).info, units={"area": unit})
     assert text({**line, "changes": [change]}, info).endswith(f"  {sentence}")
 

@@ -21,24 +21,31 @@ BY_HAND = Space(
     rows=np.array([[2.0, 0.0], [-2.0, 0.0]]),
     labels=np.array([0, 1]),
 )
-"""Two trials, of a force with two samples and of an area, which stand on either side of a mean."""
+"""Two trials, of a force with two samples and of an area, which stand on either side of
+a mean."""
 
 
 def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
-    why = explain(BY_HAND, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    why = explain(
+        BY_HAND, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1]
+    )
     # z = (0.5 + 1, 0.5); to (2, 0): 0.25 + 0.25 = |z|^2 + |b|^2 - 6 = 2.5 + 4 - 6.
     assert why.voters == (Near(0, 0, np.sqrt(0.5), {"force": 6.0, "area": 0.0}),)
     assert why.rival == Near(1, 1, np.sqrt(12.5), {"force": -6.0, "area": 0.0})
     assert why.pulls == {"force": 12.0, "area": 0.0}
-    # The trials are equally near at z = 0 in force, so that each sample falls by 1.5 units; a fifth
-    # more makes the other one nearer, as of equal ones the earlier counts.
+    # The trials are equally near at z = 0 in force, so that each sample falls by 1.5
+    # units; a fifth more makes the other one nearer, as of equal ones the earlier
+    # counts.
     assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
 
 
 def test_the_feature_that_has_to_change_least_comes_first():
-    # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples, or 3.5.
+    # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples,
+    # or 3.5.
     space = BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]]))
-    why = explain(space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1])
+    why = explain(
+        space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1]
+    )
     assert [change.feature for change in why.changes] == ["force", "area"]
 
 
@@ -53,8 +60,9 @@ def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
     )
     names = ["still", "across", "quick", "slow"]
     why = explain(space, np.zeros(4), [0], 0, names, [1] * 4)
-    # The nearest other trial is as near where the first coordinate is 1; a fifth more makes it
-    # nearer. Across, a trial of the answer lies in between for up to four times as much.
+    # The nearest other trial is as near where the first coordinate is 1; a fifth more
+    # makes it nearer. Across, a trial of the answer lies in between for up to four
+    # times as much.
     assert why.changes == tuple(
         Change(name, 1, pytest.approx(size), pytest.approx(size))
         for name, size in (("quick", 2.4), ("across", 4.0), ("slow", 4.8))
@@ -69,7 +77,8 @@ VOTES = Space(
     rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [5.0], [np.inf]]),
     labels=np.array([1, 0, 0, 1, 0, -1]),
 )
-"""The first three trials vote at 0, one for label 1 and two for label 0. The last has no label."""
+"""The first three trials vote at 0, one for label 1 and two for label 0. The last has
+no label."""
 
 
 @pytest.mark.parametrize("outvoted", [-1.0, -2.5], ids=["the nearest", "the farthest"])
@@ -93,7 +102,8 @@ def test_a_trial_on_the_way_makes_the_least_change_smaller():
 
 
 def test_an_answer_that_its_votes_do_not_give_has_no_change():
-    """Tasks that are decided together may give it; a label of its votes would be no change."""
+    """Tasks that are decided together may give it; a label of its votes would be no
+    change."""
     assert explain(VOTES, np.zeros(1), [0, 1, 2], 1, ["force"], [1]).changes == ()
 
 
@@ -103,14 +113,20 @@ def test_a_trial_without_a_label_is_no_rival():
 
 
 def why_of(model, task, vector, decision):
-    """The explanation of a model's decision, and the distances of the trials that voted."""
-    rows, label = decision.neighbours.tolist(), model.info.tasks[task].labels.index(decision.label)
+    """The explanation of a model's decision, and the distances of the trials that
+    voted."""
+    rows, label = (
+        decision.neighbours.tolist(),
+        model.info.tasks[task].labels.index(decision.label),
+    )
     named = (model.info.features, model.info.widths)
     why = explain(Space.of(model, task), vector, rows, label, *named)
     return why, [near.distance for near in why.voters]
 
 
-def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(model, tmp_path):
+def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
+    model, tmp_path
+):
     """Three decision points; one task takes one feature, the other lacks labels."""
     info = replace(model.info, decision_points_s=(0.3, 0.6, 1.2))
     choices = {
@@ -120,7 +136,10 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(mo
     rng = np.random.default_rng(0)
     X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
     vectors[-1] *= 1e3  # beyond the reach of features and coordinates
-    y = {"of_area": np.array(["a", "b", "c"] * 20), "partial": np.array(["d", "e", "", "d"] * 15)}
+    y = {
+        "of_area": np.array(["a", "b", "c"] * 20),
+        "partial": np.array(["d", "e", "", "d"] * 15),
+    }
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range
     for name, task in model.info.tasks.items():
@@ -134,8 +153,12 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(mo
 
 def test_without_another_label_there_is_no_rival():
     space = BY_HAND._replace(labels=np.array([0, 0]))
-    why = explain(space, np.array([11.0, 12.0, 0.25]), [1], 0, ["force", "area"], [2, 1])
-    assert why == Explanation((Near(1, 0, np.sqrt(12.5), {"force": -6.0, "area": 0.0}),))
+    why = explain(
+        space, np.array([11.0, 12.0, 0.25]), [1], 0, ["force", "area"], [2, 1]
+    )
+    assert why == Explanation(
+        (Near(1, 0, np.sqrt(12.5), {"force": -6.0, "area": 0.0}),)
+    )
 
 
 @pytest.mark.parametrize("name", ["golden", "exported"])
@@ -147,11 +170,18 @@ def test_the_parts_add_up_to_the_graphs_distances(name, exported):
         space = Space.of(model, task)
         reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
         for i in range(24):
-            rows, label = golden[f"{task}_neighbours"][i], int(golden[f"{task}_label"][i])
+            rows, label = (
+                golden[f"{task}_neighbours"][i],
+                int(golden[f"{task}_label"][i]),
+            )
             vector = golden["vectors"][i]
-            why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
+            why = explain(
+                space, vector, rows.tolist(), label, info.features, info.widths
+            )
             z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
-            for near, distance in zip(why.voters, golden[f"{task}_distances"][i], strict=True):
+            for near, distance in zip(
+                why.voters, golden[f"{task}_distances"][i], strict=True
+            ):
                 parts = z @ z + space.rows[near.row] @ space.rows[near.row]
                 assert near.distance == pytest.approx(distance, abs=1e-5 * reach)
                 assert parts - sum(near.pulls.values()) == pytest.approx(

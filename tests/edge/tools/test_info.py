@@ -35,7 +35,9 @@ def test_two_models_are_compared_by_what_differs(edge, exported, monkeypatch):
     infos = [Model(path).info for path in pair]
     assert changes["rows"] == [info.rows for info in infos]
     assert changes["data_digest"] == [info.data_digest for info in infos]
-    assert changes["tasks.category.labels"] == [list(i.tasks["category"].labels) for i in infos]
+    assert changes["tasks.category.labels"] == [
+        list(i.tasks["category"].labels) for i in infos
+    ]
     assert "window_s" not in changes
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     out = " ".join(edge("info", *pair, text=True)[1].split())

@@ -1,4 +1,5 @@
-"""A robot owner's loop, over the fake: calibrate, record, export, run. No line of code."""
+"""A robot owner's loop, over the fake: calibrate, record, export, run. No line of
+code."""
 
 import shutil
 
@@ -14,7 +15,9 @@ from tests.conftest import PAPER, export
 def skin(tmp_path, forearm):
     """The owner's own skin file: Cody's, with the thresholds of this skin."""
     text = skinfile.shipped("cody").read_text()
-    text = text.replace("threshold_counts = 40", f"threshold_counts = {forearm.threshold_counts}")
+    text = text.replace(
+        "threshold_counts = 40", f"threshold_counts = {forearm.threshold_counts}"
+    )
     text = text.replace("onset_counts = 60", f"onset_counts = {forearm.onset_counts}")
     path = tmp_path / "skin.toml"
     path.write_text(text)
@@ -28,14 +31,19 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     assert edge("check", skin)[0] == 0
     assert edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
     assert (
-        edge("calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)[0] == 0
+        edge(
+            "calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20
+        )[0]
+        == 0
     )
 
     trials = tmp_path / "trials"
     shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(2)]
     for name in shown:
         labels = load(recordings / f"{name}.npz").labels
-        given = [part for task in labels for part in ("--label", f"{task}={labels[task]}")]
+        given = [
+            part for task in labels for part in ("--label", f"{task}={labels[task]}")
+        ]
         status, (event,), _ = edge("record", "--skin", skin, "--fake", recordings / f"{name}.npz",
                                "--out", trials, "--length", 1.3, *given)  # fmt: skip
         assert (status, event["complete"]) == (0, True)

@@ -1,4 +1,5 @@
-"""The live page shows frames, contacts and decisions, and relabels and deletes trials."""
+"""The live page shows frames, contacts and decisions, and relabels and deletes
+trials."""
 
 from contextlib import closing
 
@@ -14,7 +15,9 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from tests.browser import chromium
 
-LAYOUT = SkinLayout(rows=4, cols=6, threshold_counts=100, dead=(5,), counts_per_newton=1000.0)
+LAYOUT = SkinLayout(
+    rows=4, cols=6, threshold_counts=100, dead=(5,), counts_per_newton=1000.0
+)
 
 
 @pytest.fixture
@@ -22,7 +25,9 @@ def pictures(monkeypatch):
     """The pictures that pages show; a browser is always there to see them."""
     shown = []
     monkeypatch.setattr("edge.tools.web.WebServer.watched", True)
-    monkeypatch.setattr("edge.tools.web.WebServer.show", lambda _, picture: shown.append(picture))
+    monkeypatch.setattr(
+        "edge.tools.web.WebServer.show", lambda _, picture: shown.append(picture)
+    )
     return shown
 
 
@@ -49,7 +54,11 @@ def test_a_picture_has_the_skin_and_the_contact_since_onset(page, pictures):
 
     picture = pictures[-1]
     assert (picture["rows"], picture["cols"], picture["dead"]) == (4, 6, (5,))
-    assert np.flatnonzero(picture["counts"]).tolist() == [8, 9] == picture["contact"]["taxels"]
+    assert (
+        np.flatnonzero(picture["counts"]).tolist()
+        == [8, 9]
+        == picture["contact"]["taxels"]
+    )
     assert picture["invalid"] == [18]
     assert set(picture["contact"]["force"]) == {0.6}
     assert set(picture["contact"]["area"]) == {2}
@@ -81,7 +90,9 @@ def test_decisions_stay_until_the_next_onset(page, pictures):
     }
 
 
-def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(page, pictures):
+def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(
+    page, pictures
+):
     touch = edge.load(demo.FOLDER / "pillow-movable.npz")
     events = edge.Classifier(edge.Model(demo.MODEL)).classify(touch)
     decided = next(event for event in events if isinstance(event, Decided))
@@ -154,10 +165,15 @@ class TestInABrowser:
                 page.push(next(stream))
                 browser.implicitly_wait(0)
                 seen.add(browser.execute_script(image))
-                if len(seen) > 1 and browser.find_element("id", "record-part").is_displayed():
+                if (
+                    len(seen) > 1
+                    and browser.find_element("id", "record-part").is_displayed()
+                ):
                     break
             assert len(seen) > 1
-            label = browser.find_element("css selector", ".label-row input[aria-label=label]")
+            label = browser.find_element(
+                "css selector", ".label-row input[aria-label=label]"
+            )
             label.send_keys("box")
             browser.find_element("id", "record").click()
             for _ in range(400):

@@ -1,4 +1,5 @@
-"""Trials as `record` saves them: safe names, two recorders in one folder, angles where known."""
+"""Trials as `record` saves them: safe names, two recorders in one folder, angles where
+known."""
 
 import io
 import json
@@ -55,7 +56,9 @@ def test_recorders_side_by_side_save_every_trial_under_a_name_of_its_own(tmp_pat
     assert len(list(tmp_path.glob("box-*.npz"))) == 40
 
 
-def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path, caplog):
+def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(
+    tmp_path, caplog
+):
     out = io.StringIO()
     with recorder(tmp_path, out, names=("shoulder", "elbow")) as mine:
         mine.save(frames(np.array([0.1, 0.2]), None), complete=True)
@@ -63,7 +66,9 @@ def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(tmp_path,
     assert trial.joint_names == ("shoulder", "elbow")
     assert json.loads(out.getvalue())["frames_without_joints"] == 1
     assert trial.joints[0].tolist() == [0.1, 0.2]
-    assert caplog.messages[-1:] == [f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"]
+    assert caplog.messages[-1:] == [
+        f"{tmp_path}/box-001.npz: 1 of 2 frames have no joint angles"
+    ]
 
 
 @pytest.fixture
@@ -71,7 +76,9 @@ def record(edge, recordings, tmp_path):
     """Record a touch, labelled object=foam, into a folder."""
 
     def run(*options, fake=recordings / "soft_1.npz", out=tmp_path / "trials"):
-        return edge("record", "--fake", fake, "--label", "object=foam", "--out", out, *options)
+        return edge(
+            "record", "--fake", fake, "--label", "object=foam", "--out", out, *options
+        )
 
     return run
 
@@ -84,7 +91,8 @@ def test_record_saves_a_trial_with_its_lead_in(record, recordings):
     trial = load(event["file"])
     assert trial.labels == {"object": "foam", "category": "soft-fixed"}
     assert Path(event["file"]).name == "foam-soft-fixed-001.npz"
-    # Onset is at frame 20: 20 frames of lead-in, and 130 from onset on, the last included.
+    # Onset is at frame 20: 20 frames of lead-in, and 130 from onset on, the last
+    # included.
     np.testing.assert_array_equal(trial.frames, source.frames[:151])
     np.testing.assert_array_equal(trial.joints, source.joints[:151])
     np.testing.assert_allclose(trial.t, np.arange(151) * 0.01, atol=1e-9)
@@ -138,7 +146,9 @@ def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record
     status, (event,), err = record("--joints", "udp:0", "--dof", 5, "--seconds", 0.5)
     assert (status, event["joints"]) == (1, False)
     assert "--joints gave no angles at the times of the frames" in err
-    assert time.monotonic() - began > 0.4  # it plays in real time, as angles come in real time
+    assert (
+        time.monotonic() - began > 0.4
+    )  # it plays in real time, as angles come in real time
 
 
 def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
@@ -159,7 +169,9 @@ def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
     assert "lines could not be sent to stdout: nobody reads them" in err
 
 
-def test_record_saves_one_trial_a_contact_and_never_overwrites(record, parted, tmp_path):
+def test_record_saves_one_trial_a_contact_and_never_overwrites(
+    record, parted, tmp_path
+):
     options = ("--loop", "--label", "kind=a b/c", "--length", 1.2, "--trials")
     assert [len(record(*options, n, fake=parted)[1]) for n in (2, 1)] == [2, 1]
     names = sorted(p.name for p in (tmp_path / "trials").iterdir())
@@ -189,8 +201,14 @@ def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
         ([], "give --label TASK=LABEL"),
         (["--web", "127.0.0.1:0", "--out", "one.npz"], "give --label TASK=LABEL"),
         (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
-        (["--label", "a=b", "--out", "a" * 300 + ".npz"], "cannot be written: File name too long"),
-        (["--label", "a=b", "--out", "a" * 300], "cannot be written: File name too long"),
+        (
+            ["--label", "a=b", "--out", "a" * 300 + ".npz"],
+            "cannot be written: File name too long",
+        ),
+        (
+            ["--label", "a=b", "--out", "a" * 300],
+            "cannot be written: File name too long",
+        ),
         (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
     ],
 )
@@ -217,7 +235,9 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
     monkeypatch.setattr("edge.tools.page.Page.push", push)
     monkeypatch.setattr("edge.commands.source.PacedClock", VirtualClock)
 
-    status, events, _ = edge("record", "--fake", parted, "--web", "127.0.0.1:0", "--out", tmp_path)
+    status, events, _ = edge(
+        "record", "--fake", parted, "--web", "127.0.0.1:0", "--out", tmp_path
+    )
 
     assert status == 0
     saved = [event for event in events if event["event"] == "saved"]
@@ -233,7 +253,9 @@ def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_re
     assert list((tmp_path / "trials").iterdir()) == []
 
 
-def test_keys_choose_the_label_and_delete_the_last_trial(edge, parted, tmp_path, monkeypatch):
+def test_keys_choose_the_label_and_delete_the_last_trial(
+    edge, parted, tmp_path, monkeypatch
+):
     """The first of a task's labels holds until the number of another is pressed."""
     trials = tmp_path / "trials"
     script = [(1, "2"), (2, "d")]  # once there are so many files, this key

@@ -14,7 +14,9 @@ from tests.conftest import ROOT, python
 
 @pytest.fixture
 def replay(exported, edge):
-    return lambda *arguments: edge("replay", "--model", exported / "model.onnx", *arguments)
+    return lambda *arguments: edge(
+        "replay", "--model", exported / "model.onnx", *arguments
+    )
 
 
 def test_a_folder_is_replayed_and_summed_up(replay, recordings):
@@ -25,7 +27,9 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
     keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
     assert all(keys <= set(e) for e in decisions)
     # Every trial is its own nearest neighbour here, so nothing can be wrong.
-    assert all(e["label"] == e["expected"] for e in decisions if e["task"] == "category")
+    assert all(
+        e["label"] == e["expected"] for e in decisions if e["task"] == "category"
+    )
     assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
     assert "rigid-fixed            8           ." in err
     assert "16 of 16 recordings match a training trial to the last bit" in err
@@ -34,11 +38,21 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
 def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):
     good = recordings / "hard_0.npz"
     (tmp_path / "short.npz").write_bytes(good.read_bytes()[:5000])
-    np.savez(tmp_path / "skin.npz", t=np.zeros(1), frames=np.zeros((1, 3, 3), np.uint16), meta="{}")
+    np.savez(
+        tmp_path / "skin.npz",
+        t=np.zeros(1),
+        frames=np.zeros((1, 3, 3), np.uint16),
+        meta="{}",
+    )
     missing = tmp_path / "missing.npz"
-    status, events, err = replay(tmp_path / "short.npz", missing, good, tmp_path / "skin.npz")
+    status, events, err = replay(
+        tmp_path / "short.npz", missing, good, tmp_path / "skin.npz"
+    )
     assert status == 2
-    assert [e["task"] for e in events if e["event"] == "decision"] == ["category", "object"]
+    assert [e["task"] for e in events if e["event"] == "decision"] == [
+        "category",
+        "object",
+    ]
     said = err.splitlines()
     assert len(said) == 3
     assert "short.npz: not a readable .npz file" in said[0]
@@ -62,7 +76,9 @@ def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, 
 
 @pytest.fixture
 def verify(exported, edge):
-    return lambda golden: edge("verify", "--model", exported / "model.onnx", "--golden", golden)
+    return lambda golden: edge(
+        "verify", "--model", exported / "model.onnx", "--golden", golden
+    )
 
 
 def test_the_golden_file_is_met(verify, exported):
@@ -73,7 +89,10 @@ def test_the_golden_file_is_met(verify, exported):
         "series counts",
         "onset",
         "features",
-        *(f"category_{part}" for part in ("label", "neighbours", "scores", "distances")),
+        *(
+            f"category_{part}"
+            for part in ("label", "neighbours", "scores", "distances")
+        ),
         *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
     ]
     assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
@@ -91,7 +110,9 @@ def test_the_golden_file_is_met(verify, exported):
         ("onset_s", "onset", 1, 1e-6),
     ],
 )
-def test_a_difference_names_the_worst_row(verify, exported, tmp_path, key, name, row, change):
+def test_a_difference_names_the_worst_row(
+    verify, exported, tmp_path, key, name, row, change
+):
     arrays = dict(np.load(exported / "golden.npz"))
     arrays[key][row] += np.array(change).astype(arrays[key].dtype)
     np.savez(tmp_path / "golden.npz", **arrays)
@@ -123,7 +144,9 @@ def test_a_damaged_golden_file_is_one_sentence(verify, exported, tmp_path):
 def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
     model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
     line = f"{sys.executable} -m edge {' '.join(model)} | head -1"
-    piped = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True, check=False)
+    piped = subprocess.run(
+        line, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert (piped.stdout.count("\n"), piped.stderr) == (1, "")
 
 
@@ -132,13 +155,20 @@ def test_output_without_room_is_one_sentence(exported, recordings):
     with open("/dev/full", "w") as full:
         run = python("-m", "edge", "replay", *given, stdout=full)
     assert run.returncode == 2
-    assert run.stderr.startswith("edge-classify: standard output cannot be written: No space left")
+    assert run.stderr.startswith(
+        "edge-classify: standard output cannot be written: No space left"
+    )
     assert run.stderr.count("\n") == 1
 
 
 def test_a_label_cannot_send_escape_sequences_to_the_terminal():
     summary = Summary({"object": None})
-    event = {"event": "decision", "task": "object", "label": "\x1b]0;a\x07", "flags": []}
+    event = {
+        "event": "decision",
+        "task": "object",
+        "label": "\x1b]0;a\x07",
+        "flags": [],
+    }
     summary.add({"object": "\u202ebox\x9b"}, [event])
     assert all(line.isprintable() for line in summary.text().splitlines())
     assert "\\x1b]0;a\\x07" in summary.text()
@@ -151,5 +181,9 @@ def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
         event = {"event": "decision", "task": "object", "label": label, "flags": []}
         summary.add({"object": label}, [event])
     head, *rows = summary.text().splitlines()[-13:]
-    assert head.split() == [row.split()[0] for row in rows] == [str(i + 1) for i in range(12)]
+    assert (
+        head.split()
+        == [row.split()[0] for row in rows]
+        == [str(i + 1) for i in range(12)]
+    )
     assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12

@@ -34,11 +34,17 @@ def labelled(touch, **labels):
 def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     teach, edge, exported, make_touch, tmp_path
 ):
-    save(tmp_path / "cup.npz", labelled(make_touch(seed=70), category="soft-fixed", object="cup"))
+    save(
+        tmp_path / "cup.npz",
+        labelled(make_touch(seed=70), category="soft-fixed", object="cup"),
+    )
     status, lines, messages = teach(tmp_path / "cup.npz")
     assert status == 0
     assert shares_of(lines) == {"category": 1, "object": 0}
-    assert "object: left out 1 trial of the new label 'cup'; --new-labels adds it\n" in messages
+    assert (
+        "object: left out 1 trial of the new label 'cup'; --new-labels adds it\n"
+        in messages
+    )
     assert "its accuracy is not measured, and no error rate is certified" in messages
     before = Model(exported / "model.onnx")
     after = Model(tmp_path / "taught" / "model.onnx")
@@ -50,7 +56,8 @@ def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     assert (decision.neighbours[0], decision.distances[0]) == (16, 0.0)
     # No label of its object is known, so the answers about objects are what they were.
     assert (
-        after.decide(vector)["object"].distances == before.decide(vector)["object"].distances
+        after.decide(vector)["object"].distances
+        == before.decide(vector)["object"].distances
     ).all()
     golden = tmp_path / "taught" / "golden.npz"
     assert edge("verify", "--model", after.path, "--golden", golden)[0] == 0
@@ -66,7 +73,9 @@ def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path)
 def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
     teach, edge, exported, make_touch, tmp_path
 ):
-    recordings = [tmp_path / f"{name}.npz" for name in ("cup 0", "cup 1", "cup 2", "mug")]
+    recordings = [
+        tmp_path / f"{name}.npz" for name in ("cup 0", "cup 1", "cup 2", "mug")
+    ]
     for seed, path in enumerate(recordings):
         labels = {"category": "soft-movable", "object": path.stem.split()[0]}
         touch = make_touch(seed=70 + seed)
@@ -89,19 +98,34 @@ def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
     again = tmp_path / "again"
     given = ["--model", model, "--out", again, "--new-labels", recordings[3]]
     assert edge("teach", *given)[0] == 0
-    assert Model(again / "model.onnx").info.tasks["object"].labels[-2:] == ("cup", "mug")
+    assert Model(again / "model.onnx").info.tasks["object"].labels[-2:] == (
+        "cup",
+        "mug",
+    )
     for folder in (model.parent, again):
         golden = folder / "golden.npz"
-        assert edge("verify", "--model", folder / "model.onnx", "--golden", golden)[0] == 0
+        assert (
+            edge("verify", "--model", folder / "model.onnx", "--golden", golden)[0] == 0
+        )
         assert edge("explain", folder / "model.onnx", recordings[0])[0] == 0
-        status, lines, _ = edge("run", "--model", folder / "model.onnx", "--fake", recordings[0])
-        assert [each["label"] for each in lines if each.get("task") == "object"] == ["cup"]
+        status, lines, _ = edge(
+            "run", "--model", folder / "model.onnx", "--fake", recordings[0]
+        )
+        assert [each["label"] for each in lines if each.get("task") == "object"] == [
+            "cup"
+        ]
 
 
 def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_path):
-    save(tmp_path / "x.npz", labelled(make_touch(seed=71), category="sofft-fixed", object="hard 1"))
+    save(
+        tmp_path / "x.npz",
+        labelled(make_touch(seed=71), category="sofft-fixed", object="hard 1"),
+    )
     sentence = "category: {}1 trial of the new label 'sofft-fixed'{}; did you mean 'soft-fixed'?\n"
-    assert sentence.format("left out ", "; --new-labels adds it") in teach(tmp_path / "x.npz")[2]
+    assert (
+        sentence.format("left out ", "; --new-labels adds it")
+        in teach(tmp_path / "x.npz")[2]
+    )
     assert sentence.format("", "") in teach(tmp_path / "x.npz", "--new-labels")[2]
 
 
@@ -113,9 +137,14 @@ def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_
             lambda t: labelled(t, object="sotf 1"),
             "label it, or teach it with --new-labels; did you mean 'soft 1'?",
         ),
-        (lambda t: replace(t, frames=0 * t.frames), "odd.npz: holds no contact; leave it out"),
         (
-            lambda t: replace(t, frames=t.frames.max(axis=(1, 2), keepdims=True) * ALL_TAXELS),
+            lambda t: replace(t, frames=0 * t.frames),
+            "odd.npz: holds no contact; leave it out",
+        ),
+        (
+            lambda t: replace(
+                t, frames=t.frames.max(axis=(1, 2), keepdims=True) * ALL_TAXELS
+            ),
             "odd.npz: lies far outside the trials that the model was fitted on",
         ),
     ],

@@ -42,8 +42,12 @@ def test_a_taxel_that_cannot_be_read_is_blue():
 
 
 def test_two_rows_make_a_line_and_colours_are_sent_where_they_change():
-    text = terminal.picture(np.array([[1, 1, 2], [3, 3, 3], [4, 4, 4]], dtype=np.uint8), wide=1)
-    assert text == ("\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m")
+    text = terminal.picture(
+        np.array([[1, 1, 2], [3, 3, 3], [4, 4, 4]], dtype=np.uint8), wide=1
+    )
+    assert text == (
+        "\x1b[38;5;1;48;5;3m▀▀\x1b[38;5;2;48;5;3m▀\x1b[0m\n\x1b[38;5;4;49m▀▀▀\x1b[0m"
+    )
 
 
 def test_the_caption_is_for_a_person():

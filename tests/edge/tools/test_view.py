@@ -24,16 +24,27 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
 
 
 def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch):
-    """Half a frame early or late, so that a clock that shifts by less does not skip one."""
+    """Half a frame early or late, so that a clock that shifts by less does not skip
+    one."""
     drawn = []
     monkeypatch.setattr(view, "draw", lambda frame, *rest: drawn.append(frame.t) or ".")
     assert edge("view", "--fake", recordings / "hard_0.npz", text=True)[0] == 0
-    assert [round(t - drawn[0], 2) for t in drawn] == [round(0.1 * i, 2) for i in range(18)]
+    assert [round(t - drawn[0], 2) for t in drawn] == [
+        round(0.1 * i, 2) for i in range(18)
+    ]
 
 
 def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
     terminal, own_side = pty.openpty()
-    command = [sys.executable, "-m", "edge", "view", "--loop", "--fake", recordings / "hard_0.npz"]
+    command = [
+        sys.executable,
+        "-m",
+        "edge",
+        "view",
+        "--loop",
+        "--fake",
+        recordings / "hard_0.npz",
+    ]
     process = subprocess.Popen(
         command, stdin=own_side, stdout=own_side, stderr=subprocess.PIPE, text=True
     )
@@ -42,5 +53,7 @@ def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
     os.close(terminal)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert err.startswith("edge-classify: standard output cannot be written: Input/output error")
+    assert err.startswith(
+        "edge-classify: standard output cannot be written: Input/output error"
+    )
     assert err.count("\n") == 1

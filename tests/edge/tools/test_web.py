@@ -1,4 +1,5 @@
-"""The server of the live page: who may ask, what it answers, and that nobody holds up the loop."""
+"""The server of the live page: who may ask, what it answers, and that nobody holds up
+the loop."""
 
 import http.client
 import json
@@ -14,9 +15,12 @@ from edge.tools.web import WebServer
 
 
 def ask(server, path="/", method="GET", body=None, token=None):
-    """The status, headers and body of a request with the server's token, unless given."""
+    """The status, headers and body of a request with the server's token, unless
+    given."""
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=5)
-    connection.request(method, f"{path}?token={server.token if token is None else token}", body)
+    connection.request(
+        method, f"{path}?token={server.token if token is None else token}", body
+    )
     answer = connection.getresponse()
     return answer.status, dict(answer.getheaders()), answer.read()
 
@@ -46,7 +50,9 @@ def test_serves_the_page_under_a_strict_policy(server, path):
 
     assert status == 200
     assert body
-    assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self'")
+    assert headers["Content-Security-Policy"].startswith(
+        "default-src 'none'; script-src 'self'"
+    )
     assert headers["X-Content-Type-Options"] == "nosniff"
 
 
@@ -57,7 +63,9 @@ def test_no_other_file_is_served(server):
 @pytest.mark.parametrize("token", ["", "wrong", "caf%C3%A9"])
 def test_without_the_token_nothing_is_served_and_no_action_taken(server, taken, token):
     server.show({"t": 1.5})
-    assert [ask(server, path, token=token)[0] for path in ("/", "/picture")] == [401] * 2
+    assert [ask(server, path, token=token)[0] for path in ("/", "/picture")] == [
+        401
+    ] * 2
     assert post(server, {"do": "record"}, token=token)[0] == 401
     assert (taken, server.watched) == ([], False)
 
@@ -77,7 +85,9 @@ def test_an_action_of_the_page_is_carried_out(server, taken):
     assert taken == [action]
 
 
-@pytest.mark.parametrize("body", ["[" * 4000, "[1]", "{", json.dumps({"do": "x" * 5000})])
+@pytest.mark.parametrize(
+    "body", ["[" * 4000, "[1]", "{", json.dumps({"do": "x" * 5000})]
+)
 def test_what_is_no_action_is_refused(server, taken, body):
     assert ask(server, "/action", "POST", body)[0] == 400
     assert taken == []
@@ -108,8 +118,12 @@ def test_it_is_watched_as_long_as_a_browser_asks_for_pictures(server, monkeypatc
 def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
     monkeypatch.setattr(web._Handler, "timeout", 0.2)
     server.show({"counts": "0" * 20_000_000})
-    with socket.create_connection(("127.0.0.1", server.server_port), timeout=5) as sleeper:
-        sleeper.sendall(b"GET /picture?token=%s HTTP/1.0\r\n\r\n" % server.token.encode())
+    with socket.create_connection(
+        ("127.0.0.1", server.server_port), timeout=5
+    ) as sleeper:
+        sleeper.sendall(
+            b"GET /picture?token=%s HTTP/1.0\r\n\r\n" % server.token.encode()
+        )
         ends = time.monotonic() + 10.0
         while not server.watched:
             assert time.monotonic() < ends
@@ -121,12 +135,16 @@ def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
     assert received < 10_000_000
 
 
-@pytest.mark.parametrize("address", ["8000", "127.0.0.1:x", "127.0.0.1:70000", "nowhere.invalid:1"])
+@pytest.mark.parametrize(
+    "address", ["8000", "127.0.0.1:x", "127.0.0.1:70000", "nowhere.invalid:1"]
+)
 def test_an_address_that_cannot_be_used_is_named(address):
     with pytest.raises(InputError, match=f"--web {address}"):
         WebServer(address, refuse)
 
 
 def test_a_port_in_use_is_named(server):
-    with pytest.raises(InputError, match=r"cannot be listened at: Address already in use"):
+    with pytest.raises(
+        InputError, match=r"cannot be listened at: Address already in use"
+    ):
         WebServer(f"127.0.0.1:{server.server_port}", refuse)

@@ -7,7 +7,8 @@ from edge.touch.track import DEBOUNCE, ContactTracker
 
 
 def pressed(layout, t, taxels, **more):
-    """A frame of `taxels`, {(row, col): counts}; a col may be several, and the rest counts 0."""
+    """A frame of `taxels`, {(row, col): counts}; a col may be several, and the rest
+    counts 0."""
     counts = np.zeros(layout.shape, dtype=np.uint16)
     for place, value in taxels.items():
         counts[place] = value

@@ -24,7 +24,9 @@ def test_a_urdf_chain_agrees_with_yourdfpy(urdf):
 
 def test_cody_at_zero_and_with_a_bent_elbow():
     chain = Chain.cody()
-    assert chain.pose([0] * 5)[:3, 3] == pytest.approx([0.00635, -0.21668, -0.55648], abs=1e-15)
+    assert chain.pose([0] * 5)[:3, 3] == pytest.approx(
+        [0.00635, -0.21668, -0.55648], abs=1e-15
+    )
     bent = chain.pose([0, 0, 0, math.pi / 2, 0])[:3, 3]
     # The elbow is at z = -0.27795; turned about -y, the forearm points forward.
     assert bent == pytest.approx([0.00635 + 0.27853, -0.21668, -0.27795], abs=1e-15)
@@ -76,9 +78,18 @@ def test_missing_extra_and_non_finite_angles_are_named(q, word):
         ("[[joint]]\nname = 'j'", "axis is missing"),
         ("[[joint]]\naxis = [0, 0, 0]", "axis is zero"),
         ("[[joint]]\naxis = [0, 0, inf]", "a finite number, not inf"),
-        ("[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]", "lower limit 0.0523599 exceeds"),
-        ("[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'", "type must be one of .* not 'ball'"),
-        ("[[joint]]\nname = 'hip'\naxis = [0, 0]", "joint 'hip': axis must be a list of 3"),
+        (
+            "[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]",
+            "lower limit 0.0523599 exceeds",
+        ),
+        (
+            "[[joint]]\naxis = [0, 0, 1]\ntype = 'ball'",
+            "type must be one of .* not 'ball'",
+        ),
+        (
+            "[[joint]]\nname = 'hip'\naxis = [0, 0]",
+            "joint 'hip': axis must be a list of 3",
+        ),
         ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset"),
     ],
 )

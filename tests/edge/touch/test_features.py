@@ -58,7 +58,8 @@ def test_a_contact_that_is_over_was_over_when_it_lifted_off():
 
 @given(seed=st.integers(0, 1000), window_s=st.floats(0.05, 1.2))
 def test_nothing_after_the_window_changes_its_features(seed, window_s):
-    """A board decides before it knows whether a contact that has lifted off comes back."""
+    """A board decides before it knows whether a contact that has lifted off comes
+    back."""
     rng = np.random.default_rng(seed)
     t = np.arange(130) / 100
     area = np.repeat(rng.integers(0, 3, 13), 10)
@@ -78,7 +79,9 @@ def test_forty_samples_of_each_feature_from_onset_to_the_end_of_the_window():
     assert vector.dtype == np.float64
     force = np.floor(1000 * t) / 500.0
     assert vector[:40] == pytest.approx(np.interp(times, t, force), abs=1e-15)
-    assert vector[40:80] == pytest.approx(np.interp(times, t, np.floor(10 * t + 1)), abs=1e-13)
+    assert vector[40:80] == pytest.approx(
+        np.interp(times, t, np.floor(10 * t + 1)), abs=1e-13
+    )
     assert vector[80:] == pytest.approx(0.1 * times, abs=1e-16)
 
 
@@ -98,13 +101,20 @@ def test_dropped_frames_and_jitter_do_not_shift_the_samples():
     lags=st.lists(st.integers(0, 3), min_size=12, max_size=12),
 )
 def test_times_that_stand_still_or_go_back_never_reach_the_samples(steps, lags):
-    """Frames of equal times, and taxels read earlier than in the frame before, in sixteenths."""
+    """Frames of equal times, and taxels read earlier than in the frame before, in
+    sixteenths."""
     layout = SkinLayout(1, 2, threshold_counts=10, onset_counts=10, release_s=60.0)
     frames, kept = [], {}
-    for i, (t, lag) in enumerate(zip(np.cumsum([0, *steps]).tolist(), [0, *lags], strict=False)):
+    for i, (t, lag) in enumerate(
+        zip(np.cumsum([0, *steps]).tolist(), [0, *lags], strict=False)
+    ):
         at, peak = (t - lag) / 16, 100 + 50 * (i % 3)
-        frames.append(pressed(layout, t / 16, {(0, 0): peak}, times=np.full((1, 2), at)))
-        kept[max(Fraction(at), *kept, Fraction(0))] = peak  # the later reading of an instant
+        frames.append(
+            pressed(layout, t / 16, {(0, 0): peak}, times=np.full((1, 2), at))
+        )
+        kept[max(Fraction(at), *kept, Fraction(0))] = (
+            peak  # the later reading of an instant
+        )
     contact = followed(layout, frames)
     assert contact.series().t.tolist() == list(kept)
     vector = feature_vector(contact.series(), 1.0, 9, ["max_force"])
@@ -131,9 +141,13 @@ def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
 
 def test_motion_is_interpolated_over_frames_without_a_pose():
     motion = [0.0, np.nan, 0.2, np.nan]
-    vector = feature_vector(series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion), 1.2, samples=4)
+    vector = feature_vector(
+        series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion), 1.2, samples=4
+    )
     assert vector[8:] == pytest.approx([0.0, 0.1, 0.2, 0.2])
-    none = feature_vector(series([0.0, 1.2], [1, 1], motion=[np.nan] * 2), 1.2, samples=4)
+    none = feature_vector(
+        series([0.0, 1.2], [1, 1], motion=[np.nan] * 2), 1.2, samples=4
+    )
     assert none[8:].tolist() == [0.0] * 4
 
 
@@ -156,7 +170,9 @@ def test_a_deviation_loses_no_digit_where_its_squares_leave_the_range_of_floats(
     course = series([0.0, 0.25, 0.5, 0.75, 1.0], peaks, [1] * 5, scale=scale)
     (deviation,) = feature_vector(course, 1.0, 5, ["max_force_deviation"])
     variance = Fraction(sum(p * p for p in peaks), 5) - Fraction(sum(peaks), 5) ** 2
-    assert math.ldexp(deviation, -power) == pytest.approx(math.sqrt(variance), rel=1e-15)
+    assert math.ldexp(deviation, -power) == pytest.approx(
+        math.sqrt(variance), rel=1e-15
+    )
 
 
 def test_what_is_too_large_is_refused_and_not_taken_for_unknown():

@@ -38,7 +38,8 @@ def wire():
 
 
 def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
-    """What is known after each line, of poses [t, -t] whose sender's clock is ahead of ours."""
+    """What is known after each line, of poses [t, -t] whose sender's clock is ahead of
+    ours."""
     known = []
     for i in lines:
         wire.now = i / hz + 0.002
@@ -47,7 +48,9 @@ def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
     return known
 
 
-def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(wire):
+def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(
+    wire,
+):
     wire.data = b"\n" * 80
     wire.send(5.0, [1.0, 2.0])
     assert wire.at(0.0) == [1.0, 2.0]
@@ -182,7 +185,11 @@ def test_named_angles_are_put_in_the_arms_order():
 @pytest.mark.parametrize(
     ("q", "names", "problem"),
     [
-        ([0.1, 0.2], ["elbow", "wrist"], "a line has no angle of the arm's joint shoulder"),
+        (
+            [0.1, 0.2],
+            ["elbow", "wrist"],
+            "a line has no angle of the arm's joint shoulder",
+        ),
         ([0.1, 0.2], ["elbow"], "a line's names are not one for each angle"),
         ([0.1, 0.2], "elbow", "a line's names are not one for each angle"),
     ],
@@ -200,7 +207,9 @@ def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
     assert wire.at() is not None
     known = stream(wire, range(50, 100))
-    np.testing.assert_allclose(known, [[i / 100, -i / 100] for i in range(50, 100)], atol=1e-6)
+    np.testing.assert_allclose(
+        known, [[i / 100, -i / 100] for i in range(50, 100)], atol=1e-6
+    )
 
 
 def test_a_line_out_of_order_begins_anew(wire):
@@ -215,7 +224,9 @@ def test_a_line_out_of_order_begins_anew(wire):
 def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
     wire, place, hz
 ):
-    known = stream(wire, range(2 * hz), hz=hz, ahead=lambda i: 1000.0 + 0.3 * (i == place))
+    known = stream(
+        wire, range(2 * hz), hz=hz, ahead=lambda i: 1000.0 + 0.3 * (i == place)
+    )
     assert None not in known[place + hz :]
 
 

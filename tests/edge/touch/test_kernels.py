@@ -22,7 +22,10 @@ HEAVY = list(combinations(range(9), 3))
 def by_hand(channels, table):
     """(above, counted) of every bias, in Python's integers."""
     moved = [
-        [min(value << shift if shift > 0 else value >> -shift, (1 << 14) - 1) for value in row]
+        [
+            min(value << shift if shift > 0 else value >> -shift, (1 << 14) - 1)
+            for value in row
+        ]
         for row, shift in zip(channels.tolist(), table.shifts, strict=True)
     ]
     taken = kernels._mixes(len(moved)).tolist()
@@ -33,7 +36,11 @@ def by_hand(channels, table):
         dilation, kernel = divmod(convolution, 84)
         dilation += 1
         mixed = [
-            sum(row[t] for row, take in zip(moved, taken[convolution], strict=True) if take)
+            sum(
+                row[t]
+                for row, take in zip(moved, taken[convolution], strict=True)
+                if take
+            )
             for t in range(SAMPLES)
         ]
         padded = (dilation - 1 + kernel) % 2 == 0
@@ -43,7 +50,8 @@ def by_hand(channels, table):
             at = [t + (tap - 4) * dilation for tap in range(9)]
             inside = [mixed[i] if 0 <= i < SAMPLES else 0 for i in at]
             total = sum(
-                (2 if tap in HEAVY[kernel] else -1) * value for tap, value in enumerate(inside)
+                (2 if tap in HEAVY[kernel] else -1) * value
+                for tap, value in enumerate(inside)
             )
             above += total > bias
         seen.append((above, SAMPLES - 2 * reach))
@@ -64,14 +72,18 @@ def test_every_share_is_that_of_a_loop_of_whole_numbers(biases, channels):
 
 
 @pytest.mark.parametrize(("biases", "channels"), [(1008, 32), (504, 36)])
-def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(biases, channels):
+def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
+    biases, channels
+):
     minirocket = pytest.importorskip(
         "aeon.transformations.collection.convolution_based._minirocket",
         reason="aeon is not installed",
     )
     rng = np.random.default_rng(biases)
     values = rng.integers(0, 1 << 12, (channels, SAMPLES))
-    table = KernelTable((2,) * channels, tuple(rng.integers(-(1 << 15), 1 << 15, biases).tolist()))
+    table = KernelTable(
+        (2,) * channels, tuple(rng.integers(-(1 << 15), 1 << 15, biases).tolist())
+    )
     mixes = kernels._mixes(channels)
     parameters = (
         mixes.sum(axis=1).astype(np.int32),
@@ -81,7 +93,9 @@ def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(biases, 
         np.array(table.biases, np.float32),
     )
     touch = kernels.shifted(values, table.shifts)[None].astype(np.float32)
-    (theirs,) = minirocket._static_transform_multi(touch, parameters, np.array(HEAVY, np.int32))
+    (theirs,) = minirocket._static_transform_multi(
+        touch, parameters, np.array(HEAVY, np.int32)
+    )
     assert shares(values, table).astype(np.float32).tolist() == theirs.tolist()
 
 
@@ -97,15 +111,20 @@ def test_a_convolution_takes_one_to_nine_channels_the_same_on_every_machine():
     assert set(mixes.sum(axis=1).tolist()) == {1, 2, 3, 4, 6, 9}
     assert np.flatnonzero(mixes[3]).tolist() == [1, 13, 16, 20, 23, 27]
     assert (kernels._mixes(1) == 1).all()
-    # A model stores none of them: other draws would change the features of a stored model.
-    assert zlib.crc32(np.packbits(kernels._mixes(20).astype(bool)).tobytes()) == 1077911594
+    # A model stores none of them: other draws would change the features of a stored
+    # model.
+    assert (
+        zlib.crc32(np.packbits(kernels._mixes(20).astype(bool)).tobytes()) == 1077911594
+    )
 
 
 def touch():
     """A press that grows; its frames come 40 ms apart and a little late."""
     patch = {(row, (3, 4, 5)) for row in (2, 3, 4)}
     return [
-        pressed(SKIN, 5.0 + 0.04 * i + 1e-9 * (i % 3), dict.fromkeys(patch, 10 + 7 * i % 50))
+        pressed(
+            SKIN, 5.0 + 0.04 * i + 1e-9 * (i % 3), dict.fromkeys(patch, 10 + 7 * i % 50)
+        )
         for i in range(40)
     ]
 
@@ -114,7 +133,9 @@ def series_of(frames, *wanted):
     return followed(SKIN, frames, features=wanted).series()
 
 
-@pytest.mark.parametrize(("name", "channels"), [("taxel_kernels", 24), ("zone_kernels", 32)])
+@pytest.mark.parametrize(
+    ("name", "channels"), [("taxel_kernels", 24), ("zone_kernels", 32)]
+)
 def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
     frames = touch()
     held = kernel_channels(series_of(frames, name), 1.56, name)
@@ -123,22 +144,32 @@ def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
     forces = [int(frame.counts.sum()) for frame in frames]
     sums = held.sum(axis=0) if name == "taxel_kernels" else held[10]
     assert sums.tolist() == forces
-    table = KernelTable((0,) * channels, (0,) * {"taxel_kernels": 1008, "zone_kernels": 504}[name])
-    vector = feature_vector(series_of(frames, name), 1.56, features=[name], tables={name: table})
+    table = KernelTable(
+        (0,) * channels, (0,) * {"taxel_kernels": 1008, "zone_kernels": 504}[name]
+    )
+    vector = feature_vector(
+        series_of(frames, name), 1.56, features=[name], tables={name: table}
+    )
     assert vector.tolist() == shares(held, table).tolist()
 
 
 def test_kernels_without_their_table_or_their_measurements_are_refused():
     series = series_of(touch(), "taxel_kernels")
-    with pytest.raises(InputError, match="taxel_kernels needs a table that training made"):
+    with pytest.raises(
+        InputError, match="taxel_kernels needs a table that training made"
+    ):
         feature_vector(series, 1.0, features=["taxel_kernels"])
     with pytest.raises(InputError, match="zone_kernels was not measured"):
         kernel_channels(series, 1.0, "zone_kernels")
 
 
-@pytest.mark.parametrize("name", ["sqrt_zone_kernels", "zone_kernels_mean", "taxel_kernels@10"])
+@pytest.mark.parametrize(
+    "name", ["sqrt_zone_kernels", "zone_kernels_mean", "taxel_kernels@10"]
+)
 def test_kernels_have_no_transform_summary_or_times(name):
-    with pytest.raises(InputError, match="takes no transform, summary or number of times"):
+    with pytest.raises(
+        InputError, match="takes no transform, summary or number of times"
+    ):
         feature(name)
 
 

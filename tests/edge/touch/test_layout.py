@@ -9,7 +9,20 @@ from edge.errors import InputError
 from edge.touch.layout import SkinLayout
 from tests.conftest import FOREARM
 
-ANGLES = [-82.05, -67.25, -52.44, -37.22, -22.42, -7.61, 7.61, 22.42, 37.22, 52.44, 67.25, 82.05]
+ANGLES = [
+    -82.05,
+    -67.25,
+    -52.44,
+    -37.22,
+    -22.42,
+    -7.61,
+    7.61,
+    22.42,
+    37.22,
+    52.44,
+    67.25,
+    82.05,
+]
 ANGLES += [97.95, 112.75, 127.56, 142.78, 157.58, 172.39]
 ANGLES += [-172.39, -157.58, -142.78, -127.56, -112.75, -97.95]
 
@@ -37,14 +50,28 @@ def test_a_flat_skin_lies_in_the_plane():
 
 
 def test_units_say_what_is_known():
-    assert (SkinLayout(1, 1).force_unit, SkinLayout(1, 1).length_unit) == ("count", "taxel")
+    assert (SkinLayout(1, 1).force_unit, SkinLayout(1, 1).length_unit) == (
+        "count",
+        "taxel",
+    )
     scaled = SkinLayout(1, 1, pitch_m=0.01, counts_per_newton=1000.0)
     assert (scaled.force_unit, scaled.length_unit) == ("newton", "metre")
 
 
 def test_metadata_round_trip():
     layout = SkinLayout(
-        16, 24, True, (0.0108, 0.01205), 0.046, 0.18, tuple(ANGLES), 1000.0, 100, 150, (3, 7), 0.25
+        16,
+        24,
+        True,
+        (0.0108, 0.01205),
+        0.046,
+        0.18,
+        tuple(ANGLES),
+        1000.0,
+        100,
+        150,
+        (3, 7),
+        0.25,
     )
     assert SkinLayout.from_dict(layout.to_dict()) == layout
     assert not SkinLayout.from_dict({"rows": 3, "cols": 4}).wraps

@@ -1,4 +1,5 @@
-"""Feature types by name: whole numbers against sums in plain Python, values against fractions."""
+"""Feature types by name: whole numbers against sums in plain Python, values against
+fractions."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -35,7 +36,9 @@ def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[
     """The measures of a zone, by plain sums; the best of all cuts of a turn."""
     candidates = []
     for cut in range(turn or 1):
-        moved = {(r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()}
+        moved = {
+            (r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()
+        }
 
         def total(of, moved=moved):
             return sum(f * of(r, c) for (r, c), f in moved.items())
@@ -46,7 +49,9 @@ def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[
             *(total(lambda r, c: r * c), cols_cols),
         ]
         largest = max(moved.values(), default=0)
-        candidates.append((force * cols_cols - cols * cols, cut, [largest, len(moved), *sums]))
+        candidates.append(
+            (force * cols_cols - cols * cols, cut, [largest, len(moved), *sums])
+        )
     return min(candidates)[2]
 
 
@@ -56,8 +61,12 @@ def taxels_of(counts, mask) -> dict[tuple[int, int], int]:
 
 def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
     counts = frame.counts
-    active = (counts > layout.threshold_counts) & (True if frame.valid is None else frame.valid)
-    largest = largest_region(counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps)
+    active = (counts > layout.threshold_counts) & (
+        True if frame.valid is None else frame.valid
+    )
+    largest = largest_region(
+        counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps
+    )
     left = np.zeros(layout.shape, dtype=bool)
     left[:, : layout.cols // 2] = True
     turn = layout.cols if layout.wraps else None
@@ -83,7 +92,9 @@ def frame_of(seed: int, shape, density=0.4, high=65535) -> Frame:
     wraps=st.booleans(),
     shape=st.sampled_from([(5, 7), (1, 1), (1, 6), (6, 1), (16, 24)]),
 )
-def test_whole_numbers_of_every_place_are_those_of_plain_sums(seed, density, high, wraps, shape):
+def test_whole_numbers_of_every_place_are_those_of_plain_sums(
+    seed, density, high, wraps, shape
+):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
     frame = frame_of(seed, shape, density, high)
     active = ActiveTaxels(frame.counts, 10, valid=frame.valid, wraps=wraps)
@@ -107,7 +118,14 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     row = Measurer(layout, ["skin_length"]).measure(active, active.largest())
     line = sum(range(cols))
     squares = sum(c * c for c in range(cols))
-    sums = rows * cols, rows * line, rows * line, rows * squares, line * line, rows * squares
+    sums = (
+        rows * cols,
+        rows * line,
+        rows * line,
+        rows * squares,
+        line * line,
+        rows * squares,
+    )
     assert row[2:] == [65535 * v for v in sums]
     wanted = ["skin_spread_along", "skin_slant"]
     vector = vector_of(layout, [frame, replace(frame, t=1.0)], wanted, 2)
@@ -150,7 +168,9 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
         a, b, m = (mpmath.mpf(x.numerator) / x.denominator for x in (rr, cc, rc))
         root = mpmath.sqrt((a - b) ** 2 + 4 * m * m)
         # Of taxels in a line the difference is 0 but for its sixtieth digit.
-        longer, shorter = (mpmath.sqrt(max(v, 0) / 2) for v in (a + b + root, a + b - root))
+        longer, shorter = (
+            mpmath.sqrt(max(v, 0) / 2) for v in (a + b + root, a + b - root)
+        )
     exact = {
         "force": Fraction(force, 100),
         "along": row,
@@ -165,7 +185,9 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
             float(truth), rel=4e-15, abs=1e-14
         )
     # The determinant of a thin contact cancels: see `edge.touch.features`.
-    assert value(FLAT, counts, "skin_width") == pytest.approx(float(shorter), abs=7 * 2.0**-25)
+    assert value(FLAT, counts, "skin_width") == pytest.approx(
+        float(shorter), abs=7 * 2.0**-25
+    )
 
 
 def test_a_perfect_line_has_no_width():
@@ -191,14 +213,17 @@ def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
 
 
 def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
-    """The right half is touched from the third of five frames on, and the contact ends."""
+    """The right half is touched from the third of five frames on, and the contact
+    ends."""
     right = [0, 0, 40, 80, 0, 0, 0, 0, 0, 0]
     frames = [
         pressed(FLAT, i / 4, {(1, 1): 60 if i < 4 else 0, (i % 4, 5): force})
         for i, force in enumerate(right)
     ]
     wanted = ["right_along", "right_force", "right_area"]
-    vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(3, 6)
+    vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(
+        3, 6
+    )
     assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
     assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]
     assert vector[2].tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
@@ -217,7 +242,8 @@ def test_a_rate_is_the_change_a_second_of_the_sampled_values():
 def test_force_motion_follows_the_force_where_the_area_stays():
     layout = replace(FLAT, pitch_m=0.01)
     frames = [
-        pressed(layout, t, {(1, 1): 50, (1, 2): f}) for t, f in ((0, 50), (0.5, 150), (1, 50))
+        pressed(layout, t, {(1, 1): 50, (1, 2): f})
+        for t, f in ((0, 50), (0.5, 150), (1, 50))
     ]
     vector = vector_of(layout, frames, ["contact_motion", "force_motion"], 3)
     assert vector == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0025, 0.0], abs=1e-17)
@@ -253,7 +279,10 @@ def test_the_papers_three_are_the_default_and_come_first():
         ([""], "no feature ''"),
         (["max_force@1"], "must be taken at 2 to 10000 times"),
         (["log_sqrt_log_max_force"], "applies one transform twice"),
-        (["sqrt_log_joint_change"], "may be negative and has no logarithm; take sqrt_joint_change"),
+        (
+            ["sqrt_log_joint_change"],
+            "may be negative and has no logarithm; take sqrt_joint_change",
+        ),
         (["log_skin_slant_mean"], "may be negative"),
         ([], "no feature named"),
         (["max_force", "skin_area", "max_force"], "max_force is named twice"),
@@ -266,8 +295,16 @@ def test_a_wrong_name_is_one_sentence(wanted, sentence):
 
 
 def test_a_feature_that_was_not_measured_is_one_sentence():
-    series = series_of(FLAT, [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)], ["max_force"])
-    for name in ("skin_force", "force_motion", "stiffness", "taxel_force", "joint_angle"):
+    series = series_of(
+        FLAT, [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)], ["max_force"]
+    )
+    for name in (
+        "skin_force",
+        "force_motion",
+        "stiffness",
+        "taxel_force",
+        "joint_angle",
+    ):
         with pytest.raises(InputError, match=f"{name} was not measured"):
             feature_vector(series, 1.0, 2, [name])
 
@@ -276,18 +313,27 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
     ("shape", "side", "count"),
     [((16, 16), 1, 256), ((16, 24), 2, 96), ((1, 257), 2, 129), ((13, 13), 1, 169)],
 )
-def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(shape, side, count):
+def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(
+    shape, side, count
+):
     cells = Cells(SkinLayout(*shape))
     assert (cells.side, cells.count) == (side, count)
     assert count <= MOST_CELLS
 
 
 @settings(max_examples=40)
-@given(seed=st.integers(0, 1 << 32), shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]))
-def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(seed, shape):
+@given(
+    seed=st.integers(0, 1 << 32),
+    shape=st.sampled_from([(3, 5), (16, 24), (17, 31), (1, 700)]),
+)
+def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
+    seed, shape
+):
     rng = np.random.default_rng(seed)
     rows, cols = shape
-    dead = rng.choice(rows * cols, size=rng.integers(0, rows * cols // 2), replace=False)
+    dead = rng.choice(
+        rows * cols, size=rng.integers(0, rows * cols // 2), replace=False
+    )
     layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
     counts = rng.integers(0, 65536, shape).astype(np.uint16)
     valid = None if seed % 4 == 0 else rng.random(shape) < 0.8

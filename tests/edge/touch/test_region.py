@@ -1,4 +1,5 @@
-"""Regions against scipy.ndimage.label, with the seam joined by hand where the skin wraps."""
+"""Regions against scipy.ndimage.label, with the seam joined by hand where the skin
+wraps."""
 
 from fractions import Fraction
 
@@ -21,7 +22,8 @@ def frame(*taxels: tuple[int, int], shape=(16, 24), value=100) -> np.ndarray:
 
 
 def reference_masks(active: np.ndarray, wraps: bool) -> list[np.ndarray]:
-    """scipy's components; where the skin wraps, those that meet across the seam are joined."""
+    """scipy's components; where the skin wraps, those that meet across the seam are
+    joined."""
     if not wraps:
         labels, n = scipy.ndimage.label(active)
         return [labels == i + 1 for i in range(n)]
@@ -68,7 +70,9 @@ def by_scipy(counts, threshold, valid, wraps):
     for mask in reference_masks(active, wraps):
         lowest = int(np.flatnonzero(mask.ravel())[0])
         rows = int(np.nonzero(mask)[0].sum())
-        regions.append((int(mask.sum()), int(counts[mask].max()), lowest, rows, mask.tobytes()))
+        regions.append(
+            (int(mask.sum()), int(counts[mask].max()), lowest, rows, mask.tobytes())
+        )
     regions.sort(key=lambda region: (-region[0], -region[1], region[2]))
     return regions, regions[0] if regions else None
 
@@ -77,7 +81,13 @@ def by_us(counts, threshold, valid, wraps):
     """The same from `find_regions` and `largest_region`."""
 
     def described(region):
-        return region.area, region.peak, region.index, region.sums[0], region.mask.tobytes()
+        return (
+            region.area,
+            region.peak,
+            region.index,
+            region.sums[0],
+            region.mask.tobytes(),
+        )
 
     options = {"valid": valid, "wraps": wraps}
     regions = find_regions(counts, threshold, **options)
@@ -114,7 +124,10 @@ def test_a_threshold_for_each_taxel():
     counts = frame((2, 2), (2, 3))
     threshold = np.full((16, 24), 99)
     threshold[2, 3] = 100
-    assert largest_region(counts, threshold).mask.nonzero() == (np.array([2]), np.array([2]))
+    assert largest_region(counts, threshold).mask.nonzero() == (
+        np.array([2]),
+        np.array([2]),
+    )
 
 
 @given(hnp.arrays(bool, (5, 9), elements=st.booleans()))

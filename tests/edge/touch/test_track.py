@@ -22,7 +22,9 @@ def follow(peaks, debounce=DEBOUNCE, *, layout=FLAT, dt=0.01, start=0.0, **keywo
     tracker = ContactTracker(layout, debounce, **keywords)
     contacts = {}
     for i, peak in enumerate(peaks):
-        contacts |= dict.fromkeys(tracker.push(pressed(layout, start + i * dt, {(1, 1): peak})))
+        contacts |= dict.fromkeys(
+            tracker.push(pressed(layout, start + i * dt, {(1, 1): peak}))
+        )
     return [(c.onset_s, c.series().peak.tolist(), c.ended) for c in contacts]
 
 
@@ -51,11 +53,14 @@ def test_a_contact_ends_after_a_time_without_any_taxel():
 
 
 @pytest.mark.parametrize(
-    ("away_s", "contacts"), [(0.05, 1), (0.2, 1), (0.29, 1), (0.3, 2), (0.35, 2), (0.5, 2)]
+    ("away_s", "contacts"),
+    [(0.05, 1), (0.2, 1), (0.29, 1), (0.3, 2), (0.35, 2), (0.5, 2)],
 )
 @pytest.mark.parametrize("dt", [0.01, 0.005, 0.0025])
 @pytest.mark.parametrize("start", [0.0, 0.07, 123.456, 1.7e9])
-def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(away_s, contacts, dt, start):
+def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(
+    away_s, contacts, dt, start
+):
     """At any rate and on any clock: the end is a time, not a number of frames."""
     away = round(away_s / dt)
     tap = [30] * round(0.1 / dt)
@@ -64,12 +69,17 @@ def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(away_s, con
 
 def test_nothing_is_kept_beyond_the_horizon():
     found = follow([30] * 20, horizon_s=0.055)
-    assert found == [(0.0, [30] * 7, False)]  # one frame past it, to interpolate up to it
+    assert found == [
+        (0.0, [30] * 7, False)
+    ]  # one frame past it, to interpolate up to it
 
 
 def test_motion_counts_from_the_reading_that_counts():
-    """Where the first instant was read twice, the later reading is the onset's place."""
-    frames = [pressed(FLAT, t, {(1, col): 50}) for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]]
+    """Where the first instant was read twice, the later reading is the onset's
+    place."""
+    frames = [
+        pressed(FLAT, t, {(1, col): 50}) for t, col in [(0.0, 1), (0.0, 3), (0.01, 4)]
+    ]
     contact = followed(FLAT, frames, AT_ONCE)
     assert contact.series().motion == pytest.approx([0.0, 0.01], abs=1e-16)
 
@@ -91,7 +101,9 @@ TURN = Chain([Joint("turn", (0.0, 0.0, 1.0))])
 def turning(angles):
     """A region that stays on the skin, while the arm turns."""
     joints = [None if angle is None else np.array([angle]) for angle in angles]
-    return [pressed(FLAT, i * 0.01, {(0, 2): 50}, joints=q) for i, q in enumerate(joints)]
+    return [
+        pressed(FLAT, i * 0.01, {(0, 2): 50}, joints=q) for i, q in enumerate(joints)
+    ]
 
 
 def test_motion_in_the_world_follows_the_joints():
@@ -147,7 +159,9 @@ def test_times_that_are_not_finite_are_refused(t):
 
 
 def test_another_scale_brings_the_thresholds_along():
-    model = SkinLayout(4, 6, counts_per_newton=1000.0, threshold_counts=100, onset_counts=150)
+    model = SkinLayout(
+        4, 6, counts_per_newton=1000.0, threshold_counts=100, onset_counts=150
+    )
     device = SkinLayout(4, 6, counts_per_newton=2000.0, threshold_counts=7, dead=(3,))
     adapted = for_device(model, device)
     assert (adapted.threshold_counts, adapted.onset_counts) == (200, 300)
@@ -155,7 +169,9 @@ def test_another_scale_brings_the_thresholds_along():
     assert adapted.dead == ()
     finest = for_device(model, replace(device, counts_per_newton=1e6))
     assert (finest.threshold_counts, finest.onset_counts) == (65535, 65535)
-    plain = for_device(SkinLayout(4, 6, threshold_counts=100, onset_counts=150), SkinLayout(4, 6))
+    plain = for_device(
+        SkinLayout(4, 6, threshold_counts=100, onset_counts=150), SkinLayout(4, 6)
+    )
     assert (plain.threshold_counts, plain.onset_counts) == (100, 150)
 
 
@@ -189,7 +205,8 @@ def test_a_recording_without_a_contact_gives_none(make_touch, forearm):
 
 
 def test_a_clock_too_large_for_its_steps_is_refused_and_says_so():
-    """Seconds since 1970 are fine; as milliseconds or nanoseconds, steps of a frame drown."""
+    """Seconds since 1970 are fine; as milliseconds or nanoseconds, steps of a frame
+    drown."""
     followed(FLAT, [pressed(FLAT, 1.7e9, {})])
     for t in (1.7e12, 1.7e18, -1e15):
         with pytest.raises(InputError, match="give seconds"):

@@ -1,4 +1,5 @@
-"""The joints of a URDF file from one link to another, in order, or one sentence why not."""
+"""The joints of a URDF file from one link to another, in order, or one sentence why
+not."""
 
 import pytest
 
@@ -23,11 +24,17 @@ ARM = """<?xml version="1.0"?>
 </robot>"""
 
 
-def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_file(urdf):
+def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_file(
+    urdf,
+):
     given = [joint["name"] for joint in joints_between(urdf, "base", "lower")]
     assert given == ["shoulder", "bracket", "elbow"]
-    assert [joint["name"] for joint in joints_between(urdf, "upper", "aside")] == ["camera"]
-    with pytest.raises(InputError, match="link 'upper' is both base and tip; name the arm's two"):
+    assert [joint["name"] for joint in joints_between(urdf, "upper", "aside")] == [
+        "camera"
+    ]
+    with pytest.raises(
+        InputError, match="link 'upper' is both base and tip; name the arm's two"
+    ):
         joints_between(urdf, "upper", "upper")
 
 
@@ -35,15 +42,43 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
     ("old", "new", "said"),
     [
         ("robot", "sdf", "not a URDF file: its root is <sdf> instead of <robot>"),
-        ('link name="base"', 'link name="world"', "no link 'base'; it has world, upper"),
-        ('<parent link="base"/>', '<parent link="lower"/>', "no chain of joints leads from"),
-        ('<parent link="base"/>', '<parent link="upper"/>', "no chain of joints leads from"),
+        (
+            'link name="base"',
+            'link name="world"',
+            "no link 'base'; it has world, upper",
+        ),
+        (
+            '<parent link="base"/>',
+            '<parent link="lower"/>',
+            "no chain of joints leads from",
+        ),
+        (
+            '<parent link="base"/>',
+            '<parent link="upper"/>',
+            "no chain of joints leads from",
+        ),
         ('<child link="upper"/>', "", "joint 'shoulder' has no <child link=...>"),
         ("0.3 0 -1e-3", "0.3 0 x", "joint 'elbow': not numbers: could not convert"),
-        ("0.3 0 -1e-3", "0.3 0", "joint 'elbow': origin_xyz must be a list of 3 numbers"),
-        ('<axis xyz="0 1 0"/>', '<mimic joint="elbow"/>', "joint 'slide' follows joint 'elbow'"),
-        ('lower="-2.5"', 'lower="low"', "joint 'elbow': not numbers: could not convert"),
-        ('"continuous"', '"floating"', "joint 'shoulder': type must be one of revolute, co"),
+        (
+            "0.3 0 -1e-3",
+            "0.3 0",
+            "joint 'elbow': origin_xyz must be a list of 3 numbers",
+        ),
+        (
+            '<axis xyz="0 1 0"/>',
+            '<mimic joint="elbow"/>',
+            "joint 'slide' follows joint 'elbow'",
+        ),
+        (
+            'lower="-2.5"',
+            'lower="low"',
+            "joint 'elbow': not numbers: could not convert",
+        ),
+        (
+            '"continuous"',
+            '"floating"',
+            "joint 'shoulder': type must be one of revolute, co",
+        ),
         ('type="continuous"', "", "prismatic, fixed, not ''"),
     ],
 )

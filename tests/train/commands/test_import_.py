@@ -12,7 +12,11 @@ from train.commands.import_ import zeroed
 
 def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch):
     trial = make_touch(arm=False)
-    offset = np.random.default_rng(0).integers(0, 300, trial.frames.shape[1:]).astype(np.uint16)
+    offset = (
+        np.random.default_rng(0)
+        .integers(0, 300, trial.frames.shape[1:])
+        .astype(np.uint16)
+    )
     shifted = replace(trial, frames=trial.frames + offset)
     shifted.frames[-1] = 0
     back = zeroed(shifted)
@@ -31,11 +35,14 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     noise = np.random.default_rng(0).integers(0, 41, (60, 16, 24)).astype(np.uint16)
     touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
     for i, touch in enumerate(touches):
-        write_frames(tmp_path / "csv" / f"trial{i}", touch.t, np.maximum(touch.frames, noise))
+        write_frames(
+            tmp_path / "csv" / f"trial{i}", touch.t, np.maximum(touch.frames, noise)
+        )
     given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0
-    assert "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a" in (
-        capsys.readouterr().out
+    assert (
+        "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a"
+        in (capsys.readouterr().out)
     )
     layout = load(tmp_path / "out" / "trial0.npz").layout
     assert (layout.threshold_counts, layout.onset) == (80, 120)

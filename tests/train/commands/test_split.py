@@ -9,7 +9,9 @@ from train.__main__ import main
 from train.dataset import contacts
 
 
-def test_each_contact_becomes_a_recording_with_its_own_labels(make_touch, tmp_path, capsys):
+def test_each_contact_becomes_a_recording_with_its_own_labels(
+    make_touch, tmp_path, capsys
+):
     two = in_a_row(*[make_touch(seconds=0.6)] * 2)
     each = [{"object": "one"}, {"object": "other"}]
     save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))

@@ -18,7 +18,12 @@ def test_the_command_says_what_to_use(make_touch, tmp_path, capsys):
 def test_the_command_says_what_its_proposal_hides(make_touch, tmp_path, capsys):
     for seed, peak in enumerate((900.0, 900.0, 70.0, 50.0)):
         touch = make_touch(seed=seed)
-        save(tmp_path / f"{seed}.npz", noisy(weaker(touch, peak / touch.frames.max()), seed))
+        save(
+            tmp_path / f"{seed}.npz",
+            noisy(weaker(touch, peak / touch.frames.max()), seed),
+        )
     assert main(["thresholds", str(tmp_path)]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
-    assert said.startswith("other thresholds show a contact in 1 more of the recordings")
+    assert said.startswith(
+        "other thresholds show a contact in 1 more of the recordings"
+    )

@@ -8,5 +8,7 @@ from matplotlib.figure import Figure
 def drawn(monkeypatch):
     """The figures that are saved."""
     figures, save = [], Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k)))
+    monkeypatch.setattr(
+        Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k))
+    )
     return figures

@@ -1,4 +1,5 @@
-"""Why a touch was decided so, as a picture: its curves over those of the nearest trials."""
+"""Why a touch was decided so, as a picture: its curves over those of the nearest
+trials."""
 
 import numpy as np
 
@@ -24,12 +25,16 @@ def test_a_touch_is_drawn_over_the_trials_that_a_model_finds_nearest(
     assert len(nearest) == len(texts) - 1
     assert all(len(line.get_xdata()) == len(touch.get_xdata()) for line in nearest)
     assert max(touch.get_xdata()) <= 1.2
-    assert len({(line.get_marker(), line.get_linestyle()) for line in force.lines}) == len(texts)
+    assert len(
+        {(line.get_marker(), line.get_linestyle()) for line in force.lines}
+    ) == len(texts)
     widths = [bar.get_width() for bar in pulls.patches]
     assert np.all(np.diff(np.abs(widths)) <= 0)
 
 
-def test_a_folder_without_the_trials_is_one_sentence(exported, tmp_path, make_touch, refusal):
+def test_a_folder_without_the_trials_is_one_sentence(
+    exported, tmp_path, make_touch, refusal
+):
     save(tmp_path / "new.npz", make_touch(kind="soft", seed=9))
     said = refusal("show", tmp_path / "new.npz", "--model", exported / "model.onnx")
     assert "holds none of the nearest trials, such as soft_" in said

@@ -20,7 +20,9 @@ def test_the_sketch_is_drawn_below_the_curves(tmp_path):
     assert sketched.stat().st_size > plain.stat().st_size
 
 
-def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(make_touch, tmp_path):
+def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
+    make_touch, tmp_path
+):
     save(tmp_path / "quiet.npz", make_touch(seconds=0.0, arm=False))
     assert main(["show", str(tmp_path / "quiet.npz")]) == 0
     assert (tmp_path / "quiet.png").read_bytes().startswith(b"\x89PNG")
@@ -38,7 +40,9 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(make_
         {"effects": ["stems"], "values": {"stem_count": -3}},
     ],
 )
-def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(edited, tmp_path, refusal):
+def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
+    edited, tmp_path, refusal
+):
     touch = load(TOUCH)
     file = tmp_path / "edited.npz"
     save(file, replace(touch, meta={**touch.meta, "simulation": edited}))

@@ -1,4 +1,5 @@
-"""The sketch of a simulated touch: what leans, turns or bends does so in the picture."""
+"""The sketch of a simulated touch: what leans, turns or bends does so in the
+picture."""
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ def sketch(effects, moved=0.1, since=0.0, **values):
     axis = Figure().add_subplot()
     drawn = {"effects": effects, "values": values}
     now = FIRST[0] + [moved, 0.0, 0.0]
-    return axis, sketches._object(axis, drawn, FIRST, now, since, color="blue", hatch="//")
+    return axis, sketches._object(
+        axis, drawn, FIRST, now, since, color="blue", hatch="//"
+    )
 
 
 def outline(axis):
@@ -23,7 +26,9 @@ def outline(axis):
 
 def test_an_object_that_slides_stands_on_its_floor_where_it_was_pushed_to():
     still, moved = sketch(["sliding"], 0.0)[0], sketch(["sliding"], 0.1)[0]
-    np.testing.assert_allclose(outline(moved) - outline(still), [[0.1, 0.0]] * len(outline(still)))
+    np.testing.assert_allclose(
+        outline(moved) - outline(still), [[0.1, 0.0]] * len(outline(still))
+    )
     floor = still.lines[0].get_ydata()[0]
     assert outline(still)[:, 1].min() == pytest.approx(floor)
     # A fixed object has not moved, however the contact did.
@@ -58,7 +63,9 @@ def test_a_plants_stems_bend_to_where_the_forearm_is():
     for stem in stems:
         (foot, tip), (floor, top) = stem.get_xdata(), stem.get_ydata()
         share = (FIRST[0][2] - floor) / (top - floor)
-        assert foot + share * (tip - foot) == pytest.approx(0.0)  # at the contact's height
+        assert foot + share * (tip - foot) == pytest.approx(
+            0.0
+        )  # at the contact's height
     pushed, _ = sketch(["stems", "sliding"], 0.1, **values)
     for stem in pushed.lines[1:]:
         assert np.ptp(stem.get_xdata()) == 0.0

@@ -13,7 +13,12 @@ from edge.touch.arm import Chain
 from train.__main__ import main
 from train.draw.touch_map import outline
 
-HEAD = {"event": "map", "frame": "torso_lift_link", "unit": "metre", "tasks": ["category"]}
+HEAD = {
+    "event": "map",
+    "frame": "torso_lift_link",
+    "unit": "metre",
+    "tasks": ["category"],
+}
 
 
 def touch(n, place, label, confidence=1.0):
@@ -27,7 +32,9 @@ def path(tmp_path):
     rng = np.random.default_rng(5)
     labels = ["rigid-fixed", "soft-movable", "soft-fixed", None]
     places = rng.normal([0.4, -0.2, -0.3], 0.05, (20, 3)).tolist()
-    touches = [touch(n, place, labels[n % 4], n % 3 / 2) for n, place in enumerate(places)]
+    touches = [
+        touch(n, place, labels[n % 4], n % 3 / 2) for n, place in enumerate(places)
+    ]
     path = tmp_path / "map.jsonl"
     path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *touches]))
     return path
@@ -39,7 +46,9 @@ def test_a_map_is_drawn_beside_its_file(path, capsys):
     assert capsys.readouterr().out.strip() == str(out)
     pixels = matplotlib.image.imread(out)[..., :3]
     assert pixels.shape[1] > 1000
-    assert len(np.unique(pixels.reshape(-1, 3).round(1), axis=0)) > 20  # colours of labels
+    assert (
+        len(np.unique(pixels.reshape(-1, 3).round(1), axis=0)) > 20
+    )  # colours of labels
 
 
 @pytest.mark.parametrize(
@@ -60,7 +69,9 @@ def test_what_cannot_be_drawn_is_one_sentence(path, refusal, text, options, sent
 def test_the_arm_or_skin_of_a_model_is_drawn_behind_the_contacts(path, tmp_path):
     plain, behind = tmp_path / "plain.png", tmp_path / "behind.png"
     assert main(["show", str(path), "--out", str(plain)]) == 0
-    assert main(["show", str(path), "--model", str(demo.MODEL), "--out", str(behind)]) == 0
+    assert (
+        main(["show", str(path), "--model", str(demo.MODEL), "--out", str(behind)]) == 0
+    )
     assert plain.read_bytes() != behind.read_bytes()
     chain = Chain.cody()
     name, (links,) = outline(replace(Model(demo.MODEL).info, chain=chain))
@@ -75,5 +86,7 @@ def test_a_skin_without_an_arm_is_its_own_outline():
     assert name == "the skin"
     layout = info.layout
     for line in lines:
-        np.testing.assert_allclose(np.hypot(line[:, 0], line[:, 1]), layout.radius_m, rtol=1e-12)
+        np.testing.assert_allclose(
+            np.hypot(line[:, 0], line[:, 1]), layout.radius_m, rtol=1e-12
+        )
     assert lines[0][0, 2] - lines[1][0, 2] == pytest.approx(15 * layout.pitch_m[0])

@@ -1,4 +1,5 @@
-"""Tables of values: the same trial in every form, sensors that fall, and what cannot be used."""
+"""Tables of values: the same trial in every form, sensors that fall, and what cannot be
+used."""
 
 import io
 import json
@@ -69,7 +70,9 @@ def a_long_table_of_values(folder):
 
 def a_long_table_of_frames(folder):
     rows = [("3", "cup", *row) for row in WIDE]
-    (folder / "all.tsv").write_text(text(rows, "\t", "trial\tobject\tseconds\ta\tb\tc\td\te\tf"))
+    (folder / "all.tsv").write_text(
+        text(rows, "\t", "trial\tobject\tseconds\ta\tb\tc\td\te\tf")
+    )
 
 
 @pytest.fixture
@@ -79,7 +82,8 @@ def folder(tmp_path):
 
 
 def imported(folder, *words):
-    """The exit status, and the recordings by name, of a folder or of the long table in it."""
+    """The exit status, and the recordings by name, of a folder or of the long table in
+    it."""
     path = next(folder.glob("all.*"), folder)
     out = folder.parent / "out"
     status = main(["import", "csv", str(path), "--out", str(out), *words])
@@ -132,16 +136,24 @@ def test_texts_are_objects_as_numpy_swallows_ctrl_c_in_texts_of_its_own(folder):
 
 def test_trials_may_be_numbered_in_an_array(folder):
     rows = np.array([[0.0], [0.0], [7.0]])
-    savemat(folder / "all.mat", {"trial": rows, "t": np.array([[0.0], [0.1], [0.0]]), "a": rows})
+    savemat(
+        folder / "all.mat",
+        {"trial": rows, "t": np.array([[0.0], [0.1], [0.0]]), "a": rows},
+    )
     _, recordings = imported(folder)
-    assert {name: len(trial.t) for name, trial in recordings.items()} == {"0.0": 2, "7.0": 1}
+    assert {name: len(trial.t) for name, trial in recordings.items()} == {
+        "0.0": 2,
+        "7.0": 1,
+    }
 
 
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
     (folder / "a.csv").write_text(text(rows, head="left,right,q.1,q.2"))
     (folder / "labels.csv").write_text("\ufefftrial,object,who\na,bear,me\n")
-    (folder / "skin.json").write_text(json.dumps({"rows": 2, "cols": 1, "threshold_counts": 3}))
+    (folder / "skin.json").write_text(
+        json.dumps({"rows": 2, "cols": 1, "threshold_counts": 3})
+    )
     words = ["--rate", "10", "--joints", "q", "--degrees", "--scale", "10"]
     status, recordings = imported(folder, *words)
     assert status == 0
@@ -202,6 +214,10 @@ RATE = ("--rate", "1")
 def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refusal):
     for name, content in files.items():
         (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        (folder / name).write_bytes(
+            content if isinstance(content, bytes) else content.encode()
+        )
     path = next(folder.glob("all.*"), folder)
-    assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out", *words)
+    assert sentence in refusal(
+        "import", "csv", path, "--out", folder.parent / "out", *words
+    )

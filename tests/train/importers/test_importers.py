@@ -1,4 +1,5 @@
-"""The real grasps as recordings, number by number, and files of theirs that are damaged."""
+"""The real grasps as recordings, number by number, and files of theirs that are
+damaged."""
 
 import bz2
 import math
@@ -31,7 +32,12 @@ ANGLES = [(0, [0.0] * 7), (40, [90.0] * 7)]
 
 
 def dsa(
-    frames=FRAMES, stamps=(1000, 1032, 1064), angles=ANGLES, mask=MASK, width="3.4", pads=range(6)
+    frames=FRAMES,
+    stamps=(1000, 1032, 1064),
+    angles=ANGLES,
+    mask=MASK,
+    width="3.4",
+    pads=range(6),
 ) -> str:
     matrices = "".join(
         f'<matrix index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
@@ -94,7 +100,10 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
     ("content", "word"),
     [
         (b"BZh9 no bzip2", "Invalid data stream"),
-        (bz2.compress(dsa().encode())[:-20], "file ended before the end-of-stream marker"),
+        (
+            bz2.compress(dsa().encode())[:-20],
+            "file ended before the end-of-stream marker",
+        ),
         (dsa()[:-20], "unclosed token"),
         ('<!DOCTYPE x [<!ENTITY a "b">]>' + dsa(), "declares a document type"),
         (dsa(frames=[], stamps=()), "has no frame"),
@@ -104,7 +113,10 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa(frames=[[-485]], stamps=(0,)), "does not unpack to 486"),
         (dsa(frames=[[-485, 0.5]], stamps=(0,)), "no whole number"),
         (dsa(frames=[[float("nan")]], stamps=(0,)), "no whole number"),
-        (dsa().replace("C3F30000", "C3F3"), "buffer size must be a multiple of element size"),
+        (
+            dsa().replace("C3F30000", "C3F3"),
+            "buffer size must be a multiple of element size",
+        ),
         (dsa().replace("C3F30000", "hello"), "non-hexadecimal number"),
         (dsa().replace('index="0"', f'index="{"1" * 5000}"'), "limit (4300 digits)"),
         (dsa().replace("<time_stamp>1032</time_stamp>", ""), "time_stamp must be"),
@@ -129,12 +141,16 @@ def test_a_folder_without_grasps_and_an_arm_are_refused(tmp_path):
         list(sdh2.trials(tmp_path, Chain.cody()))
 
 
-def test_the_command_writes_a_folder_that_trains_with_the_hands_joints(tmp_path, capsys):
+def test_the_command_writes_a_folder_that_trains_with_the_hands_joints(
+    tmp_path, capsys
+):
     for i in range(3):
         written(tmp_path, dsa(), f"cup_{i}.dsa")
     out = tmp_path / "out"
     assert main(["import", "sdh2", str(tmp_path), "--out", str(out)]) == 0
-    assert sorted(p.name for p in out.iterdir()) == [f"000{i}_cup.npz" for i in range(3)]
+    assert sorted(p.name for p in out.iterdir()) == [
+        f"000{i}_cup.npz" for i in range(3)
+    ]
     assert f"recordings written to {out}: 3" in capsys.readouterr().out
     assert load(out / "0000_cup.npz").joints.shape == (3, 7)
     data = load_trials([out], features=["contact_motion", "joint_change@2"])

@@ -33,7 +33,11 @@ def header(types, t):
     stamp = types.types["builtin_interfaces/msg/Time"](
         sec=nanoseconds(t) // 10**9, nanosec=nanoseconds(t) % 10**9
     )
-    more = {"seq": 0} if "seq" in types.types["std_msgs/msg/Header"].__annotations__ else {}
+    more = (
+        {"seq": 0}
+        if "seq" in types.types["std_msgs/msg/Header"].__annotations__
+        else {}
+    )
     return types.types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **more)
 
 
@@ -53,13 +57,23 @@ def image(types, t, frame, *, big=False, padding=3):
 
 def array(types, frame, *, dims=True):
     dimension = types.types["std_msgs/msg/MultiArrayDimension"]
-    shape = [dimension(label=n, size=s, stride=0) for n, s in (("rows", ROWS), ("cols", COLS))]
-    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=shape if dims else [], data_offset=0)
-    return types.types["std_msgs/msg/UInt16MultiArray"](layout=layout, data=frame.reshape(-1))
+    shape = [
+        dimension(label=n, size=s, stride=0)
+        for n, s in (("rows", ROWS), ("cols", COLS))
+    ]
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](
+        dim=shape if dims else [], data_offset=0
+    )
+    return types.types["std_msgs/msg/UInt16MultiArray"](
+        layout=layout, data=frame.reshape(-1)
+    )
 
 
 def images(version=2, *, big=False):
-    return [image(STORES[version], t, frame, big=big) for t, frame in zip(T, FRAMES, strict=True)]
+    return [
+        image(STORES[version], t, frame, big=big)
+        for t, frame in zip(T, FRAMES, strict=True)
+    ]
 
 
 def arrays(*, dims=True):
@@ -76,7 +90,8 @@ def joint_state(types, t, q, names=NAMES):
 
 
 def write_bag(path, version, frames, *, joints=True, topics=("/skin",), states=None):
-    """A bag whose messages are logged 7 ms after their stamps; `states` are (t, names, q)."""
+    """A bag whose messages are logged 7 ms after their stamps; `states` are (t, names,
+    q)."""
     types = STORES[version]
     serialize = types.serialize_ros1 if version == 1 else types.serialize_cdr
     with Bag1(path) if version == 1 else Bag2(path, version=9) as bag:
@@ -109,7 +124,8 @@ def differences(recording, *, joints=True):
     same = {
         "frames": np.array_equal(recording.frames, FRAMES),
         "t": recording.t == pytest.approx(T - T[0], abs=1e-6),
-        "joints": recording.joints == (pytest.approx(angles, abs=1e-4) if joints else None),
+        "joints": recording.joints
+        == (pytest.approx(angles, abs=1e-4) if joints else None),
     }
     return [name for name, equal in same.items() if not equal]
 
@@ -154,7 +170,9 @@ def every(names, columns, t=JOINT_T):
     ],
     ids=["backwards", "among others", "of two publishers"],
 )
-def test_angles_are_told_apart_by_the_names_of_their_joints(tmp_path, arm, capsys, states):
+def test_angles_are_told_apart_by_the_names_of_their_joints(
+    tmp_path, arm, capsys, states
+):
     path = bag_of(tmp_path, sorted(states, key=lambda state: state[0]))
     recording = imported(tmp_path, "rosbag", path, *arm)
     assert differences(recording) == []
@@ -167,7 +185,10 @@ def test_angles_are_told_apart_by_the_names_of_their_joints(tmp_path, arm, capsy
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("a", *NAMES[1:]), "has no angle of the arm's joint j0; there are a, j1, j2, j3, j4"),
+        (
+            ("a", *NAMES[1:]),
+            "has no angle of the arm's joint j0; there are a, j1, j2, j3, j4",
+        ),
         (("j0", *NAMES[:-1]), "names a joint twice"),
         (NAMES[:3], "names are 3 and angles 5"),
     ],
@@ -201,7 +222,10 @@ def test_of_two_topics_of_frames_one_must_be_named(tmp_path, refusal):
     path = write_bag(tmp_path / "grasp", 2, arrays(), topics=("/left", "/right"))
     for beside, said in (
         ("{}", 'frames are on /left, /right; name one of them as "frames_topic"'),
-        ('{"frames_topic": {}}', "frames_topic in grasp.json must be one of ['/left', '/right']"),
+        (
+            '{"frames_topic": {}}',
+            "frames_topic in grasp.json must be one of ['/left', '/right']",
+        ),
     ):
         (tmp_path / "grasp.json").write_text(beside)
         assert said in refusal("import", "rosbag", path, "--out", tmp_path / "out")
@@ -230,7 +254,9 @@ def write_mcap(path, *, cdr, **options):
     types = STORES[2]
 
     def data(kind, message, fields):
-        return types.serialize_cdr(message, kind) if cdr else json.dumps(fields).encode()
+        return (
+            types.serialize_cdr(message, kind) if cdr else json.dumps(fields).encode()
+        )
 
     frames = [
         data("sensor_msgs/msg/Image", message, {"counts": frame.tolist()})
@@ -248,10 +274,14 @@ def write_mcap(path, *, cdr, **options):
             ("/joints", "JointState", JOINT_T, poses),
         ):
             encoding = ("ros2msg", "cdr") if cdr else ("jsonschema", "json")
-            schema = writer.register_schema(f"sensor_msgs/msg/{kind}", encoding[0], b"{}")
+            schema = writer.register_schema(
+                f"sensor_msgs/msg/{kind}", encoding[0], b"{}"
+            )
             channel = writer.register_channel(topic, encoding[1], schema)
             for t, message in zip(times, messages, strict=True):
-                writer.add_message(channel, nanoseconds(t), bytes(message), nanoseconds(t))
+                writer.add_message(
+                    channel, nanoseconds(t), bytes(message), nanoseconds(t)
+                )
         writer.finish()
     return path
 
@@ -263,7 +293,9 @@ def test_an_mcap_file_of_ros_or_json_messages(tmp_path, cdr):
 
 
 def test_a_json_message_that_is_no_table_is_named_with_its_topic(tmp_path):
-    with pytest.raises(InputError, match=r"grasp: a message of /skin must be a table, not \[\]"):
+    with pytest.raises(
+        InputError, match=r"grasp: a message of /skin must be a table, not \[\]"
+    ):
         Log.of(tmp_path / "grasp").json("/skin", b"[]", 0.0)
 
 

@@ -1,4 +1,5 @@
-"""Pictures of a report: the same numbers give the same bytes, for a page and for a phone."""
+"""Pictures of a report: the same numbers give the same bytes, for a page and for a
+phone."""
 
 import io
 

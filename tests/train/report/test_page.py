@@ -1,4 +1,5 @@
-"""The report: one page that needs no other file, its tables as CSV, its plots as PNG."""
+"""The report: one page that needs no other file, its tables as CSV, its plots as
+PNG."""
 
 import csv
 import io
@@ -19,7 +20,10 @@ HOSTILE = '<script>alert("1 & 2")</script>'
 
 
 def table(**more):
-    rows = [{"case": "a,b", "n": 1, "seconds": 0.5}, {"case": HOSTILE, "n": 2, "seconds": 0.25}]
+    rows = [
+        {"case": "a,b", "n": 1, "seconds": 0.5},
+        {"case": HOSTILE, "n": 2, "seconds": 0.25},
+    ]
     return Table("speed", "How fast", rows, **more)
 
 
@@ -54,9 +58,17 @@ def test_timings_are_in_a_file_of_their_own():
 
 def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
     tables = [table(), Table("empty", "Nothing", [])]
-    sections = [Section("One", figures=[Figure("plot", "A plot", b"\x89PNG", b"")], tables=tables)]
+    sections = [
+        Section(
+            "One", figures=[Figure("plot", "A plot", b"\x89PNG", b"")], tables=tables
+        )
+    ]
     report = write(tmp_path, "Title", [], sections)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["plot.png", "report.html", "speed.csv"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "plot.png",
+        "report.html",
+        "speed.csv",
+    ]
     text = report.read_text()
     assert 'src="data:image/png;base64,iVBORw=="' in text
     assert "http" not in text
@@ -72,7 +84,12 @@ def test_a_long_table_is_folded_and_a_phone_shows_its_first_columns():
 
 def test_the_first_section_is_open_and_the_others_are_folded():
     text = page("Title", [], [Section("One"), Section("Two", ["below"])])
-    assert text.index("One") < text.index("<details") < text.index("Two") < text.index("below")
+    assert (
+        text.index("One")
+        < text.index("<details")
+        < text.index("Two")
+        < text.index("below")
+    )
 
 
 def test_words_are_explained_and_code_is_set_as_code():

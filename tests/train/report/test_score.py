@@ -1,4 +1,5 @@
-"""Scores of the reports: their columns, the best cell, transfers, nested accuracy, baselines."""
+"""Scores of the reports: their columns, the best cell, transfers, nested accuracy,
+baselines."""
 
 import numpy as np
 import pytest
@@ -59,13 +60,19 @@ def test_a_change_that_moves_trials_among_others_costs():
 
 def test_nested_accuracy_of_clear_classes_is_one():
     X, y = clear()
-    result = nested(X, {"t": y}, stratified_folds(y), grid=SearchGrid("IV"), features=ONE)["t"]
+    result = nested(
+        X, {"t": y}, stratified_folds(y), grid=SearchGrid("IV"), features=ONE
+    )["t"]
     assert (result.right, result.total, result.components, result.k) == (60, 60, 1, 1)
 
 
 def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
     searched, plain = score(Result(10, 20, components=3, k=2)), score(Result(10, 20))
-    assert list(searched) == list(plain) == ["accuracy %", "from %", "to %", "k", "components"]
+    assert (
+        list(searched)
+        == list(plain)
+        == ["accuracy %", "from %", "to %", "k", "components"]
+    )
     assert searched["from %"] < 50.0 < searched["to %"]
     assert (searched["k"], plain["k"]) == (2, "")
     assert interval(Result(10, 20)) == "30 to 70"
@@ -75,7 +82,8 @@ def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
 
 
 def test_the_interval_of_a_paired_difference_holds_95_of_100_differences():
-    """Of 2,000 pairs that err on many of the same trials, one in twenty lies outside."""
+    """Of 2,000 pairs that err on many of the same trials, one in twenty lies
+    outside."""
     rng = np.random.default_rng(0)
     inside = []
     for _ in range(2000):

@@ -27,14 +27,24 @@ def test_a_sum_that_leaves_sixteen_bits_saturates():
 
 def test_resolutions_are_the_papers(forearm):
     assert [s.rows * s.cols for s, _ in coarser(forearm, [])] == [96, 24, 6, 1]
-    assert [s.rows * s.cols for s, _ in coarser(SkinLayout(13, 13), [])] == [49, 16, 4, 1]
+    assert [s.rows * s.cols for s, _ in coarser(SkinLayout(13, 13), [])] == [
+        49,
+        16,
+        4,
+        1,
+    ]
 
 
 def test_a_larger_taxel_lies_in_the_middle_of_its_parts(forearm):
-    for skin in (forearm, replace(forearm, column_angles_deg=tuple(15.0 * c for c in range(24)))):
+    for skin in (
+        forearm,
+        replace(forearm, column_angles_deg=tuple(15.0 * c for c in range(24))),
+    ):
         coarse = pooled_layout(skin)
         for row, col in ((0, 0), (3, 5), (7, 11)):
-            angles = [skin.position(2 * row + r, 2 * col + c) for r in (0, 1) for c in (0, 1)]
+            angles = [
+                skin.position(2 * row + r, 2 * col + c) for r in (0, 1) for c in (0, 1)
+            ]
             middle = np.mean(angles, axis=0)
             place = coarse.position(row, col)
             assert place[2] == pytest.approx(middle[2])

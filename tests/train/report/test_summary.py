@@ -31,16 +31,23 @@ def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     assert not lines[3]
 
 
-def test_flattering_data_and_left_out_recordings_get_a_warning(recordings, make_touch, tmp_path):
+def test_flattering_data_and_left_out_recordings_get_a_warning(
+    recordings, make_touch, tmp_path
+):
     save(tmp_path / "still.npz", make_touch(seconds=0.0))
     save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))
     paths = [str(recordings), str(tmp_path)]
-    fitted = train.fit(paths, features=["paper"], projection="pca", window_s=9.0, jobs=1)
+    fitted = train.fit(
+        paths, features=["paper"], projection="pca", window_s=9.0, jobs=1
+    )
     text = "\n".join(warnings(fitted))
     assert "warning: no contact above 150 counts, so counted as wrong: " in text
     assert "python -m train thresholds" in text
     assert "recordings are left out for lack of a label for object: " in text
-    assert "the window of 9 s is too long: every recording ends within 1.59 s of the onset" in text
+    assert (
+        "the window of 9 s is too long: every recording ends within 1.59 s of the onset"
+        in text
+    )
 
 
 def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
@@ -48,7 +55,9 @@ def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
     objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
     for path in recordings.glob("*.npz"):
         recording = load(path)
-        place = np.full_like(recording.joints, 0.3 * objects.index(recording.labels["object"]))
+        place = np.full_like(
+            recording.joints, 0.3 * objects.index(recording.labels["object"])
+        )
         save(tmp_path / path.name, replace(recording, joints=place))
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert posture_accuracy(fitted.dataset, "object") == 1.0
@@ -57,17 +66,24 @@ def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
 
 
 def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
-    """Every recording begins in a pose that one of another object has too, and no other."""
+    """Every recording begins in a pose that one of another object has too, and no
+    other."""
     for i, path in enumerate(sorted(recordings.glob("*.npz"))):
         recording = load(path)
-        save(tmp_path / path.name, replace(recording, joints=0.0 * recording.joints + i % 8))
+        save(
+            tmp_path / path.name,
+            replace(recording, joints=0.0 * recording.joints + i % 8),
+        )
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert posture_accuracy(fitted.dataset, "object") == 0.0 < LEAK
-    assert not any("warning: object: the joint angles" in line for line in warnings(fitted))
+    assert not any(
+        "warning: object: the joint angles" in line for line in warnings(fitted)
+    )
 
 
 def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
-    """One touch stored under three names, twice with its own label and once with another."""
+    """One touch stored under three names, twice with its own label and once with
+    another."""
     shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
     touch = load(recordings / "soft_7.npz")
     save(tmp_path / "again.npz", touch)
@@ -79,18 +95,33 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
 
 
 def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings):
-    """A skin that was stored with a scale of its own: one trial of newtons a million times too
-    many leaves a few steps for all others."""
-    fixed = {"features": ["paper"], "projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
+    """A skin that was stored with a scale of its own: one trial of newtons a million
+    times too many leaves a few steps for all others."""
+    fixed = {
+        "features": ["paper"],
+        "projection": "pca",
+        "scaling": "none",
+        "jobs": 1,
+        "k": 1,
+    }
     fitted = train.fit(str(recordings), components=5, **fixed)
     assert not any("steps" in line for line in warnings(fitted))
     outlier = fitted.X.copy()
     outlier[7] *= 3e6
     classifier = ContactClassifier(fitted.classifier.choices, fitted.dataset.names)
-    classifier.fit(outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen})
-    said = [line for line in warnings(replace(fitted, classifier=classifier)) if "steps" in line]
+    classifier.fit(
+        outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen}
+    )
+    said = [
+        line
+        for line in warnings(replace(fitted, classifier=classifier))
+        if "steps" in line
+    ]
     assert len(said) == len(fitted.chosen)
-    assert f"because {fitted.dataset.trials[7].path} lies far outside all others" in said[0]
+    assert (
+        f"because {fitted.dataset.trials[7].path} lies far outside all others"
+        in said[0]
+    )
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,9 @@ class Batch(PhysicsRun):
 def run_batch(scene, specs, **options) -> Batch:
     physics = run_physics(scene, specs, **options)
     seen = list(readings(physics))
-    return Batch(**vars(physics), counts=np.stack([read.frames() for read in seen]), seen=seen)
+    return Batch(
+        **vars(physics), counts=np.stack([read.frames() for read in seen]), seen=seen
+    )
 
 
 def run(scene, step_s=0.01, **options) -> Batch:
@@ -70,8 +72,9 @@ Trace = namedtuple("Trace", "t force q target slide speed depth")
 class Rig:
     """n pushers of stiffness `arm_k` whose ends run at `speed` against beds of springs.
 
-    The step is the simulator's own; only the arm's geometry is left out (one joint of lever 1).
-    All lines of a bed's law are looked at where the gaps of its springs are not given.
+    The step is the simulator's own; only the arm's geometry is left out (one joint of
+    lever 1). All lines of a bed's law are looked at where the gaps of its springs are
+    not given.
     """
 
     def __init__(
@@ -83,15 +86,28 @@ class Rig:
         n = max([v.size for v in (*given, np.asarray(h), law[1][0])])
         box = {"name": "x", "family": "rigid", "conditions": ["fixed"]}
         scene = from_dict({"object": [box]})
-        values = {key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)}
+        values = {
+            key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)
+        }
         specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
         self.trials = t = Trials(scene, specs, values, plan_of((effects,) * n))
         t.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
-        t.rate, t.joint_k, t.damping = np.zeros((5, 1)), np.ones((5, 1)), np.zeros((5, 1))
-        t.rate[0], t.joint_k[0], t.damping[0], t.travel_s[0] = speed, arm_k, arm_d, travel_s
+        t.rate, t.joint_k, t.damping = (
+            np.zeros((5, 1)),
+            np.ones((5, 1)),
+            np.zeros((5, 1)),
+        )
+        t.rate[0], t.joint_k[0], t.damping[0], t.travel_s[0] = (
+            speed,
+            arm_k,
+            arm_d,
+            travel_s,
+        )
         t.jacobian[0, 0] = 1.0
         shape = (len(law[1]), n)
-        t.law_gaps, t.slopes, t.intercepts = (np.broadcast_to(part, shape) for part in law)
+        t.law_gaps, t.slopes, t.intercepts = (
+            np.broadcast_to(part, shape) for part in law
+        )
         t.plan.run(("stand", *TUNE), t)
         t.compliance[0] = t.give[0]
 

@@ -28,13 +28,16 @@ def test_halving_the_step_halves_the_error(thing):
 
 
 def test_a_light_object_that_swings_within_a_step_is_not_within_the_tolerance():
-    # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in that.
+    # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in
+    # that.
     scene = make(movable(1e-4, 0.5, 0.4), lead_s=0.05, after_s=0.15)
     trials = next(iter(kinds(scene).values()))
     (convergence,) = measure(scene, [trials])
     assert not convergence.within
     true, step = (
-        run_physics(scene, tuple(replace(trial, step_s=step_s) for trial in trials)).force
+        run_physics(
+            scene, tuple(replace(trial, step_s=step_s) for trial in trials)
+        ).force
         for step_s in (2e-5, convergence.step_s)
     )
     assert convergence.error >= 0.9 * np.sqrt(np.mean((step - true) ** 2)) / true.max()

@@ -1,4 +1,5 @@
-"""An effect is added by a module and its entry in the schema, as CONTRIBUTING.md shows."""
+"""An effect is added by a module and its entry in the schema, as CONTRIBUTING.md
+shows."""
 
 import re
 import sys
@@ -30,8 +31,13 @@ def sponge(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("sponge")
 def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
-    # F' = K (v - F / eta), so F = eta v (1 - exp(-K t / eta)), with arm and bed in series.
-    eta, speed, stiffness = np.array([20.0, 60.0]), 0.15, 1.0 / (1.0 / 115.0 + 1.0 / 1e4)
+    # F' = K (v - F / eta), so F = eta v (1 - exp(-K t / eta)), with arm and bed in
+    # series.
+    eta, speed, stiffness = (
+        np.array([20.0, 60.0]),
+        0.15,
+        1.0 / (1.0 / 115.0 + 1.0 / 1e4),
+    )
     trace = Rig(h=5e-4, speed=speed, effects=("sponge",), sponge_n_s_m=eta).run(2000)
     want = eta * speed * (1.0 - np.exp(-stiffness * trace.t / eta))
     np.testing.assert_allclose(trace.force, want, atol=2e-3 * want.max())

@@ -1,4 +1,5 @@
-"""The loads on a pivoting forearm are the one minimum of a convex energy, or are refused."""
+"""The loads on a pivoting forearm are the one minimum of a convex energy, or are
+refused."""
 
 from dataclasses import replace
 from functools import partial
@@ -35,7 +36,8 @@ def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
 
 
 def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
-    # Its push and its tilt go together, as on an arm of 20 cm and more, and C has no inverse.
+    # Its push and its tilt go together, as on an arm of 20 cm and more, and C has no
+    # inverse.
     beds, free, (c00, *_) = tilt_cases(600, seed=2)
     lean = np.linspace(-5.0, 5.0, 600)
     c01 = lean * c00
@@ -63,7 +65,9 @@ def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
 def bed_loads(springs, y0, y1):
     """Force and moment of beds at a depth and a tilt."""
     inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
-    force = (np.maximum(inside, 0.0) * springs.stiffness * springs.weight[:, None]).sum(axis=1)
+    force = (np.maximum(inside, 0.0) * springs.stiffness * springs.weight[:, None]).sum(
+        axis=1
+    )
     return force.sum(axis=0), (force * springs.lever).sum(axis=0)
 
 
@@ -98,7 +102,8 @@ def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
 
 
 def tilt_error(springs, free, c, loads):
-    """Distance from the one answer, metres at the skin: the step that exact Newton would take.
+    """Distance from the one answer, metres at the skin: the step that exact Newton
+    would take.
 
     The energy is strictly convex, so a point with no step left is its minimum.
     """
@@ -117,7 +122,12 @@ def tilt_error(springs, free, c, loads):
     c01 = c[1] + mean * c[2]
     c00 = c[0] + mean * (c[1] + c01)
     r0 = r0 + mean * r1
-    det = 1.0 + c00 * stiffness + c[2] * spread + (c00 * c[2] - c01 * c01) * stiffness * spread
+    det = (
+        1.0
+        + c00 * stiffness
+        + c[2] * spread
+        + (c00 * c[2] - c01 * c01) * stiffness * spread
+    )
     p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
     p1 = ((1.0 + c00 * stiffness) * r1 - c01 * stiffness * r0) / det
     return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)

@@ -10,12 +10,15 @@ SCENE = scene(one_object(), skin={"rows": 2, "cols": 4}, motion={"place_m": 0.18
 
 
 @pytest.mark.parametrize(
-    ("count", "shown"), [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)]
+    ("count", "shown"),
+    [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)],
 )
 def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, shown):
     counts = np.zeros((3, 2, 4), dtype=np.float32)
     counts[1, 1, 2] = count
-    reading = Readings(SCENE, None, (), 0, np.arange(3) / 100.0, counts, np.zeros((3, 1)))
+    reading = Readings(
+        SCENE, None, (), 0, np.arange(3) / 100.0, counts, np.zeros((3, 1))
+    )
     want = np.zeros((3, 2, 4), dtype=np.uint16)
     want[1, 1, 2] = shown
     assert reading.frames().dtype == np.uint16

@@ -21,7 +21,12 @@ MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
 
 def scene(*add, leave_out=(), objects=None, **trials):
-    box = {"name": "box", "family": "rigid", "conditions": ["fixed", "movable"], **MOVES}
+    box = {
+        "name": "box",
+        "family": "rigid",
+        "conditions": ["fixed", "movable"],
+        **MOVES,
+    }
     return scenes.scene(
         objects or [box],
         seed=3,
@@ -32,7 +37,8 @@ def scene(*add, leave_out=(), objects=None, **trials):
 
 
 def everything():
-    """One object of each family, with every key that calls for an effect; a plant of few stems."""
+    """One object of each family, with every key that calls for an effect; a plant of
+    few stems."""
     full = {
         **MOVES, "skin_friction": 0.3, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1,
         "height_m": 0.3, "foot_m": 0.2, "aside_m": 0.02, "slope_deg": 1.0,
@@ -70,7 +76,9 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         for name in EFFECTS:
             if name not in effects:
                 bomb = types.ModuleType(name)
-                bomb.__getattr__ = lambda attribute, name=name: pytest.fail(f"{name} was touched")
+                bomb.__getattr__ = lambda attribute, name=name: pytest.fail(
+                    f"{name} was touched"
+                )
                 monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
         after = batch_of(trial_scene, i)[0]
         monkeypatch.undo()
@@ -109,7 +117,9 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     # Before the contact nothing but the noise's own draws is to be seen.
     far = {"lead_s": 5.0, "after_s": 0.1}
     trial_scene = scene("noise", **far)
-    other_scene = scene("noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far)
+    other_scene = scene(
+        "noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far
+    )
     first, second = (batch_of(s)[0].counts[:, :499] for s in (trial_scene, other_scene))
     assert first.any()
     np.testing.assert_array_equal(first, second)
@@ -141,7 +151,10 @@ def test_6_results_do_not_depend_on_the_batch(sensor):
     together = run_batch(trial_scene, every)
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
-        some, where = run_batch(trial_scene, specs), [every.index(spec) for spec in specs]
+        some, where = (
+            run_batch(trial_scene, specs),
+            [every.index(spec) for spec in specs],
+        )
         for name in ("counts", "joints", "force"):
             bits = getattr(together, name)[where].tobytes()
             assert getattr(some, name).tobytes() == bits, (name, specs[0].key)
@@ -158,7 +171,9 @@ def test_each_required_effect_has_its_reason():
     reasons = {"relaxation": "family foam", "sliding": "movable", "cover": "cover_n_m"}
     reasons |= {"tipping": "base_m and height_m", "noise": "effects.add"}
     assert called.items() >= reasons.items()
-    assert not {"sliding", "stribeck"} & set(required_effects(trial_scene, foam, "fixed"))
+    assert not {"sliding", "stribeck"} & set(
+        required_effects(trial_scene, foam, "fixed")
+    )
     trial_scene = scene(leave_out=["relaxation"], objects=everything())
     called = required_effects(trial_scene, foam, "fixed")
     assert ("foundation" in called, "relaxation" in called) == (True, False)
@@ -166,14 +181,26 @@ def test_each_required_effect_has_its_reason():
 
 def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
     wall = {"name": "wall", "family": "rigid", "conditions": ["fixed"]}
-    box = {**wall, "name": "box", "conditions": ["fixed", "movable"], "foot_m": 0.2, **MOVES}
-    trial_scene = from_dict({"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}})
+    box = {
+        **wall,
+        "name": "box",
+        "conditions": ["fixed", "movable"],
+        "foot_m": 0.2,
+        **MOVES,
+    }
+    trial_scene = from_dict(
+        {"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}}
+    )
     pushed, still = trial_scene.objects
     assert {"slope", "turning"} <= set(required_effects(trial_scene, pushed, "movable"))
-    assert not {"slope", "turning"} & set(required_effects(trial_scene, pushed, "fixed"))
+    assert not {"slope", "turning"} & set(
+        required_effects(trial_scene, pushed, "fixed")
+    )
     assert (pushed.values["slope_deg"].low, "slope_deg" in still.values) == (0.0, False)
     for key, needed in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
-        with pytest.raises(InputError, match=f"spread.{key} .*: give a movable object {needed}"):
+        with pytest.raises(
+            InputError, match=f"spread.{key} .*: give a movable object {needed}"
+        ):
             from_dict({"object": [wall], "spread": {key: 1e-3}})
 
 

@@ -1,9 +1,9 @@
 """No effect and no pair of effects makes energy: a ledger of every step.
 
-The equilibrium point's motion is all that puts energy in. In each step of a joint, backward Euler's
-I (v+ - v) / h + d v+ + k (q+ - q_eq) = -tau leaves tau dq to the contact, whatever its effects
-are: nothing in free motion, and never less than nothing in sum. The speed and the lean of a pushed
-object take no more than the contact took.
+The equilibrium point's motion is all that puts energy in. In each step of a joint,
+backward Euler's I (v+ - v) / h + d v+ + k (q+ - q_eq) = -tau leaves tau dq to the
+contact, whatever its effects are: nothing in free motion, and never less than nothing
+in sum. The speed and the lean of a pushed object take no more than the contact took.
 """
 
 from dataclasses import replace
@@ -38,15 +38,20 @@ ROUNDING = 1e-9
 
 
 class Ledger:
-    """Joules, step by step: those that the arm gave the contact, and the contact the object."""
+    """Joules, step by step: those that the arm gave the contact, and the contact the
+    object."""
 
     def __init__(self, scene, specs, meddle=None):
         """Of a scene's trials; `meddle` changes them after each step."""
         self.scene, self.specs, self.meddle = scene, specs, meddle
         plan = make_plan(scene, specs)
         book = Call("ledger", self.book, np.ones(len(specs), dtype=bool))
-        self.plan = replace(plan, stages={**plan.stages, "settle": [*plan.stages["settle"], book]})
-        self.inertia = np.array(scene.inertia)[:, None] if "inertia" in plan.calls else 0.0
+        self.plan = replace(
+            plan, stages={**plan.stages, "settle": [*plan.stages["settle"], book]}
+        )
+        self.inertia = (
+            np.array(scene.inertia)[:, None] if "inertia" in plan.calls else 0.0
+        )
         self.took, self.idle, self.pushed, self.has = [], [], [], []
         self.q = None
 
@@ -91,7 +96,9 @@ class Ledger:
         first = np.argmin(self.idle, axis=0)
         before = [np.abs(took[:k, i]).max() for i, k in enumerate(first)]
         assert max(before) <= ROUNDING, f"{effects}: the arm alone made or lost energy"
-        assert (took - idle >= -ROUNDING * scale).all(), f"{effects}: gave back more than it took"
+        assert (took - idle >= -ROUNDING * scale).all(), (
+            f"{effects}: gave back more than it took"
+        )
         if self.pushed:
             pushed = np.cumsum(self.pushed, axis=0)
             assert (np.array(self.has) <= pushed + ROUNDING * scale).all(), (
@@ -100,7 +107,8 @@ class Ledger:
 
 
 def lean(t, mover):
-    """The energy stored in the lean of a thing that tips; beyond the balance it gives it back."""
+    """The energy stored in the lean of a thing that tips; beyond the balance it gives
+    it back."""
     if "tipping" not in t.own:
         return 0.0
     own = t.own["tipping"]
@@ -109,8 +117,8 @@ def lean(t, mover):
 
 
 def pair_scene(first, second):
-    """A scene whose object calls for two effects and for nothing that they do not need; None where
-    no object can have both."""
+    """A scene whose object calls for two effects and for nothing that they do not need;
+    None where no object can have both."""
     pair = {first, second}
     pair |= {need for name in pair for need in EFFECTS[name].needs}
     families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
@@ -175,5 +183,7 @@ def test_a_run_that_makes_energy_is_refused():
     for every, turned, when in ((1, -1.0, ": at 1 s"), (2, 0.02, "")):
         joints = batch.joints.copy()
         joints[1, 100::every, 0] += turned
-        with pytest.raises(EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"):
+        with pytest.raises(
+            EdgeError, match=f"trial 1 of thing-fixed makes energy{when}"
+        ):
             engine.check_energy(batch.trials, joints, batch.t)

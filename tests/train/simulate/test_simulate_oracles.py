@@ -1,4 +1,5 @@
-"""The simulated arm, and rigid things that it pushes, held against answers that are known."""
+"""The simulated arm, and rigid things that it pushes, held against answers that are
+known."""
 
 import math
 from dataclasses import replace
@@ -8,7 +9,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
-from tests.train.simulate.scenes import Rig, make, movable, one_object, run, scene, slider, specs_of
+from tests.train.simulate.scenes import (
+    Rig,
+    make,
+    movable,
+    one_object,
+    run,
+    scene,
+    slider,
+    specs_of,
+)
 from train.simulate import engine
 from train.simulate.arm import Kinematics
 from train.simulate.contact import GRAVITY
@@ -22,7 +32,12 @@ RADIUS = 0.04604
 SKEW_JOINTS = [
     {"name": "a", "axis": [1, 2, 3], "origin_xyz": [0.1, 0.2, 0.3]},
     {"name": "f", "type": "fixed", "axis": [1, 0, 0], "origin_rpy": [0.3, 0.2, 1]},
-    {"name": "b", "axis": [0, -1, 0.5], "origin_rpy": [1, 0, 0.4], "translate": [0, 0, 0.2]},
+    {
+        "name": "b",
+        "axis": [0, -1, 0.5],
+        "origin_rpy": [1, 0, 0.4],
+        "translate": [0, 0, 0.2],
+    },
 ]
 SKEW = Chain.from_dict({"joint": SKEW_JOINTS})
 
@@ -66,7 +81,8 @@ class TestArm:
         assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
 
     def test_contact_holds_the_arm_where_the_object_is(self):
-        # A rigid, fixed object: the skin's point at the contact does not go on along the push.
+        # A rigid, fixed object: the skin's point at the contact does not go on along
+        # the push.
         batch = run(make(one_object(width_m=0.05)))
         t = batch.trials
         held = t.kinematics.pose(batch.joints[0].T)
@@ -127,7 +143,9 @@ class TestInertia:
 
     def swing(self, tmp_path, h, loss_s, after_s=0.6):
         chain = tmp_path / "arm.toml"
-        chain.write_text('[[joint]]\nname = "a"\naxis = [0, -1, 0]\ntranslate = [0, 0, -0.4]\n')
+        chain.write_text(
+            '[[joint]]\nname = "a"\naxis = [0, -1, 0]\ntranslate = [0, 0, -0.4]\n'
+        )
         return scene(
             one_object(width_m=0.01),
             trials={"count": 1, "lead_s": 0.05, "after_s": after_s},
@@ -143,7 +161,8 @@ class TestInertia:
         )
 
     def oracle(self, batch, loss_s):
-        """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never pulling."""
+        """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never
+        pulling."""
         t, rate = batch.trials, math.radians(30.0)
         slopes, intercepts = t.slopes[:, 0], t.intercepts[:, 0]
 
@@ -154,12 +173,18 @@ class TestInertia:
             depth = (axis - t.face[:, 0]) @ normal + RADIUS
             lever = np.cross(pose.axes[:, 0, 0], axis) @ normal
             elastic = max((slopes * depth - intercepts).max(), 0.0)
-            stiffness = slopes[np.argmax(slopes * depth - intercepts)] if elastic > 0.0 else 0.0
+            stiffness = (
+                slopes[np.argmax(slopes * depth - intercepts)] if elastic > 0.0 else 0.0
+            )
             return max(elastic + loss_s * stiffness * lever * speed, 0.0), lever
 
         def rates(time, y):
             force, lever = contact_at(*y)
-            torque = self.STIFFNESS * (rate * time - y[0]) - self.DAMPING * y[1] - lever * force
+            torque = (
+                self.STIFFNESS * (rate * time - y[0])
+                - self.DAMPING * y[1]
+                - lever * force
+            )
             return [y[1], torque / self.INERTIA]
 
         start = [-self.DAMPING / self.STIFFNESS * rate, rate]
@@ -170,9 +195,13 @@ class TestInertia:
 
     @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
     def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
-        batches = [run(self.swing(tmp_path, h, loss_s, after_s=0.25), h) for h in (2e-4, 1e-4)]
+        batches = [
+            run(self.swing(tmp_path, h, loss_s, after_s=0.25), h) for h in (2e-4, 1e-4)
+        ]
         want = self.oracle(batches[0], loss_s)
-        errors = [np.sqrt(np.mean((b.force[0] - want) ** 2)) / want.max() for b in batches]
+        errors = [
+            np.sqrt(np.mean((b.force[0] - want) ** 2)) / want.max() for b in batches
+        ]
         assert errors[1] < 0.1
         assert errors[1] < 0.75 * errors[0]
 
@@ -183,7 +212,10 @@ class TestInertia:
         paced, plain = (run(trial_scene, h, plan=plan) for plan in plans)
         want = self.oracle(paced, loss_s)
         hit = slice(0, int(np.argmax(want)) + 4)
-        errors = [np.abs(b.force[0, hit] - want[hit]).max() / want.max() for b in (paced, plain)]
+        errors = [
+            np.abs(b.force[0, hit] - want[hit]).max() / want.max()
+            for b in (paced, plain)
+        ]
         assert errors[0] < 0.1
         assert errors[1] > 0.4
         # It bounces, as it does by the equations.
@@ -224,7 +256,9 @@ class TestFriction:
     def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
         t = run(make(one_object(width_m=0.05, skin_friction=0.4))).trials
         pose = t.kinematics.pose(t.q_frame)
-        local = np.einsum("kin,in->kn", pose.rotation, t.point + RADIUS * t.normal - pose.origin)
+        local = np.einsum(
+            "kin,in->kn", pose.rotation, t.point + RADIUS * t.normal - pose.origin
+        )
         for j in range(4):
             moved = []
             for turned in (-1e-6, 1e-6):
@@ -234,7 +268,9 @@ class TestFriction:
             want = t.own["friction"].jacobian[j]
             np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
 
-    def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(self):
+    def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(
+        self,
+    ):
         stuck = make(one_object(width_m=0.05, skin_friction=5.0), "tilt", after_s=4.0)
         shear = run(replace(stuck, travel_s=0.6)).trials.own["friction"]
         assert (np.abs(shear.pull) > 0.5).all()
@@ -247,7 +283,9 @@ class TestFriction:
         forearm = t.kinematics.pose(t.q_frame).rotation[2]
         askew = (t.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
-        np.testing.assert_allclose((push * forearm).sum(axis=0) / t.loads[0], 0.0, atol=0.01)
+        np.testing.assert_allclose(
+            (push * forearm).sum(axis=0) / t.loads[0], 0.0, atol=0.01
+        )
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
@@ -256,7 +294,9 @@ class TestFriction:
         forearm = t.kinematics.pose(t.q).rotation[2]
         own = t.normal - forearm * (t.normal * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
-        np.testing.assert_allclose(batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3)
+        np.testing.assert_allclose(
+            batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3
+        )
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         held = run(make(movable(0.05, 0.5, 0.5, skin_friction=0.5, width_m=0.2)))
@@ -287,20 +327,25 @@ class TestTilt:
         for j in range(4):
             t.q[j] += 1e-6
             tilt.locate(t, ALL)
-            # The point of the forearm that is looked at moves along it; the Jacobian's does not.
+            # The point of the forearm that is looked at moves along it; the Jacobian's
+            # does not.
             moved = t.y_frame - before
             moved[0] -= before[1] * (middle - t.own["tilt"].lever[0])
             np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
             t.q[j] -= 1e-6
 
     def test_an_object_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
-        batch = run(make(movable(0.3, 0.3, 0.25, width_m=2.0, skin_friction=0.3), "tilt"))
+        batch = run(
+            make(movable(0.3, 0.3, 0.25, width_m=2.0, skin_friction=0.3), "tilt")
+        )
         lever = batch.trials.own["tilt"].lever
         assert (batch.traces["slide_m"][:, -1] > 0.2).all()
         assert (lever[0] == 0.0).all()  # as near to it as a row is
 
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
-        trial_scene = make(one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia")
+        trial_scene = make(
+            one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia"
+        )
         t = run(trial_scene, 0.0025).trials
         moved = (t.jacobian * (t.q - t.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()

@@ -1,4 +1,5 @@
-"""The default scene set, held to the paper's three headline accuracies (section IV-A)."""
+"""The default scene set, held to the paper's three headline accuracies (section
+IV-A)."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +18,11 @@ SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 PAPER = {"category": 80.0, "mobility": 91.43, "object": 72.14}
 """Percent of 140 trials."""
 SEEDS = 8
-"""Data sets whose mean is held to the paper: one alone may lie as far off as its own chance."""
+"""Data sets whose mean is held to the paper: one alone may lie as far off as its own
+chance."""
 SURE = 1.0 - 0.05 / len(PAPER)
-"""Confidence in each accuracy, at which the chance that any of them is off is 5 % (Bonferroni)."""
+"""Confidence in each accuracy, at which the chance that any of them is off is 5 %
+(Bonferroni)."""
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +65,9 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
     for i in range(1, SEEDS):
         write(replace(cody18, seed=cody18.seed + i), tmp_path / str(i))
         datasets.append(load_trials([tmp_path / str(i)]))
-    results = [grid_search(d.features(), {t: d.labels(t) for t in PAPER}) for d in datasets]
+    results = [
+        grid_search(d.features(), {t: d.labels(t) for t in PAPER}) for d in datasets
+    ]
     for task, paper in PAPER.items():
         ours = float(np.mean([result[task].accuracy for result in results]))
         deviation = np.sqrt(ours * (1.0 - ours) * (1.0 + 1.0 / SEEDS) / 140)
@@ -72,7 +77,10 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
 def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
     force, motion = dataset.features()[:, 39], dataset.features()[:, 119]
     category = dataset.labels("category")
-    mean = {c: (force[category == c].mean(), motion[category == c].mean()) for c in set(category)}
+    mean = {
+        c: (force[category == c].mean(), motion[category == c].mean())
+        for c in set(category)
+    }
     assert mean["rigid-fixed"][0] > mean["rigid-movable"][0] > mean["soft-movable"][0]
     assert mean["rigid-fixed"][0] > mean["soft-fixed"][0]
     assert mean["rigid-movable"][1] > mean["rigid-fixed"][1]
@@ -80,10 +88,13 @@ def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
 
 
 def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
-    # Three kinds stand for all here; --explain measures every one. The arm's inertia is left
-    # out: how things bounce is another at each step.
-    cody18 = replace(cody18, add=tuple(name for name in cody18.add if name != "inertia"))
+    # Three kinds stand for all here; --explain measures every one. The arm's inertia is
+    # left out: how things bounce is another at each step.
+    cody18 = replace(
+        cody18, add=tuple(name for name in cody18.add if name != "inertia")
+    )
     some = list(kinds(cody18).values())[2:10:3]
     for specs, convergence in zip(some, measure(cody18, some), strict=True):
-        # Of the window that labels are judged in; of the longer trials it is a quarter less.
+        # Of the window that labels are judged in; of the longer trials it is a quarter
+        # less.
         assert convergence.errors[convergence.steps_s.index(specs[0].step_s)] < 0.02

@@ -1,4 +1,5 @@
-"""Objects pushed beside their middle turn, slopes help or hinder, and tipped objects fall."""
+"""Objects pushed beside their middle turn, slopes help or hinder, and tipped objects
+fall."""
 
 import math
 
@@ -16,7 +17,12 @@ AT_THE_END = slice(-40, None)
 
 def push(**keys):
     """A box of even friction that the arm pushes, and its batch of one trial."""
-    even = {"width_m": 0.05, "mass_kg": MASS, "friction_static": MU, "friction_kinetic": MU}
+    even = {
+        "width_m": 0.05,
+        "mass_kg": MASS,
+        "friction_static": MU,
+        "friction_kinetic": MU,
+    }
     box = one_object(conditions=["movable"], **{**even, **keys})
     return run(make(box, count=1, after_s=1.8), 0.0025)
 
@@ -32,7 +38,10 @@ class TestTurning:
         assert turned == pytest.approx(slid * aside / (lever**2 + aside**2), rel=1e-12)
 
     def test_the_contact_moves_around_the_forearm_with_the_face(self):
-        straight, turned = push(aside_m=0.0, foot_m=0.24), push(aside_m=0.06, foot_m=0.24)
+        straight, turned = (
+            push(aside_m=0.0, foot_m=0.24),
+            push(aside_m=0.06, foot_m=0.24),
+        )
 
         def column(batch):
             weight = batch.counts[0, -1].sum(axis=0, dtype=float)
@@ -95,7 +104,8 @@ class TestToppling:
         assert (slide[np.argmax(fallen) :] == lies).all()
 
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
-        # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as it is.
+        # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
+        # it is.
         own, mover = batch.trials.own["tipping"], batch.trials.own["sliding"]
         travel, lies = own.travel[0], mover.lies[0]
         slide, force = batch.traces["slide_m"][0], batch.force[0]

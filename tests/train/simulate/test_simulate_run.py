@@ -17,7 +17,9 @@ DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
 
 
 def digests(folder):
-    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.iterdir()}
+    return {
+        p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.iterdir()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +66,23 @@ def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path,
 def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
     distributed = pytest.importorskip("distributed")
     where = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None}
-    with distributed.LocalCluster(2, threads_per_worker=1, processes=False, **where) as cluster:
+    with distributed.LocalCluster(
+        2, threads_per_worker=1, processes=False, **where
+    ) as cluster:
         write(demo, tmp_path, address=cluster.scheduler_address)
     assert digests(tmp_path) == digests(written[0])
 
 
-def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(written, tmp_path):
+def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(
+    written, tmp_path
+):
     write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
     write(scenes.load(DEMO, count=3), tmp_path / "more")
-    first, other, more = digests(written[0]), digests(tmp_path / "seed"), digests(tmp_path / "more")
+    first, other, more = (
+        digests(written[0]),
+        digests(tmp_path / "seed"),
+        digests(tmp_path / "more"),
+    )
     assert all(first[name] != digest for name, digest in other.items())
     assert all(more[name] == digest for name, digest in first.items())
 
@@ -81,7 +91,9 @@ def test_the_sensors_effects_reach_the_recording():
 
     def recorded(**effects):
         trials = {"count": 1, "after_s": 0.6}
-        return next(simulate(scene(one_object(width_m=0.03), trials=trials, effects=effects)))[1]
+        return next(
+            simulate(scene(one_object(width_m=0.03), trials=trials, effects=effects))
+        )[1]
 
     plain = recorded()
     peak = plain.frames.max()
@@ -114,7 +126,9 @@ def test_the_sensors_effects_reach_the_recording():
 
 class TestCommand:
     def test_simulate_writes_and_says_how_many(self, tmp_path, capsys):
-        assert main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
+        assert (
+            main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)]) == 0
+        )
         err = capsys.readouterr().err
         assert f"recordings written to {tmp_path}: 8" in err
         assert len(list(tmp_path.iterdir())) == 8
@@ -139,11 +153,19 @@ class TestCommand:
             (["nowhere.toml", "--out", "x"], "nowhere.toml: cannot be read"),
             ([str(DEMO)], "give --out DIR, --explain or both"),
             ([str(DEMO), "--out", "x", "--jobs", "0"], "--jobs must be"),
-            ([str(DEMO), "--out", "x", "--trials", "0"], "trials.count must be a whole number"),
-            ([str(DEMO), "--trials", "1", "--out", f"{DEMO}/folder"], "cannot be written"),
+            (
+                [str(DEMO), "--out", "x", "--trials", "0"],
+                "trials.count must be a whole number",
+            ),
+            (
+                [str(DEMO), "--trials", "1", "--out", f"{DEMO}/folder"],
+                "cannot be written",
+            ),
         ],
     )
-    def test_bad_usage_is_one_sentence(self, arguments, says, refusal, tmp_path, monkeypatch):
+    def test_bad_usage_is_one_sentence(
+        self, arguments, says, refusal, tmp_path, monkeypatch
+    ):
         monkeypatch.chdir(tmp_path)
         assert says in refusal("simulate", *arguments)
 
@@ -161,7 +183,9 @@ class TestCommand:
         ),
     ],
 )
-def test_simulate_warns_of_settings_that_make_trials_useless(tmp_path, capsys, rest, said):
+def test_simulate_warns_of_settings_that_make_trials_useless(
+    tmp_path, capsys, rest, said
+):
     path = tmp_path / "scene.toml"
     path.write_text(
         f'{rest}\ntrials.count = 1\n[[object]]\nname = "feather"\nfamily = "rigid"\n'
@@ -178,6 +202,9 @@ def test_a_touch_whose_peak_is_the_onset_is_not_felt(tmp_path):
     """A contact begins above it (`edge.touch.track`)."""
     trial_scene = make(one_object(), count=1)
     ((_, trial),) = simulate(trial_scene)
-    for onset, unfelt in ((int(trial.frames.max()) - 1, 0), (int(trial.frames.max()), 1)):
+    for onset, unfelt in (
+        (int(trial.frames.max()) - 1, 0),
+        (int(trial.frames.max()), 1),
+    ):
         felt = replace(trial_scene, skin=replace(trial_scene.skin, onset_counts=onset))
         assert write(felt, tmp_path).unfelt == unfelt

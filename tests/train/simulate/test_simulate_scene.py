@@ -32,7 +32,10 @@ GOOD = {
 def changed(path, value):
     """The good scene with another value, at a path like `object.0.name`."""
     table = copy.deepcopy(GOOD)
-    place, (*keys, last) = table, [int(key) if key.isdigit() else key for key in path.split(".")]
+    place, (*keys, last) = (
+        table,
+        [int(key) if key.isdigit() else key for key in path.split(".")],
+    )
     for key in keys:
         place = place[key]
     place[last] = value
@@ -59,48 +62,118 @@ MISTAKES = [
     ("colour", 1, "unknown key colour; allowed: seed, trials, arm"),
     ("trials.cuont", 1, "unknown key trials.cuont; allowed: lead_s, count"),
     ("trials.count", 0, "trials.count must be a whole number from 1 to 1000000, not 0"),
-    ("trials.lead_s", [0.3, 0.1], "a range with its lower limit first, [0.1, 0.3], not [0.3, 0.1]"),
+    (
+        "trials.lead_s",
+        [0.3, 0.1],
+        "a range with its lower limit first, [0.1, 0.3], not [0.3, 0.1]",
+    ),
     ("trials.lead_s", [0.1], "trials.lead_s must be one number or a range"),
-    ("trials.rate_hz", math.nan, "trials.rate_hz must be a number from 1 to 10000, not nan"),
+    (
+        "trials.rate_hz",
+        math.nan,
+        "trials.rate_hz must be a number from 1 to 10000, not nan",
+    ),
     ("seed", True, "seed must be a whole number"),
-    ("step_s.sliding", 0.003, "step_s.sliding must be an even part of a frame's 0.01 s"),
+    (
+        "step_s.sliding",
+        0.003,
+        "step_s.sliding must be an even part of a frame's 0.01 s",
+    ),
     ("step_s.soup", 0.01, "unknown key step_s.soup"),
     ("skin.taxel_n_m", 1e18, "skin.taxel_n_m must be a number above 0, at most 1e+15"),
     ("skin.cols", 2, "skin.cols must be a whole number from 3 to 1000, not 2"),
     ("motion.travel_s", 0.1, "the arm's stroke ends after 0.1 s (motion.travel_s, or"),
-    ("motion.start_deg", [119.0, 5.0, 0.0, 42.0, 0.0], "the arm's stroke ends after 0.05 s"),
-    ("motion.start_deg", [-60, 0, 0, 0, 0], "of shoulder_pitch must be -47.61 to 120, not -60.0"),
-    ("motion.start_deg", [1, 2], "motion.start_deg must be a list of 5 numbers, not [1, 2]"),
-    ("motion.rate_deg_s", [0] * 5, "must be not all 0, so that the arm reaches an object"),
+    (
+        "motion.start_deg",
+        [119.0, 5.0, 0.0, 42.0, 0.0],
+        "the arm's stroke ends after 0.05 s",
+    ),
+    (
+        "motion.start_deg",
+        [-60, 0, 0, 0, 0],
+        "of shoulder_pitch must be -47.61 to 120, not -60.0",
+    ),
+    (
+        "motion.start_deg",
+        [1, 2],
+        "motion.start_deg must be a list of 5 numbers, not [1, 2]",
+    ),
+    (
+        "motion.rate_deg_s",
+        [0] * 5,
+        "must be not all 0, so that the arm reaches an object",
+    ),
     ("motion.place_m", 5.0, "motion.place_m must be a number from 0.02232 to"),
     ("spread.place_m", 0.05, "spread.place_m must be at most 0.0322, not 0.05: some"),
     ("spread.yaw_deg", 50, "spread.yaw_deg must be a number from 0 to 30, not 50"),
-    ("arm.stiffness_nm_rad", [1, 1, 1, 1, -1], "stiffness_nm_rad must be a number above 0, not -1"),
-    ("effects.add", ["tlit"], "effects.add must be a list of different names out of foundation,"),
+    (
+        "arm.stiffness_nm_rad",
+        [1, 1, 1, 1, -1],
+        "stiffness_nm_rad must be a number above 0, not -1",
+    ),
+    (
+        "effects.add",
+        ["tlit"],
+        "effects.add must be a list of different names out of foundation,",
+    ),
     ("effects.add", ["stems"], "it needs an object of family foliage"),
     ("effects.add", ["cover"], "it needs an object with cover_n_m"),
-    ("effects.leave_out", ["tilt"], "must be a list without tilt, which effects.add adds"),
-    ("effects.leave_out", ["sliding"], "leaves out sliding, without which object 'thing'"),
-    ("effects.tilt", {"x": 1}, "unknown key effects.tilt; allowed: add, leave_out, inertia"),
-    ("effects.noise.counts", -1, "effects.noise.counts must be a number from 0 to 65535, not -1"),
+    (
+        "effects.leave_out",
+        ["tilt"],
+        "must be a list without tilt, which effects.add adds",
+    ),
+    (
+        "effects.leave_out",
+        ["sliding"],
+        "leaves out sliding, without which object 'thing'",
+    ),
+    (
+        "effects.tilt",
+        {"x": 1},
+        "unknown key effects.tilt; allowed: add, leave_out, inertia",
+    ),
+    (
+        "effects.noise.counts",
+        -1,
+        "effects.noise.counts must be a number from 0 to 65535, not -1",
+    ),
     ("effects.noise", 3, "effects.noise must be a table"),
     ("object", {}, "object must be a list of tables, not {}"),
     ("object", [], "give at least one [[object]] or [[family]]"),
-    ("object", GOOD["object"] * 2, "object 'thing': name must be different from every other"),
+    (
+        "object",
+        GOOD["object"] * 2,
+        "object 'thing': name must be different from every other",
+    ),
     ("object.0.name", "", "object 0: name must be text"),
     ("object.0.family", "metal", "family must be one of rigid, foam"),
-    ("object.0.conditions", ["flying"], "a list of different names out of fixed, movable"),
+    (
+        "object.0.conditions",
+        ["flying"],
+        "a list of different names out of fixed, movable",
+    ),
     ("object.0.conditions", [], "conditions must be fixed, movable or both"),
-    ("object.0.mass_kg", -1.0, "mass_kg must be a number above 0, at most 1e+12, not -1.0"),
+    (
+        "object.0.mass_kg",
+        -1.0,
+        "mass_kg must be a number above 0, at most 1e+12, not -1.0",
+    ),
     ("object.0.friction_static", None, "friction_static is missing"),
     ("object.0.friction_kinetic", 0.6, "must be at most friction_static (0.5)"),
-    ("object.0.modulus_pa", 1e4, "object 'thing': unknown key modulus_pa; allowed: name"),
+    (
+        "object.0.modulus_pa",
+        1e4,
+        "object 'thing': unknown key modulus_pa; allowed: name",
+    ),
     ("object.0.base_m", 0.2, "object 'thing': height_m is missing"),
 ]
 
 
 @pytest.mark.parametrize(("path", "value", "says"), MISTAKES)
-def test_a_mistake_gets_one_sentence_with_the_key_and_the_values_allowed(path, value, says):
+def test_a_mistake_gets_one_sentence_with_the_key_and_the_values_allowed(
+    path, value, says
+):
     with pytest.raises(InputError) as error:
         from_dict(changed(path, value), where="scene.toml")
     assert str(error.value).startswith("scene.toml: ")
@@ -151,7 +224,9 @@ def test_a_skin_of_one_row_meets_things_there(family):
 
 def test_a_motion_about_the_forearm_itself_is_refused():
     scene = from_dict({**GOOD, "motion": {"rate_deg_s": [0.0, 0.0, 0.0, 0.0, 20.0]}})
-    with pytest.raises(InputError, match=r"motion\.rate_deg_s does not move the forearm"):
+    with pytest.raises(
+        InputError, match=r"motion\.rate_deg_s does not move the forearm"
+    ):
         next(simulate(scene))
 
 
@@ -171,5 +246,7 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
     assert scene.arm.to_dict() == Chain.from_urdf(urdf, "a", "c").to_dict()
     assert next(simulate(scene))[1].frames.max() > 0
     urdf.write_text(robot.format("prismatic"))
-    with pytest.raises(InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"):
+    with pytest.raises(
+        InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"
+    ):
         from_dict(table, here)

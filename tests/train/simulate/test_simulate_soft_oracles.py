@@ -22,23 +22,45 @@ class TestRelaxation:
         k, ratio, rate, up = 500.0, 1.2, 0.02, 0.5
         law = {"effects": ("relaxation",), "relax_ratio": ratio, "relax_s": tau}
         steps_s = [0.01, 0.002, 0.1]
-        rig = Rig(h=steps_s, arm_k=1e12, speed=rate, travel_s=up, slopes=[[k] * 3], **law)
+        rig = Rig(
+            h=steps_s, arm_k=1e12, speed=rate, travel_s=up, slopes=[[k] * 3], **law
+        )
         trace = rig.run(150)
         t = trace.t
         ramp = np.minimum(t, up)
-        z = ratio * k * rate * tau * (1.0 - np.exp(-ramp / tau)) * np.exp(-(t - ramp) / tau)
+        z = (
+            ratio
+            * k
+            * rate
+            * tau
+            * (1.0 - np.exp(-ramp / tau))
+            * np.exp(-(t - ramp) / tau)
+        )
         np.testing.assert_allclose(trace.force, k * rate * ramp + z, rtol=1e-8)
 
 
 class TestBed:
-    def bed(self, rows, columns, depth, *, modulus=10e3, thickness=0.1, curve=None, shift=0.0):
-        """Total force and taxels touched of a cylinder on a foundation, as the base lays it."""
+    def bed(
+        self,
+        rows,
+        columns,
+        depth,
+        *,
+        modulus=10e3,
+        thickness=0.1,
+        curve=None,
+        shift=0.0,
+    ):
+        """Total force and taxels touched of a cylinder on a foundation, as the base
+        lays it."""
         pitch = RADIUS * 2.0 * math.pi / columns
         row_pitch = 0.173 / rows
         z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * row_pitch
         angles = (np.arange(columns) + 0.5) * (2.0 * math.pi / columns)
         angles_off = np.abs((angles - math.pi) - shift * 2.0 * math.pi / columns)
-        stiffness = np.where(angles_off < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0)
+        stiffness = np.where(
+            angles_off < math.pi / 2, modulus * pitch * row_pitch / thickness, 0.0
+        )
         gaps = RADIUS * (1.0 - np.cos(angles_off))
         gap = contact.curve_gap(z, curve or 1e6)
         springs = gaps[:, None], stiffness[:, None]
@@ -47,10 +69,16 @@ class TestBed:
 
     @staticmethod
     def cylinder(depth, modulus=10e3, thickness=0.1):
-        return (4.0 / 3.0) * (modulus / thickness) * depth * math.sqrt(2.0 * RADIUS * depth)
+        return (
+            (4.0 / 3.0)
+            * (modulus / thickness)
+            * depth
+            * math.sqrt(2.0 * RADIUS * depth)
+        )
 
     @pytest.mark.parametrize(
-        ("depth", "low", "high"), [(0.5e-3, 0.54, 1.35), (2e-3, 0.93, 1.08), (5e-3, 0.95, 1.06)]
+        ("depth", "low", "high"),
+        [(0.5e-3, 0.54, 1.35), (2e-3, 0.93, 1.08), (5e-3, 0.95, 1.06)],
     )
     def test_sampled_on_taxels_it_keeps_to_the_continuum_law(self, depth, low, high):
         ratios = []
@@ -72,7 +100,9 @@ class TestBed:
         depth = 3e-3
         force, area, _ = self.bed(600, 1000, depth, curve=RADIUS)
         assert area == pytest.approx(2.0 * math.pi * RADIUS * depth, rel=0.02)
-        assert force == pytest.approx(math.pi * 10e3 / 0.1 * RADIUS * depth**2, rel=0.02)
+        assert force == pytest.approx(
+            math.pi * 10e3 / 0.1 * RADIUS * depth**2, rel=0.02
+        )
         twice, _, _ = self.bed(600, 1000, 2 * depth, curve=RADIUS)
         assert math.log2(twice / force) == pytest.approx(2.0, abs=0.05)
 
@@ -86,37 +116,49 @@ class TestBed:
             c = float(2.0 ** rng.integers(-12, 2))
             free = float(rng.integers(1, furthest)) / 1024.0
             law = contact.bed_law(gaps[:, None], k[:, None])
-            force = contact.closed_form(gaps[:, None], *law, np.array([free]), np.array([c]))[0]
+            force = contact.closed_form(
+                gaps[:, None], *law, np.array([free]), np.array([c])
+            )[0]
             best = Fraction(0)
             total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):
                 total_k += Fraction(float(s))
                 total_b += Fraction(float(s)) * Fraction(float(g))
-                best = max(best, (total_k * Fraction(free) - total_b) / (1 + Fraction(c) * total_k))
+                best = max(
+                    best,
+                    (total_k * Fraction(free) - total_b) / (1 + Fraction(c) * total_k),
+                )
             assert force == pytest.approx(float(best), rel=1e-14, abs=1e-300)
 
 
 def layer_solution(half_width, step=1 / 200):
-    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer of E = 1
-    and H = 1 without lateral strain, by its Green's function (Fourier), half_width a."""
+    """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer
+    of E = 1 and H = 1 without lateral strain, by its Green's function (Fourier),
+    half_width a."""
     n, length = 8192, 8192 * step
     w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
     v = np.clip(w, 1e-9, 20.0)
-    bonded = (6.0 * np.sinh(2 * v) - 4.0 * v) / (6.0 * np.cosh(2 * v) + 4.0 * v**2 + 10.0)
+    bonded = (6.0 * np.sinh(2 * v) - 4.0 * v) / (
+        6.0 * np.cosh(2 * v) + 4.0 * v**2 + 10.0
+    )
     u = 2.0 * np.where(w > 20.0, 1.0, bonded) / np.maximum(w, 1e-9)
     u[0] = 1.0
     assert length > 30.0
     green = np.fft.irfft(u, n) / step
     points = 2 * round(half_width / step) + 1
     x = (np.arange(points) - points // 2) * step
-    flat, curved = solve(toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T).T
+    flat, curved = solve(
+        toeplitz(green[:points]), np.stack([np.ones(points), x * x / 2.0]).T
+    ).T
     depth = curved[0] / flat[0]  # no pressure at the edge
     pressure = depth * flat - curved
     return pressure.sum(), depth, pressure.max() / pressure.mean()
 
 
 class TestLateral:
-    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.3, 0.1), (0.6, 0.1), (1.0, 0.1)])
+    @pytest.mark.parametrize(
+        ("part", "bound"), [(0.1, 0.2), (0.3, 0.1), (0.6, 0.1), (1.0, 0.1)]
+    )
     def test_load_and_width_are_the_elastic_layers(self, part, bound):
         load, depth, peak = layer_solution(part)
         # Columns so fine that the sum is the integral; E = H = R = 1.
@@ -128,14 +170,17 @@ class TestLateral:
         assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
         shape = np.sqrt(inside[inside > 0.0])
         assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
-        # Independent springs are as wide as the square root of the depth says, and too soft.
+        # Independent springs are as wide as the square root of the depth says, and too
+        # soft.
         assert math.sqrt(2.0 * depth) > 1.15 * part
 
     def test_the_bed_of_taxels_keeps_to_it(self):
         foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
         batch = run(make(foam))
         depth = batch.traces["depth_m"][0, -1] / 0.1
-        widths = np.array([layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)])
+        widths = np.array(
+            [layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
+        )
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
         length = batch.trials.skin.pitch[0] * batch.trials.weight[:, 0].sum()
@@ -143,19 +188,30 @@ class TestLateral:
 
 
 class TestAskew:
-    """Over the end of a foam block of 8 kPa, 0.1 m thick, against an elastic block of that size by
-    finite elements (linear bricks of 8 mm, bonded behind, no friction, Poisson's ratio 0.1)."""
+    """Over the end of a foam block of 8 kPa, 0.1 m thick, against an elastic block of
+    that size by finite elements (linear bricks of 8 mm, bonded behind, no friction,
+    Poisson's ratio 0.1)."""
 
     def test_a_face_that_goes_on_beyond_the_skin_has_no_end_there(self):
         rising, falling = np.arange(4.0), -np.arange(4.0)
-        covered, begins, ends = np.ones(4), np.array([0.0, 1, 1, 1]), np.array([1.0, 1, 1, 0])
+        covered, begins, ends = (
+            np.ones(4),
+            np.array([0.0, 1, 1, 1]),
+            np.array([1.0, 1, 1, 0]),
+        )
 
         def askew(depth, weight):
             return lateral.askew(depth[:, None], weight[:, None], 0.5)[:, 0].tolist()
 
         assert askew(rising, covered) == askew(falling, covered) == [0.0] * 4
-        assert (askew(rising, begins), askew(falling, begins)) == ([0.0] * 4, [0.0, 2.0, 0.0, 0.0])
-        assert (askew(rising, ends), askew(falling, ends)) == ([0.0, 0.0, 2.0, 0.0], [0.0] * 4)
+        assert (askew(rising, begins), askew(falling, begins)) == (
+            [0.0] * 4,
+            [0.0, 2.0, 0.0, 0.0],
+        )
+        assert (askew(rising, ends), askew(falling, ends)) == (
+            [0.0, 0.0, 2.0, 0.0],
+            [0.0] * 4,
+        )
 
     @pytest.mark.parametrize(
         ("degrees", "force", "depth_mm", "peak", "rows"),
@@ -165,7 +221,9 @@ class TestAskew:
             (17.0, 6.00, 25.5, 0.445, [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]),
         ],
     )
-    def test_rows_bear_the_loads_of_an_elastic_block(self, degrees, force, depth_mm, peak, rows):
+    def test_rows_bear_the_loads_of_an_elastic_block(
+        self, degrees, force, depth_mm, peak, rows
+    ):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
         slope, pitch = np.tan(np.radians(degrees)), t.skin.pitch[0]
@@ -173,7 +231,8 @@ class TestAskew:
         depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
         t.weight[:], t.line_depth[:] = np.pad(np.ones(14), 1)[:, None], depth[:, None]
         t.force[:] = force
-        # Half a column from the nearest on either side, as in the block's sum over taxels.
+        # Half a column from the nearest on either side, as in the block's sum over
+        # taxels.
         angles_off = (np.arange(len(t.columns)) - len(t.columns) // 2 + 0.5) * 0.26166
         radius = t.skin.radius_m
         gaps = lateral.touched_at(radius * (1.0 - np.cos(angles_off)), radius, 0.1)
@@ -228,9 +287,17 @@ class TestBubbles:
     HEIGHT, STIFFNESS = 0.008, 1500.0
 
     def wrap(self, **keys):
-        thing = {"family": "bubbles", "bubble_m": self.HEIGHT, "bubble_n_m": self.STIFFNESS}
+        thing = {
+            "family": "bubbles",
+            "bubble_m": self.HEIGHT,
+            "bubble_n_m": self.STIFFNESS,
+        }
         scene = make(one_object(**thing, **keys))
-        return run(replace(scene, taxel_n_m=Value(1e12, 1e12)) if keys["pop_n"] > 1e3 else scene)
+        return run(
+            replace(scene, taxel_n_m=Value(1e12, 1e12))
+            if keys["pop_n"] > 1e3
+            else scene
+        )
 
     @pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
     def test_they_stiffen_by_the_gas_law(self, part):
@@ -306,16 +373,24 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
     t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
     viscous = t.own["viscous"]
-    elastic = contact.spring_loads(t.line_depth, t.gaps, t.stiffness, t.weight).sum(axis=0)
+    elastic = contact.spring_loads(t.line_depth, t.gaps, t.stiffness, t.weight).sum(
+        axis=0
+    )
     assert (np.ptp(elastic, axis=0) > 0.1).all()
     np.testing.assert_allclose(t.row_force, elastic, atol=1e-3)
     np.testing.assert_allclose(viscous.given, viscous.ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
-    wrap = make(one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0)
+    wrap = make(
+        one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0
+    )
     t = run(replace(wrap, travel_s=0.6)).trials
     bubbles = t.own["pop"]
     assert (np.ptp(bubbles.alive.sum(axis=0), axis=0) > 0.0).all()
-    loads = contact.spring_loads(t.line_depth, bubbles.gaps, bubbles.stiffness, t.weight)
-    np.testing.assert_allclose(t.row_force, (loads * bubbles.alive).sum(axis=0), atol=1e-6)
+    loads = contact.spring_loads(
+        t.line_depth, bubbles.gaps, bubbles.stiffness, t.weight
+    )
+    np.testing.assert_allclose(
+        t.row_force, (loads * bubbles.alive).sum(axis=0), atol=1e-6
+    )

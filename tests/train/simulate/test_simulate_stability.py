@@ -1,4 +1,5 @@
-"""The step holds where others blow up. "Finite" proves nothing: forces and energy are judged."""
+"""The step holds where others blow up. "Finite" proves nothing: forces and energy are
+judged."""
 
 import numpy as np
 
@@ -21,7 +22,9 @@ def judge(trace, stiffness, mass, mu_s, mu_k):
     most = ARM_K * np.maximum(trace.target, 0.0)
     # The target's motion at fixed q puts energy in; after that nothing may add any.
     bed, moving = 0.5 * force**2 / stiffness, 0.5 * mass * trace.speed**2
-    q0, bed0, moving0 = (np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, bed, moving))
+    q0, bed0, moving0 = (
+        np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, bed, moving)
+    )
     before = bed0 + moving0 + 0.5 * ARM_K * (trace.target - q0) ** 2
     after = bed + moving + 0.5 * ARM_K * (trace.target - trace.q) ** 2
     friction = mu_k * mass * GRAVITY * moved
@@ -40,7 +43,8 @@ def judge(trace, stiffness, mass, mu_s, mu_k):
 
 
 def test_the_judge_rejects_a_finite_trace_that_reset_itself():
-    # A general engine's soft body went NaN, reset itself and ended finite with zero force.
+    # A general engine's soft body went NaN, reset itself and ended finite with zero
+    # force.
     trace = slider(0.01, 5.0, MU_S, MU_K, slopes=[[1e3]]).run(60)
     assert judge(trace, 1e3, 5.0, MU_S, MU_K) == []
     trace.force[30:] = 0.0

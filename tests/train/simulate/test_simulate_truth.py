@@ -43,38 +43,67 @@ class TestLabels:
         assert single == {}
 
     def test_a_movable_object_that_never_slides_is_refused(self):
-        with pytest.raises(InputError, match=r"'box' is labelled movable.* moved 0 mm.*lower"):
+        with pytest.raises(
+            InputError, match=r"'box' is labelled movable.* moved 0 mm.*lower"
+        ):
             list(simulate(scene({**BOX, "mass_kg": 20.0})))
 
     def test_a_soft_object_that_never_yields_is_refused(self):
-        stone = {"name": "stone", "family": "foam", "conditions": ["fixed"], "modulus_pa": 1e9}
-        with pytest.raises(InputError, match="'stone' is labelled soft.*lower its stiffness"):
+        stone = {
+            "name": "stone",
+            "family": "foam",
+            "conditions": ["fixed"],
+            "modulus_pa": 1e9,
+        }
+        with pytest.raises(
+            InputError, match="'stone' is labelled soft.*lower its stiffness"
+        ):
             list(simulate(scene(stone)))
 
     def test_a_motion_that_never_touches_is_refused(self):
         trial_scene = scene({**BOX, "conditions": ["fixed"]})
-        with pytest.raises(InputError, match="was never touched, as the arm's stroke.*motion"):
+        with pytest.raises(
+            InputError, match="was never touched, as the arm's stroke.*motion"
+        ):
             list(simulate(replace(trial_scene, damping=(0.0,) * 5, travel_s=1e-6)))
 
     @pytest.mark.parametrize(
         ("change", "says"),
         [
-            ({"motion": {"travel_s": 0.2}}, r"as the arm's stroke ended 0\.\d\d s.*travel_s"),
-            ({"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}}, "stroke ended.*start_deg"),
-            ({"trials": {"count": 1, "after_s": 0.1}}, r"and the trial ended 0\.\d\d s.*after_s"),
+            (
+                {"motion": {"travel_s": 0.2}},
+                r"as the arm's stroke ended 0\.\d\d s.*travel_s",
+            ),
+            (
+                {"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}},
+                "stroke ended.*start_deg",
+            ),
+            (
+                {"trials": {"count": 1, "after_s": 0.1}},
+                r"and the trial ended 0\.\d\d s.*after_s",
+            ),
         ],
     )
     def test_the_error_names_the_reason_why_a_trial_ended_early(self, change, says):
-        with pytest.raises(InputError, match=r"the last moved \d+ mm, less than 20, .*" + says):
+        with pytest.raises(
+            InputError, match=r"the last moved \d+ mm, less than 20, .*" + says
+        ):
             list(simulate(scene({**BOX, "mass_kg": 1.0}, **change)))
 
     @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles"])
     @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
-    def test_an_object_inside_the_arm_is_refused_at_once(self, monkeypatch, family, step_s):
+    def test_an_object_inside_the_arm_is_refused_at_once(
+        self, monkeypatch, family, step_s
+    ):
         monkeypatch.setattr(
             convergence, "measure", lambda *_: pytest.fail("it measured the step first")
         )
-        wide = {"name": "wall", "family": family, "conditions": ["fixed"], "width_m": 1.0}
+        wide = {
+            "name": "wall",
+            "family": family,
+            "conditions": ["fixed"],
+            "width_m": 1.0,
+        }
         rest = {"spread": {"yaw_deg": 30.0}, "effects": {"add": ["tilt", "inertia"]}}
         trial_scene = scene(wide, step_s=step_s, **rest)
         says = r"'wall' touches the arm before it moves, in trial \d .* by \d\d degrees; .*yaw_deg"
@@ -85,7 +114,9 @@ class TestLabels:
 class TestFamilies:
     def test_objects_are_drawn_within_their_ranges(self):
         trial_scene = scene(families=[FAMILY])
-        assert [o.name for o in trial_scene.objects] == [f"crate {i:02d}" for i in range(1, 7)]
+        assert [o.name for o in trial_scene.objects] == [
+            f"crate {i:02d}" for i in range(1, 7)
+        ]
         masses = [o.values["mass_kg"].low for o in trial_scene.objects]
         assert len(set(masses)) == 6
         for o in trial_scene.objects:
@@ -103,7 +134,8 @@ class TestFamilies:
         ],
     )
     def test_no_object_holds_more_than_can_be_pushed(self, keys):
-        """The skin's shear makes an object harder to move; stems push no more than they bear."""
+        """The skin's shear makes an object harder to move; stems push no more than they
+        bear."""
         for o in scene(families=[{**FAMILY, **keys, "count": 40}]).objects:
             value = {name: number.low for name, number in o.values.items()}
             mu = value["friction_static"]
@@ -116,14 +148,22 @@ class TestFamilies:
         other = {**FAMILY, "name": "trunk"}
         both = scene(families=[other, FAMILY])
         assert both.objects[6:] == scene(families=[FAMILY]).objects
-        assert scene(families=[FAMILY], seed=5).objects != scene(families=[FAMILY]).objects
+        assert (
+            scene(families=[FAMILY], seed=5).objects != scene(families=[FAMILY]).objects
+        )
 
     @pytest.mark.parametrize(
         ("change", "says"),
         [
             ({"count": 0}, "count must be a whole number from 1 to 1000, not 0"),
-            ({"mass_kg": [50.0, 60.0]}, r"low enough that 6 N \(labels.push_n\) move it"),
-            ({"colour": 3}, "family 'crate': unknown key colour; allowed: name.*, count"),
+            (
+                {"mass_kg": [50.0, 60.0]},
+                r"low enough that 6 N \(labels.push_n\) move it",
+            ),
+            (
+                {"colour": 3},
+                "family 'crate': unknown key colour; allowed: name.*, count",
+            ),
             ({"stem_count": 3}, "family 'crate': unknown key stem_count"),
             ({"friction_kinetic": 0.2}, "unknown key friction_kinetic; .*kinetic_part"),
             ({"base_m": 0.2}, "family 'crate': object 'crate 01': height_m is missing"),
@@ -148,5 +188,7 @@ class TestLimits:
 
     def test_leaving_out_the_effect_that_makes_it_soft_is_refused(self):
         foam = {"name": "foam", "family": "foam", "conditions": ["fixed"]}
-        with pytest.raises(InputError, match="leaves out foundation, without which .* be soft"):
+        with pytest.raises(
+            InputError, match="leaves out foundation, without which .* be soft"
+        ):
             scene(foam, effects={"leave_out": ["foundation"]})

@@ -40,10 +40,19 @@ def context(scene, tmp_path_factory):
 def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
     changed = variants(scene)
     assert list(changed)[:4] == [
-        f"{what} x {factor}" for factor in ("0.5", "2") for what in ("speed", "arm stiffness")
+        f"{what} x {factor}"
+        for factor in ("0.5", "2")
+        for what in ("speed", "arm stiffness")
     ]
     effects = {name.split(" ")[1] for name in list(changed)[4:]}
-    assert {"crosstalk", "hysteresis", "drift", "noise", "saturation", "dead_band"} < effects
+    assert {
+        "crosstalk",
+        "hysteresis",
+        "drift",
+        "noise",
+        "saturation",
+        "dead_band",
+    } < effects
     assert {"quantisation", "dead_taxels", "jitter", "dropped_frames"} < effects
     assert "noise" not in changed["without noise"].add
     assert "drift" in changed["with drift"].add
@@ -61,7 +70,9 @@ def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene)
 
 
 @pytest.mark.parametrize("change", ["with crosstalk", "without noise"])
-def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(context, scene, change):
+def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(
+    context, scene, change
+):
     data, changed = context.dataset, variants(scene)[change]
     trials = dict(simulate(changed))
     asked = [trials[trial.path.name] for trial in data.trials]
@@ -74,13 +85,19 @@ def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
     monkeypatch.setattr(robust, "variants", lambda scene: {})
     fewer = replace(scene, trials={**scene.trials, "count": 1})
     for other in (fewer, replace(scene, seed=scene.seed + 1)):
-        with pytest.raises(InputError, match="cody18 gives other trials than these recordings"):
+        with pytest.raises(
+            InputError, match="cody18 gives other trials than these recordings"
+        ):
             robust.section(replace(context, scene=other))
 
 
-def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_it(scene, tmp_path):
+def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_it(
+    scene, tmp_path
+):
     """What a heavy thing does under half the force is no contradiction of its label."""
-    heavy = tuple(o for o in scenes.load(SCENE, count=2).objects if o.name == "wooden crate")
+    heavy = tuple(
+        o for o in scenes.load(SCENE, count=2).objects if o.name == "wooden crate"
+    )
     alone = replace(scene, objects=heavy)
     weak = variants(alone)["arm stiffness x 0.5"]
     with pytest.raises(InputError, match="contradicted"):
@@ -93,7 +110,10 @@ def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_
 @pytest.mark.parametrize(
     ("simulation", "sentence"),
     [
-        ({"redrawn": "often"}, "redrawn must be a whole number from 0 to 39, not 'often'"),
+        (
+            {"redrawn": "often"},
+            "redrawn must be a whole number from 0 to 39, not 'often'",
+        ),
         ({"redrawn": -1}, "redrawn must be a whole number from 0 to 39, not -1"),
         ([], r"must be a table, not \[\]"),
     ],
@@ -103,5 +123,7 @@ def test_a_damaged_count_of_draws_is_one_sentence(context, scene, simulation, se
     meta = {**first.recording.meta, "simulation": simulation}
     damaged = replace(first, recording=replace(first.recording, meta=meta))
     data = replace(context.dataset, trials=(damaged, *others))
-    with pytest.raises(InputError, match=rf"{first.path.name}: meta\.simulation.*{sentence}"):
+    with pytest.raises(
+        InputError, match=rf"{first.path.name}: meta\.simulation.*{sentence}"
+    ):
         simulated_again(scene, data)

@@ -17,7 +17,9 @@ ROW = {
 
 
 def test_number_formats_are_rows_beside_the_other_costs():
-    table = costs.section(SimpleNamespace(y={"t": None}, costs=[], formats=[ROW])).tables[0]
+    table = costs.section(
+        SimpleNamespace(y={"t": None}, costs=[], formats=[ROW])
+    ).tables[0]
 
     first, *boards = table.rows
     assert first["change"] == "float32"

@@ -53,7 +53,10 @@ def test_the_points_come_fastest_first(front):
     ],
 )
 def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wanted, milliseconds):
-    assert ParetoFront.read(front(text()), DIGEST).pick(wanted).milliseconds == milliseconds
+    assert (
+        ParetoFront.read(front(text()), DIGEST).pick(wanted).milliseconds
+        == milliseconds
+    )
 
 
 @pytest.mark.parametrize(
@@ -82,7 +85,10 @@ def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wanted, said):
         ("[" * 100_000, "not a front.json"),
         (text(points=[]), "not a front.json"),
         (text(data_digest="1" * 64), "was measured on other recordings"),
-        (text().replace("0.6,", '"much",').replace("0.6}", '"much"}'), "not a front.json"),
+        (
+            text().replace("0.6,", '"much",').replace("0.6}", '"much"}'),
+            "not a front.json",
+        ),
     ],
 )
 def test_a_damaged_file_is_one_sentence(front, content, said):

@@ -50,8 +50,13 @@ class TestWires:
         assert three.every(100.0) == 1
 
     def test_a_single_taxel_is_one_chip_on_one_bus(self):
-        names = [choice.name for choice in wires(SkinLayout(rows=1, cols=1, wraps=False))]
-        assert names == ["AD7147, 1 bus at 400 kHz", "microcontroller, 1 bus at 1000 kHz"]
+        names = [
+            choice.name for choice in wires(SkinLayout(rows=1, cols=1, wraps=False))
+        ]
+        assert names == [
+            "AD7147, 1 bus at 400 kHz",
+            "microcontroller, 1 bus at 1000 kHz",
+        ]
 
     def test_a_skin_is_wired_with_every_chip_that_serves_it(self, forearm):
         assert [choice.name.split(",")[0] for choice in wires(forearm)] == [
@@ -92,7 +97,9 @@ def fronted(recordings, tmp_path_factory):
     path = tmp_path_factory.mktemp("front") / "front.json"
     dataset = followed(read([recordings]))
     points = {0.4: make_choice(dataset, 0.4)}
-    path.write_text(json.dumps(ParetoFront.of(points, "category", 0.01).to_dict(dataset.digest)))
+    path.write_text(
+        json.dumps(ParetoFront.of(points, "category", 0.01).to_dict(dataset.digest))
+    )
     return path, points[0.4]["category"]
 
 
@@ -137,7 +144,9 @@ class TestCosts:
         assert (half.frames == touch.frames[::2]).all()
         assert len(half.joints) == len(half.t)
 
-    def test_a_contact_no_longer_noticed_is_wrong_but_a_trial_left_out_is_not_counted(self):
+    def test_a_contact_no_longer_noticed_is_wrong_but_a_trial_left_out_is_not_counted(
+        self,
+    ):
         before = {(Path(name), 0): True for name in "abcd"}
         after = {(Path(name), 0): True for name in "ab"}
         assert costs.difference(before, after, fewer=False)[0] == -50.0
@@ -151,12 +160,19 @@ class TestCosts:
             "96 taxels", "24 taxels", "6 taxels", "1 taxel", "the paper's features",
         ]  # fmt: skip
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
-        assert cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
+        assert (
+            cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
+        )
 
 
 def test_prices_are_two_numbers():
     assert cost("second=0,wrong=2.5") == (2.5, 0.0)
-    for text in ("wrong=10", "wrong=-1,second=1", "wrong=inf,second=1", "wrong=1,second=1,x=1"):
+    for text in (
+        "wrong=10",
+        "wrong=-1,second=1",
+        "wrong=inf,second=1",
+        "wrong=1,second=1,x=1",
+    ):
         with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
             cost(text)
 
@@ -166,7 +182,9 @@ def test_the_dearer_an_error_the_longer_it_pays_to_wait():
     shares = {0.4: 50, 0.8: 90, 1.2: 95}
     points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
     fixed = SimpleNamespace(y={"t": None}, after_s=0.0, points=points)
-    fixed.results = lambda task: {w: tasks[task].by_trial for w, tasks in points.items()}
+    fixed.results = lambda task: {
+        w: tasks[task].by_trial for w, tasks in points.items()
+    }
     best = []
     for fixed.wrong, fixed.second in ((0.5, 1.0), (2.0, 1.0), (10.0, 1.0)):
         best.append(answer.prices(fixed).tables[0].rows[0]["best window s"])
@@ -190,7 +208,9 @@ class TestEarly:
     def test_a_calibrated_confidence_has_no_calibration_error(self):
         compared = comparison(share_right(0.5, 0.5, 0.5))
         assert compared.calibration_error == pytest.approx(0.0)
-        assert comparison(share_right(0.9, 0.9, 0.9)).calibration_error == pytest.approx(0.4)
+        assert comparison(
+            share_right(0.9, 0.9, 0.9)
+        ).calibration_error == pytest.approx(0.4)
 
     def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
         compared = comparison(share_right(0.5, 0.7, 0.9))
@@ -201,13 +221,19 @@ class TestEarly:
         listed = [rule.asked for rule in answer.distinct(compared)]
         assert listed == [0.1, 0.3]
 
-    def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(self):
+    def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(
+        self,
+    ):
         rule = StoppingRule(0.1, 0.0, 0.5, 1)
         wrong = np.array([[True, False, False, False], [False] * 4])
         unknown = np.array([[False] * 4, [True, False, False, False]])
         course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
         decisions = early._certified(0.1, [(course, rule)], (0.6, 1.2))
-        assert (decisions.folds, decisions.result.right, decisions.result.total) == (1, 3, 4)
+        assert (decisions.folds, decisions.result.right, decisions.result.total) == (
+            1,
+            3,
+            4,
+        )
         # At the full window one more is right and one names nothing.
         assert decisions.gain[0] == 0.0
         assert (decisions.mean_s, decisions.early, decisions.unknown) == (0.6, 1.0, 0.0)
@@ -216,13 +242,21 @@ class TestEarly:
         dataset = followed(read([save_touches(tmp_path, 20)]))
         compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
         assert compared.right.all()
-        rule = next(certified for certified in compared.certified if certified.asked == 0.15)
+        rule = next(
+            certified for certified in compared.certified if certified.asked == 0.15
+        )
         assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
         # Forty trials certify no rate as low as the smallest one.
-        assert min(certified.asked for certified in compared.certified) > early.ERRORS[0]
+        assert (
+            min(certified.asked for certified in compared.certified) > early.ERRORS[0]
+        )
 
-    def test_features_of_kernels_have_the_tables_of_the_other_folds(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(early, "fit", partial(early.fit, features=("zone_kernels",)))
+    def test_features_of_kernels_have_the_tables_of_the_other_folds(
+        self, tmp_path, monkeypatch
+    ):
+        monkeypatch.setattr(
+            early, "fit", partial(early.fit, features=("zone_kernels",))
+        )
         dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
         assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()
 
@@ -231,9 +265,13 @@ class TestEarly:
 
         floors = breakaway_times(load(SCENE))
         # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
-        assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(0.28 / 0.6)
+        assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(
+            0.28 / 0.6
+        )
         # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.
-        assert floors["chair"] / floors["cardboard box"] == pytest.approx((4 * 0.4 / 1.4) / 0.6)
+        assert floors["chair"] / floors["cardboard box"] == pytest.approx(
+            (4 * 0.4 / 1.4) / 0.6
+        )
         assert 0.3 < floors["cardboard box"] < 0.5
 
 
@@ -244,8 +282,16 @@ class TestBoard:
         path = board_file(tmp_path / "board.json", "0" * 64)
         whole = path.read_text()
         assert board.read(path).memory_mb == 61.5
-        changes = ("decision", "something"), ("cold_start_ms", "start"), ("100.0", "NaN")
-        for wrong in ("[" * 100_000, whole[:50], *(whole.replace(*change) for change in changes)):
+        changes = (
+            ("decision", "something"),
+            ("cold_start_ms", "start"),
+            ("100.0", "NaN"),
+        )
+        for wrong in (
+            "[" * 100_000,
+            whole[:50],
+            *(whole.replace(*change) for change in changes),
+        ):
             path.write_text(wrong)
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
@@ -259,7 +305,11 @@ def board_file(path, digest):
     stage = {"median_us": 100.0, "p99_us": 200.0, "n": 40}
     board_ = {
         "machine": {"kind": "a board", "name": "here"},
-        "model": {"sha256": "ab" * 32, "data_digest": digest, "features": ["a", "b", "c"]},
+        "model": {
+            "sha256": "ab" * 32,
+            "data_digest": digest,
+            "features": ["a", "b", "c"],
+        },
         "stages": dict.fromkeys(("track", "features", "decision"), stage),
         "memory_mb": 61.5,
         "cold_start_ms": 812.0,
@@ -290,7 +340,10 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     report = tradeoff([data], out, str(path), scene_path=str(SCENE))
     text = report.read_text()
     assert "http" not in text
-    assert "62 MB of memory, and the model is ready 812 ms after the start of Python" in text
+    assert (
+        "62 MB of memory, and the model is ready 812 ms after the start of Python"
+        in text
+    )
     assert not browser.available() or browser.faults(report) == []
     assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
     saved = {row["change"]: row for row in rows_of(out / "costs.csv")}

@@ -1,5 +1,6 @@
-"""The hooks of every trial: a soft arm that follows its equilibrium point, a bed of taxels, and the
-image of the load. Effects add hooks, or replace some of these (`plan`)."""
+"""The hooks of every trial: a soft arm that follows its equilibrium point, a bed of
+taxels, and the image of the load. Effects add hooks, or replace some of these
+(`plan`)."""
 
 import math
 
@@ -7,7 +8,13 @@ import numpy as np
 
 from edge.errors import InputError
 from train.simulate.arm import Pose, cross, dot
-from train.simulate.contact import closed_form, covered, curve_gap, share_out, spring_loads
+from train.simulate.contact import (
+    closed_form,
+    covered,
+    curve_gap,
+    share_out,
+    spring_loads,
+)
 from train.simulate.trials import Array, Index, Trials, pick, total
 
 STILL_M_S = 1e-6
@@ -21,8 +28,8 @@ FAR_M = -1e9
 def swing(t: Trials, i: Index) -> None:
     """Begin with the arm in its steady sweep.
 
-    Before the contact each joint lags its equilibrium point by d/k of its speed, the steady
-    solution of d q' + k (q - q_eq) = 0 for a ramp.
+    Before the contact each joint lags its equilibrium point by d/k of its speed, the
+    steady solution of d q' + k (q - q_eq) = 0 for a ramp.
     """
     low, high = t.kinematics.limits
     start = np.repeat(np.array(t.scene.start)[:, None], t.n, axis=1)
@@ -39,8 +46,9 @@ def swing(t: Trials, i: Index) -> None:
 def place(t: Trials, i: Index) -> None:
     """Put the object where the sweep meets it after the lead.
 
-    Its face lies across the forearm's motion, turned by the yaw. For each column that it can touch
-    this finds the gap at zero depth, R (1 - cos theta), and the part that the face covers.
+    Its face lies across the forearm's motion, turned by the yaw. For each column that
+    it can touch this finds the gap at zero depth, R (1 - cos theta), and the part that
+    the face covers.
 
     Raises:
         InputError: the forearm does not move at that place.
@@ -65,7 +73,9 @@ def place(t: Trials, i: Index) -> None:
     t.face[:] = point + skin.radius_m * normal
     angles = np.radians(np.array(skin.column_angles_deg))[:, None]
     met = np.arctan2(dot(speed, pose.rotation[1]), dot(speed, pose.rotation[0]))
-    away = np.abs(angles - met - 2.0 * math.pi * np.rint((angles - met) / (2.0 * math.pi)))
+    away = np.abs(
+        angles - met - 2.0 * math.pi * np.rint((angles - met) / (2.0 * math.pi))
+    )
     window = len(t.columns)
     first = np.argmin(away, axis=0) - window // 2
     t.columns[:] = (first + np.arange(window)[:, None]) % skin.cols
@@ -85,7 +95,8 @@ def lay(t: Trials, i: Index) -> None:
 
 
 def lay_rows(t: Trials, i: Index) -> None:
-    """Find the part of each row that the face covers, and how far the face draws back there."""
+    """Find the part of each row that the face covers, and how far the face draws back
+    there."""
     offset, radius = t.row_z - pick(t.z, i), pick(t.values["radius_m"], i)
     t.weight[:, i] = covered(offset, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = np.where(radius < FLAT_M, curve_gap(offset, radius), 0.0)
@@ -107,14 +118,16 @@ def law(t: Trials, i: Index) -> None:
 
 
 def tune(t: Trials, i: Index) -> None:
-    """Set the stiffness and the compliance of each joint within a step of this length."""
+    """Set the stiffness and the compliance of each joint within a step of this
+    length."""
     held = t.damping / pick(t.h, i)
     t.held[:, i] = held
     t.give[:, i] = 1.0 / (held + t.joint_k)
 
 
 def locate(t: Trials, i: Index) -> None:
-    """Find the depth, its Jacobian and the compliance of a step at the frame's joint angles."""
+    """Find the depth, its Jacobian and the compliance of a step at the frame's joint
+    angles."""
     q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
     pose = t.kinematics.pose(q)
     along = pose.rotation[2]
@@ -147,14 +160,17 @@ def predict(t: Trials, i: Index) -> None:
 
 def press(t: Trials, i: Index) -> None:
     """Solve the contact's loads; an object that moves adds its compliance."""
-    t.loads[:, i] = t.ask(i, pick(t.y[0], i), pick(t.compliance[0], i) + pick(t.soft, i))
+    t.loads[:, i] = t.ask(
+        i, pick(t.y[0], i), pick(t.compliance[0], i) + pick(t.soft, i)
+    )
 
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads of a forearm that does not pivot, in closed form.
 
-    With forces that depend on speed (`effects.viscous`) the force is gain F - L: the elastic law
-    with a scaled compliance, beside a load that is already there. A contact never pulls.
+    With forces that depend on speed (`effects.viscous`) the force is gain F - L: the
+    elastic law with a scaled compliance, beside a load that is already there. A contact
+    never pulls.
     """
     law = pick(t.law_gaps, i), pick(t.slopes, i), pick(t.intercepts, i)
     if "viscous" in t.own:

@@ -1,9 +1,10 @@
 """Foam that stiffens as it is pressed flat, until the surface behind it is felt.
 
-An open-celled foam is about linear to two thirds of its thickness (the support factor of the IFD
-test, 65 % over 25 % of compression, is 2 to 2.6; a linear one has 2.6), then stiffens, and is
-solid at 1 - 1.4 times its relative density (Gibson and Ashby, Cellular Solids, 5.2), some 93 %.
-Two more tangents for each column approximate this, so the bed stays convex and piecewise linear.
+An open-celled foam is about linear to two thirds of its thickness (the support factor
+of the IFD test, 65 % over 25 % of compression, is 2 to 2.6; a linear one has 2.6), then
+stiffens, and is solid at 1 - 1.4 times its relative density (Gibson and Ashby, Cellular
+Solids, 5.2), some 93 %. Two more tangents for each column approximate this, so the bed
+stays convex and piecewise linear.
 """
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from train.simulate.trials import Index, Trials, pick
 
 CLOSING, CLOSED = 0.65, 0.93
-"""Compression, as a part of the thickness, at which the cells begin to close and are closed."""
+"""Compression, as a part of the thickness, at which the cells begin to close and are
+closed."""
 STIFFER = 5.0
 """Stiffness between the two, as a multiple of the initial one."""
 
@@ -23,5 +25,7 @@ def fill(t: Trials, i: Index) -> None:
     t.add_springs(
         i,
         np.concatenate([gaps + CLOSING * depth, gaps + CLOSED * depth]),
-        np.concatenate([soft * (STIFFER - 1.0), reach * pick(t.values["taxel_n_m"], i)]),
+        np.concatenate(
+            [soft * (STIFFER - 1.0), reach * pick(t.values["taxel_n_m"], i)]
+        ),
     )

@@ -1,4 +1,5 @@
-"""A sleeve over the skin: a spring in series, 1/k = 1/k_skin + 1/k_cover, that spreads the load."""
+"""A sleeve over the skin: a spring in series, 1/k = 1/k_skin + 1/k_cover, that spreads
+the load."""
 
 import numpy as np
 
@@ -7,13 +8,19 @@ from train.simulate.trials import Index, Trials, pick
 
 def soften(t: Trials, i: Index) -> None:
     """Put the sleeve in series with each taxel."""
-    t.taxel_k[i] = 1.0 / (1.0 / pick(t.taxel_k, i) + 1.0 / pick(t.values["cover_n_m"], i))
+    t.taxel_k[i] = 1.0 / (
+        1.0 / pick(t.taxel_k, i) + 1.0 / pick(t.values["cover_n_m"], i)
+    )
 
 
 def pass_on(t: Trials, i: Index) -> None:
-    """Move a part of each taxel's load to its four neighbours; none is lost at the skin's ends."""
+    """Move a part of each taxel's load to its four neighbours; none is lost at the
+    skin's ends."""
     image = pick(t.image, i)
     moved = image * pick(t.values["cover_spread"], i)
     around = np.pad(moved, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    beside, above = around[1:-1, 2:] + around[1:-1, :-2], around[2:, 1:-1] + around[:-2, 1:-1]
+    beside, above = (
+        around[1:-1, 2:] + around[1:-1, :-2],
+        around[2:, 1:-1] + around[:-2, 1:-1],
+    )
     t.image[:, :, i] = image - 4.0 * moved + beside + above

@@ -1,4 +1,5 @@
-"""Each taxel also reads a part of its four neighbours' load; the last column meets the first."""
+"""Each taxel also reads a part of its four neighbours' load; the last column meets the
+first."""
 
 import numpy as np
 

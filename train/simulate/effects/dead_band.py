@@ -1,4 +1,5 @@
-"""Small readings are zero, as in the lab's node (below 6 standard deviations of its noise)."""
+"""Small readings are zero, as in the lab's node (below 6 standard deviations of its
+noise)."""
 
 import numpy as np
 

@@ -1,7 +1,8 @@
-"""Elastic foundation: each taxel presses its own column of foam, of E A / H newtons a metre.
+"""Elastic foundation: each taxel presses its own column of foam, of E A / H newtons a
+metre.
 
-On such independent columns a cylinder of radius R at depth d bears F/L = (4/3) (E/H) d sqrt(2 R d)
-(Winkler's foundation; Johnson, Contact Mechanics, 4.3).
+On such independent columns a cylinder of radius R at depth d bears F/L = (4/3) (E/H) d
+sqrt(2 R d) (Winkler's foundation; Johnson, Contact Mechanics, 4.3).
 """
 
 from train.simulate.trials import Index, Trials, pick

@@ -1,12 +1,12 @@
 """Friction between skin and object: the face holds the skin until it slides along it.
 
-As the forearm swings, its skin is dragged along the object's face. The shear carries a part of the
-arm's push, and presses the object down or lifts it. Coulomb's law holds for the skin's shear
-spring: T = K u with abs(T) <= mu F. F is the normal force of the step before, and the spring is
-implicit, so no stiffness makes energy.
+As the forearm swings, its skin is dragged along the object's face. The shear carries a
+part of the arm's push, and presses the object down or lifts it. Coulomb's law holds for
+the skin's shear spring: T = K u with abs(T) <= mu F. F is the normal force of the step
+before, and the spring is implicit, so no stiffness makes energy.
 
-A soft object fits itself to a forearm that lies askew, and presses along the forearm's normal. The
-bound then lies around the component of that normal along the face.
+A soft object fits itself to a forearm that lies askew, and presses along the forearm's
+normal. The bound then lies around the component of that normal along the face.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,11 @@ class Shear:
     Attributes:
         stiffness: newtons a metre of the skin along the face.
         fits: (n,) whether the object fits itself to a forearm that lies askew.
-        stretch, pull: (n,) metres of the spring, and its newtons on the arm along the face.
+        stretch, pull: (n,) metres of the spring, and its newtons on the arm along the
+            face.
         jacobian: (dof, n) how the joints move the skin along the face.
-        coupled: (2, n) metres that the skin moves along the face for each load of the contact.
+        coupled: (2, n) metres that the skin moves along the face for each load of the
+            contact.
         give: (n,) metres that it moves for each newton along the face.
         before: (dof, n) joint angles before the step.
     """
@@ -79,7 +81,9 @@ def predict(t: Trials, i: Index) -> None:
     state = t.own["friction"]
     q, q_free, loads = pick(t.q, i), pick(t.q_free, i), pick(t.loads, i)
     jacobian, coupled = pick(state.jacobian, i), pick(state.coupled, i)
-    drawn = total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
+    drawn = (
+        total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
+    )
     stuck = state.stiffness * (pick(state.stretch, i) + drawn)
     stuck = stuck / (1.0 + state.stiffness * pick(state.give, i))
     pull = np.clip(stuck, *bounds(t, i))

@@ -1,14 +1,16 @@
 """The arm's inertia: the arm hits, bounces and then presses steadily.
 
-Each joint obeys I q'' + d q' + k (q - q_eq) = -J^T F, solved by backward Euler in closed form.
-Inertia adds I / h^2 to the joint's stiffness within a step, and the joint's speed to its position
-without load. The skin's loss limits the bounce: a dashpot of `loss_s` times the stiffness beside
-each taxel's spring (Kelvin and Voigt; `viscous`). A mass m on a stiffness K then has the damping
-ratio loss_s sqrt(K / m) / 2. Inertia between joints is left out.
+Each joint obeys I q'' + d q' + k (q - q_eq) = -J^T F, solved by backward Euler in
+closed form. Inertia adds I / h^2 to the joint's stiffness within a step, and the
+joint's speed to its position without load. The skin's loss limits the bounce: a dashpot
+of `loss_s` times the stiffness beside each taxel's spring (Kelvin and Voigt;
+`viscous`). A mass m on a stiffness K then has the damping ratio loss_s sqrt(K / m) / 2.
+Inertia between joints is left out.
 
-A hit on a rigid object is shorter than a frame, so only short steps resolve it. Newmark's rules of
-second order are no better: they ring, or damp as much. So steps are shorter when a touch is near
-and for a while after each jolt, and of the scene's length elsewhere.
+A hit on a rigid object is shorter than a frame, so only short steps resolve it.
+Newmark's rules of second order are no better: they ring, or damp as much. So steps are
+shorter when a touch is near and for a while after each jolt, and of the scene's length
+elsewhere.
 """
 
 import math
@@ -21,8 +23,8 @@ from train.simulate.trials import Array, Index, Trials, pick, total
 FINER = 8
 """Steps of a frame near a jolt, as a multiple of the usual number."""
 JOLT = 0.1
-"""A larger change of the force's slope between frames, as a part of the peak so far, is a jolt: the
-arm has been hit or released."""
+"""A larger change of the force's slope between frames, as a part of the peak so far, is
+a jolt: the arm has been hit or released."""
 LASTS_S = 0.02
 """Seconds for which steps stay short after a jolt."""
 NEAR = 1.5
@@ -56,7 +58,9 @@ def swing(t: Trials, i: Index) -> None:
     """Begin with the joints at the speed of the equilibrium point."""
     inertia, speed = np.array(t.scene.inertia)[:, None], np.repeat(t.rate, t.n, axis=1)
     before, weight = np.zeros((2, *t.q.shape))
-    t.keep("inertia", Momentum, inertia=inertia, speed=speed, before=before, weight=weight)
+    t.keep(
+        "inertia", Momentum, inertia=inertia, speed=speed, before=before, weight=weight
+    )
 
 
 def stand(t: Trials, i: Index) -> None:
@@ -72,7 +76,12 @@ def pace(t: Trials, i: Index) -> None:
     jolts = np.abs(change - pick(state.change, i)) > JOLT * peak
     left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
     near = (force == 0.0) & (depth + NEAR * closing > 0.0)
-    state.depth[i], state.force[i], state.change[i], state.peak[i] = depth, force, change, peak
+    state.depth[i], state.force[i], state.change[i], state.peak[i] = (
+        depth,
+        force,
+        change,
+        peak,
+    )
     t.steps[i] = np.where(near | (left > 0), FINER, 1) * pick(t.usual, i)
     state.left[i] = np.maximum(left - 1, 0)
 

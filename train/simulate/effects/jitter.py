@@ -1,4 +1,5 @@
-"""Frames come early or late; each shows the load at its own time, and reports that time."""
+"""Frames come early or late; each shows the load at its own time, and reports that
+time."""
 
 from typing import Any
 
@@ -13,7 +14,9 @@ def clock(readings: Readings) -> None:
     t, counts = readings.t, readings.counts.reshape(len(readings.t), -1)
     frame, part = t[1] - t[0], np.zeros(len(t))
     drawn = readings.stream("jitter").standard_normal(len(t) - 2)
-    part[1:-1] = np.clip(drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45)
+    part[1:-1] = np.clip(
+        drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45
+    )
     readings.times = t + part * frame
     series: tuple[NDArray[Any], ...] = readings.joints, counts
     for values in series:

@@ -1,19 +1,23 @@
-"""Foam as an elastic layer, whose surface moves beside the contact too, not as separate springs.
+"""Foam as an elastic layer, whose surface moves beside the contact too, not as separate
+springs.
 
-For a smooth body pressed into a layer of thickness H, the load grows with depth as the stiffness
-of a flat strip as wide as the contact: dF/dd = S(a) (a the contact's half width; Barber, Contact
-Mechanics, 4.4: the incompressible argument holds for any linear elastic body). Solved numerically
-for a bonded layer (plane strain, no lateral strain in uniaxial compression) both S and F are a
-foundation's with a margin beside the contact,
+For a smooth body pressed into a layer of thickness H, the load grows with depth as the
+stiffness of a flat strip as wide as the contact: dF/dd = S(a) (a the contact's half
+width; Barber, Contact Mechanics, 4.4: the incompressible argument holds for any linear
+elastic body). Solved numerically for a bonded layer (plane strain, no lateral strain in
+uniaxial compression) both S and F are a foundation's with a margin beside the contact,
 
-    S(a) = 2 E (a / H + 0.19) a metre of length,   F(a) = (E / R) (2/3 a^3 / H + 0.55 a^2),
+    S(a) = 2 E (a / H + 0.19) a metre of length, F(a) = (E / R) (2/3 a^3 / H + 0.55
+    a^2),
 
-so a column of taxels at x is touched at the depth at which the contact has become that wide,
+so a column of taxels at x is touched at the depth at which the contact has become that
+wide,
 
     d(x) = (1 / R) integral of a (a + 0.55 H) / (a + 0.19 H) from 0 to x,
 
-and from then on adds its foundation. The margin is one more spring in each line. The bed stays
-convex and piecewise linear. The pressure is close to a half ellipse at any a / H up to 1.5.
+and from then on adds its foundation. The margin is one more spring in each line. The
+bed stays convex and piecewise linear. The pressure is close to a half ellipse at any a
+/ H up to 1.5.
 """
 
 import numpy as np
@@ -28,8 +32,8 @@ SPREAD = 0.55
 
 
 def delay(x: Array, depth: Array) -> Array:
-    """R times the depth at which the layer is touched at x, beyond that of separate springs: the
-    integral of a (SPREAD - MARGIN) H / (a + MARGIN H)."""
+    """R times the depth at which the layer is touched at x, beyond that of separate
+    springs: the integral of a (SPREAD - MARGIN) H / (a + MARGIN H)."""
     beside = MARGIN * depth
     return np.asarray((SPREAD - MARGIN) * depth * (x - beside * np.log1p(x / beside)))
 
@@ -43,7 +47,9 @@ def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
 
 def widen(t: Trials, i: Index) -> None:
     """Columns are touched at a larger depth."""
-    gaps = touched_at(pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i))
+    gaps = touched_at(
+        pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i)
+    )
     t.column_gaps[:, i] = gaps
 
 
@@ -55,7 +61,8 @@ def fill(t: Trials, i: Index) -> None:
 
 
 def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
-    """(rows, n) slope with which the forearm dips into an end of the face that lies in this row.
+    """(rows, n) slope with which the forearm dips into an end of the face that lies in
+    this row.
 
     A face that covers all of the skin's first or last row continues beyond the skin.
     """
@@ -69,14 +76,16 @@ def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
 
 
 def row_loads(t: Trials, i: Index, wide: Array) -> Array:
-    """(rows, n) the load of each row up to a common factor, with `wide` (rows, n) columns touched.
+    """(rows, n) the load of each row up to a common factor, with `wide` (rows, n)
+    columns touched.
 
-    Across the forearm a row bears the load of a layer. Along it, rows are coupled as in a stretched
-    foundation whose length is the margin (Pasternak's; Kerr, J. Applied Mechanics 31, 1964). Where
-    the forearm lies askew over the end of a face, that end bears the margin squared times the slope
-    in addition, and rows pressed less deep than the margin times the slope are hardly touched. The
-    highest load of a taxel is within 10 % of that on an elastic block by finite elements, askew by
-    10 and 17 degrees.
+    Across the forearm a row bears the load of a layer. Along it, rows are coupled as in
+    a stretched foundation whose length is the margin (Pasternak's; Kerr, J. Applied
+    Mechanics 31, 1964). Where the forearm lies askew over the end of a face, that end
+    bears the margin squared times the slope in addition, and rows pressed less deep
+    than the margin times the slope are hardly touched. The highest load of a taxel is
+    within 10 % of that on an elastic block by finite elements, askew by 10 and 17
+    degrees.
     """
     depth, weight = pick(t.line_depth, i), pick(t.weight, i)
     gaps, stiffness = pick(t.gaps, i), pick(t.stiffness, i)
@@ -84,7 +93,10 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
     inside = np.maximum(depth - gaps[touched][:, None], 0.0)
     pressed = total(inside * stiffness[touched][:, None]) if touched.any() else 0.0
     borne = np.where(depth > 0.0, pressed, 0.0) * weight
-    margin, ends = MARGIN * pick(t.values["depth_m"], i), askew(depth, weight, t.skin.pitch[0])
+    margin, ends = (
+        MARGIN * pick(t.values["depth_m"], i),
+        askew(depth, weight, t.skin.pitch[0]),
+    )
     slight = margin * total(ends)
     dips = slight > 0.0
     if dips.any():
@@ -95,8 +107,8 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
 
 
 def image(t: Trials, i: Index) -> None:
-    """Share the force among the rows by their loads, and within a row as a half ellipse: by the
-    root of each column's depth beyond its touch."""
+    """Share the force among the rows by their loads, and within a row as a half
+    ellipse: by the root of each column's depth beyond its touch."""
     depth, reach = pick(t.line_depth, i), pick(t.reach, i)
     # A touch so slight that it falls between two columns goes to the nearest.
     gaps = pick(t.column_gaps, i)

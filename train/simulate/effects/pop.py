@@ -1,8 +1,9 @@
-"""Bubble wrap: a bubble under each taxel stiffens by the gas law, and is gone once it bursts.
+"""Bubble wrap: a bubble under each taxel stiffens by the gas law, and is gone once it
+bursts.
 
-p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three tangents (at 0,
-b/2 and 3b/4) approximate it, each exactly in series with the skin's spring. Behind a
-burst bubble lies the hard backing, b deeper.
+p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three
+tangents (at 0, b/2 and 3b/4) approximate it, each exactly in series with the skin's
+spring. Behind a burst bubble lies the hard backing, b deeper.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,8 @@ class Bubbles:
     """Bubbles and the backing under each.
 
     Attributes:
-        first: the place of their first spring in `Trials.gaps`; segments follow each other.
+        first: the place of their first spring in `Trials.gaps`; segments follow each
+            other.
         gaps, stiffness: (S, n) of these springs.
         alive: (S, rows, n) 1 where a spring is left, 0 where it is gone.
     """
@@ -37,7 +39,8 @@ class Bubbles:
 
 
 def lay(t: Trials, i: Index) -> None:
-    """Lay four springs in each column: three tangents, and the backing for after the burst."""
+    """Lay four springs in each column: three tangents, and the backing for after the
+    burst."""
     values, skin = {k: pick(v, i) for k, v in t.values.items()}, pick(t.taxel_k, i)
     k0, height = values["bubble_n_m"], values["bubble_m"]
     slopes = [1.0 / (1.0 / skin + 1.0 / (k0 * s)) for s in SLOPES]
@@ -49,7 +52,8 @@ def lay(t: Trials, i: Index) -> None:
     stiffness = np.concatenate([reach * k for k in steeper])
     base.lay_rows(t, i)
     state = t.own["pop"] = Bubbles(
-        len(t.gaps), *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))]
+        len(t.gaps),
+        *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))],
     )
     state.gaps[:, i], state.stiffness[:, i] = gaps, stiffness
     state.alive[: -len(reach)] = 1.0
@@ -84,7 +88,10 @@ def image(t: Trials, i: Index) -> None:
     """Share the force among the springs, then add up the four of each taxel."""
     state = t.own["pop"]
     loads = spring_loads(
-        pick(t.line_depth, i), pick(state.gaps, i), pick(state.stiffness, i), pick(t.weight, i)
+        pick(t.line_depth, i),
+        pick(state.gaps, i),
+        pick(state.stiffness, i),
+        pick(t.weight, i),
     )
     loads *= pick(state.alive, i)
     share_out(pick(t.force, i), loads)
@@ -93,7 +100,8 @@ def image(t: Trials, i: Index) -> None:
 
 
 def pass_on(t: Trials, i: Index) -> None:
-    """Burst the overloaded bubbles, which leaves their backing from the next frame on."""
+    """Burst the overloaded bubbles, which leaves their backing from the next frame
+    on."""
     state = t.own["pop"]
     burst = (pick(t.image, i) > pick(t.values["pop_n"], i)).swapaxes(0, 1)
     at = np.flatnonzero(burst.any(axis=(0, 1)))

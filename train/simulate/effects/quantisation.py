@@ -7,7 +7,10 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Round to the nearest whole number of steps."""
-    counts, step = readings.counts, np.float32(readings.scene.setting("quantisation", "counts"))
+    counts, step = (
+        readings.counts,
+        np.float32(readings.scene.setting("quantisation", "counts")),
+    )
     counts /= step
     np.rint(counts, out=counts)
     counts *= step

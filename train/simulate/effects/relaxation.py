@@ -1,5 +1,5 @@
-"""Standard linear solid: a second spring, k1 = ratio * k, in series with a dashpot that relaxes it
-(`viscous`)."""
+"""Standard linear solid: a second spring, k1 = ratio * k, in series with a dashpot that
+relaxes it (`viscous`)."""
 
 from train.simulate.trials import Index, Trials, pick
 

@@ -1,7 +1,8 @@
-"""An object on the floor: it sticks while the push is at most mu_s m g, then drags mu_k m g.
+"""An object on the floor: it sticks while the push is at most mu_s m g, then drags mu_k
+m g.
 
-A step first assumes that the object sticks. It moves where the push exceeds `hold`, and stops
-exactly at rest.
+A step first assumes that the object sticks. It moves where the push exceeds `hold`, and
+stops exactly at rest.
 """
 
 from dataclasses import dataclass
@@ -74,8 +75,8 @@ def drag(t: Trials, i: Index) -> None:
 def give_way(t: Trials, i: Index) -> None:
     """Let an object that moves give way to the load.
 
-    Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is one more
-    compliance, h^2/m, and a shift, so the contact's solver still applies.
+    Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is one
+    more compliance, h^2/m, and a shift, so the contact's solver still applies.
     """
     mover: Mover = t.own["sliding"]
     h, speed, y = pick(t.h, i), pick(mover.speed, i), pick(t.y[0], i)
@@ -101,7 +102,8 @@ def move(t: Trials, i: Index) -> None:
     stops = moving & ~goes
     again = np.flatnonzero(stops | (~moving & (force > pick(mover.hold, i))))
     if again.size:
-        # An object that stops is solved again at rest, one that starts is solved again in motion.
+        # An object that stops is solved again at rest, one that starts is solved again
+        # in motion.
         trials, rests = np.arange(t.n)[i][again], stops[again]
         y = np.where(rests, mover.rest[trials], mover.shifted[trials])
         soft = np.where(rests, 0.0, (gain * h)[again])

@@ -1,4 +1,5 @@
-"""A table that is not level: the weight's component along it adds to friction or takes from it.
+"""A table that is not level: the weight's component along it adds to friction or takes
+from it.
 
 On a slope of angle b, uphill along the push, m g (mu cos b + sin b) moves an object.
 """

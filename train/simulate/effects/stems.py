@@ -1,5 +1,5 @@
-"""Foliage: stems at different depths that bend as cantilevers (k = 3 E I / L^3, one number here),
-damp, and slip off the forearm for good once bent too far."""
+"""Foliage: stems at different depths that bend as cantilevers (k = 3 E I / L^3, one
+number here), damp, and slip off the forearm for good once bent too far."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,12 @@ class Stems:
     """The stems of each trial; a trial of fewer stems has some of no stiffness.
 
     Attributes:
-        depth, stiffness: (stems, n) metres at which each is touched, and newtons a metre, 0 once it
-            has slipped off.
+        depth, stiffness: (stems, n) metres at which each is touched, and newtons a
+            metre, 0 once it has slipped off.
         damping: (stems, n) N s/m of each, 0 once it has slipped off.
-        taxel, part: (stems, n) the place in the window's image of the first of the two rows that a
-            stem lies between, and the part of its load that the second bears.
+        taxel, part: (stems, n) the place in the window's image of the first of the two
+            rows that a stem lies between, and the part of its load that the second
+            bears.
         order: (stems, n) the stems sorted by depth.
         slopes, intercepts: (stems, n) the law of the stems still held, without damping.
         drag: (n,) N s/m of all bent stems.
@@ -89,7 +90,8 @@ def let_go(t: Trials, i: Index) -> None:
 
 
 def tune(t: Trials, i: Index) -> None:
-    """The law of the next step: the stems still held, and implicitly the damping of bent ones."""
+    """The law of the next step: the stems still held, and implicitly the damping of
+    bent ones."""
     state = t.own["stems"]
     drag, stems = pick(state.drag, i) / pick(t.h, i), len(state.depth)
     t.slopes[:stems, i] = pick(state.slopes, i) + drag
@@ -127,7 +129,11 @@ def image(t: Trials, i: Index) -> None:
     loads = bent * pick(state.stiffness, i)
     borne = total(loads)
     loads = loads * (pick(t.force, i) / np.where(borne > 0.0, borne, 1.0))
-    image, part, every = np.zeros((t.image[..., 0].size, m)), pick(state.part, i), np.arange(m)
+    image, part, every = (
+        np.zeros((t.image[..., 0].size, m)),
+        pick(state.part, i),
+        np.arange(m),
+    )
     beside = len(t.columns) if t.rows > 1 else 0
     shares = zip(pick(state.taxel, i), loads * (1.0 - part), loads * part, strict=True)
     for taxel, first, second in shares:

@@ -1,7 +1,8 @@
-"""The forearm pivots about the contact, which adds a second coordinate: its angle to the face.
+"""The forearm pivots about the contact, which adds a second coordinate: its angle to
+the face.
 
-Rows then press to different depths, a + lever * tilt, and the loads are a force and a moment
-(`pivot_solver`).
+Rows then press to different depths, a + lever * tilt, and the loads are a force and a
+moment (`pivot_solver`).
 """
 
 from dataclasses import dataclass
@@ -21,10 +22,12 @@ class Tilt:
 
     Attributes:
         lever: (rows, n) metres of each row from the contact's middle.
-        guess, settled: (2, n) the loads with which the next search begins, and those of the last
-            step.
-        gaps: (S, 1, n) metres at which each spring of a row is touched, in ascending order.
-        stiffness: (S, 1, n) newtons a metre, or (S, rows, n) where springs of some rows are gone.
+        guess, settled: (2, n) the loads with which the next search begins, and those of
+            the last step.
+        gaps: (S, 1, n) metres at which each spring of a row is touched, in ascending
+            order.
+        stiffness: (S, 1, n) newtons a metre, or (S, rows, n) where springs of some rows
+            are gone.
         order: (S, n) the place of each spring in `Trials.gaps`.
         intact: (S, n) newtons a metre of the springs before any is gone.
         nearest: (S,) the smallest gap of any trial's s-th spring.
@@ -74,8 +77,9 @@ def law(t: Trials, i: Index) -> None:
 
 
 def locate(t: Trials, i: Index) -> None:
-    """Find depth and tilt against the object's face at the frame's joint angles, their Jacobians,
-    and the part of each row that the face covers, with its lever about the middle."""
+    """Find depth and tilt against the object's face at the frame's joint angles, their
+    Jacobians, and the part of each row that the face covers, with its lever about the
+    middle."""
     q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
     along_face, radius = pick(t.along_face, i), t.skin.radius_m
     pose = t.kinematics.pose(q)
@@ -129,8 +133,11 @@ def settle(t: Trials, i: Index) -> None:
 
 
 def bear(t: Trials, i: Index) -> None:
-    """The force on the skin, the push's component along the skin's normal, and each row's depth."""
+    """The force on the skin, the push's component along the skin's normal, and each
+    row's depth."""
     tilt = pick(t.depth[1], i)
     t.force[i] = pick(t.loads[0], i) * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
-    depth = pick(t.depth[0], i) + pick(t.own["tilt"].lever, i) * tilt - pick(t.line_gap, i)
+    depth = (
+        pick(t.depth[0], i) + pick(t.own["tilt"].lever, i) * tilt - pick(t.line_gap, i)
+    )
     base.keep_depth(t, i, depth, pick(t.weight, i))

@@ -1,10 +1,11 @@
-"""An object that tips over its far edge before it slides: where mu_s > base / (2 height).
+"""An object that tips over its far edge before it slides: where mu_s > base / (2
+height).
 
-It takes m g base / (2 height) at the height of the contact. As the object leans, the lever of its
-weight shrinks, and so does the push needed. Leaning stores energy: released, the object falls back
-onto its foot. Beyond the balance its weight turns it over, away from the arm, until it lies. The
-softening is taken at the step's start, since an explicit concave potential makes no energy, and the
-rest implicitly.
+It takes m g base / (2 height) at the height of the contact. As the object leans, the
+lever of its weight shrinks, and so does the push needed. Leaning stores energy:
+released, the object falls back onto its foot. Beyond the balance its weight turns it
+over, away from the arm, until it lies. The softening is taken at the step's start,
+since an explicit concave potential makes no energy, and the rest implicitly.
 """
 
 import math
@@ -34,8 +35,9 @@ class Tipping:
 def stand(t: Trials, i: Index) -> None:
     """Find the objects that tip.
 
-    The object is modelled as a box twice as high as the contact: its moment of inertia about the
-    edge is m (base^2 + 4 height^2) / 3, felt at the contact as this divided by height^2.
+    The object is modelled as a box twice as high as the contact: its moment of inertia
+    about the edge is m (base^2 + 4 height^2) / 3, felt at the contact as this divided
+    by height^2.
     """
     mover, mass = t.own["sliding"], t.values["mass_kg"]
     foot, height = t.values["base_m"], t.values["height_m"]

@@ -1,11 +1,12 @@
 """A push beside an object's middle turns the object about the vertical as it slides.
 
-A disc-like foot of radius R under even pressure bears a force F at a distance e from its middle
-until (F / f)^2 + (F e / (c f))^2 = 1, with f = mu m g and c = 2 R / 3. This ellipsoid approximates
-its limit surface, and the object moves along the normal of that surface (Goyal, Ruina and
-Papadopoulos, Wear 143, 1991; Lynch and Mason, Int. J. Robotics Research 15, 1996). So f / sqrt(1 +
-e^2 / c^2) moves it, and it turns by e / (c^2 + e^2) for each metre at the contact. As its face
-turns, other columns of the forearm touch it.
+A disc-like foot of radius R under even pressure bears a force F at a distance e from
+its middle until (F / f)^2 + (F e / (c f))^2 = 1, with f = mu m g and c = 2 R / 3. This
+ellipsoid approximates its limit surface, and the object moves along the normal of that
+surface (Goyal, Ruina and Papadopoulos, Wear 143, 1991; Lynch and Mason, Int. J.
+Robotics Research 15, 1996). So f / sqrt(1 + e^2 / c^2) moves it, and it turns by e /
+(c^2 + e^2) for each metre at the contact. As its face turns, other columns of the
+forearm touch it.
 """
 
 import math
@@ -32,7 +33,10 @@ def stand(t: Trials, i: Index) -> None:
     """Reduce friction and mass to those felt by an off-centre push."""
     aside, radius = pick(t.values["aside_m"], i), 0.5 * pick(t.values["foot_m"], i)
     lever = LEVER * radius
-    mover, easier = t.own["sliding"], 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
+    mover, easier = (
+        t.own["sliding"],
+        1.0 / np.sqrt(1.0 + aside * aside / (lever * lever)),
+    )
     mover.static[i] = pick(mover.static, i) * easier
     mover.kinetic[i] = pick(mover.kinetic, i) * easier
     # A disc's own moment of inertia is m R^2 / 2.
@@ -44,7 +48,8 @@ def stand(t: Trials, i: Index) -> None:
 def pass_on(t: Trials, i: Index) -> None:
     """Move the image around the forearm with the face.
 
-    A load between two columns is shared by them; a load beyond the window goes to its last column.
+    A load between two columns is shared by them; a load beyond the window goes to its
+    last column.
     """
     state = t.own["turning"]
     turned = pick(state.per_metre, i) * pick(t.own["sliding"].slide, i)
@@ -54,7 +59,11 @@ def pass_on(t: Trials, i: Index) -> None:
     if not moving.size:
         return
     further = np.floor(columns[moving])
-    part, trials, last = columns[moving] - further, np.arange(t.n)[i][moving], len(t.columns) - 1
+    part, trials, last = (
+        columns[moving] - further,
+        np.arange(t.n)[i][moving],
+        len(t.columns) - 1,
+    )
     image = t.image.take(trials, -1)
     moved, places = np.zeros_like(image), np.arange(len(moving))
     for beyond, share in ((0, 1.0 - part), (1, part)):

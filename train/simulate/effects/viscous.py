@@ -1,17 +1,20 @@
-"""Forces that depend on speed: a Maxwell element and a dashpot beside a contact's elastic law.
+"""Forces that depend on speed: a Maxwell element and a dashpot beside a contact's
+elastic law.
 
-Beside the elastic force F a Maxwell element (Zener's) adds z with z' = -z / tau + r dF/dt, and a
-dashpot adds T dF/dt. Let w = r F - z be the part of F already relaxed. A step is the exact answer
-to a ramp of F within it, stable for any tau: with e = exp(-h / tau) and s = r (1 - e) tau / h,
+Beside the elastic force F a Maxwell element (Zener's) adds z with z' = -z / tau + r
+dF/dt, and a dashpot adds T dF/dt. Let w = r F - z be the part of F already relaxed. A
+step is the exact answer to a ramp of F within it, stable for any tau: with e = exp(-h /
+tau) and s = r (1 - e) tau / h,
 
     z+ = e z + s (F+ - F),    w+ = e w + (s - e r) F + (r - s) F+,
 
-so the contact bears (1 + s + T / h) F+ - L with L = e w + (s - e r + T / h) F. No term of w or L is
-negative. So the law stays convex, its solvers still apply, no step can make energy, and the length
-of a step affects only that step.
+so the contact bears (1 + s + T / h) F+ - L with L = e w + (s - e r + T / h) F. No term
+of w or L is negative. So the law stays convex, its solvers still apply, no step can
+make energy, and the length of a step affects only that step.
 
-Where the forearm pivots, each row of the skin has its own element; elsewhere the first row holds
-that of the whole contact. The effects `relaxation` and `inertia` share this module.
+Where the forearm pivots, each row of the skin has its own element; elsewhere the first
+row holds that of the whole contact. The effects `relaxation` and `inertia` share this
+module.
 """
 
 from dataclasses import dataclass
@@ -27,8 +30,8 @@ class Viscous:
 
     Attributes:
         loss_s, ratio, relax_s: (n,) T, r and tau.
-        kept, let_go, late, damped, gain: (n,) for the present step: e, r - s, s - e r, T / h and
-            1 + s + T / h.
+        kept, let_go, late, damped, gain: (n,) for the present step: e, r - s, s - e r,
+            T / h and 1 + s + T / h.
         force, given, load: (rows, n) F, w and -L.
     """
 

@@ -1,4 +1,5 @@
-"""Builds the stand-in for /dev/i2c-N that lets an unmodified smbus2 run without hardware."""
+"""Builds the stand-in for /dev/i2c-N that lets an unmodified smbus2 run without
+hardware."""
 
 import os
 import shutil
@@ -12,14 +13,26 @@ ROOT = Path(__file__).parents[4]
 
 def compiler() -> str | None:
     """A C compiler, or None where there is none (or this is not Linux)."""
-    return shutil.which("cc") or shutil.which("gcc") if sys.platform == "linux" else None
+    return (
+        shutil.which("cc") or shutil.which("gcc") if sys.platform == "linux" else None
+    )
 
 
 def build(folder: Path) -> Path:
     """The shim as a library in `folder`."""
     library = folder / "i2cdev.so"
-    command = [str(compiler()), "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
-    subprocess.run([*command, "-o", str(library), str(SOURCE), "-ldl", "-lpthread"], check=True)
+    command = [
+        str(compiler()),
+        "-O2",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-shared",
+        "-fPIC",
+    ]
+    subprocess.run(
+        [*command, "-o", str(library), str(SOURCE), "-ldl", "-lpthread"], check=True
+    )
     return library
 
 

@@ -18,7 +18,8 @@ from edge.touch.joint_stream import Joints
 
 
 def topic(task: str) -> str:
-    """A task's name as a valid topic: letters, digits and underscores, no digit in front.
+    """A task's name as a valid topic: letters, digits and underscores, no digit in
+    front.
 
     >>> topic("Object-36"), topic("36 objects")
     ('object_36', 'task_36_objects')
@@ -28,7 +29,8 @@ def topic(task: str) -> str:
 
 
 class ClassifyNode(Node):
-    """Publishes `~/TASK` (vision_msgs/Classification) and `~/events` (JSON in std_msgs/String)."""
+    """Publishes `~/TASK` (vision_msgs/Classification) and `~/events` (JSON in
+    std_msgs/String)."""
 
     def __init__(self) -> None:
         super().__init__("edge_classify")
@@ -44,7 +46,9 @@ class ClassifyNode(Node):
         }
         self._frame_id = given["frame_id"]
         self._model = edge.Model(given["model"])
-        self._skin, self._joints, self._lasts_s = self._open(given["skin"], given["fake"])
+        self._skin, self._joints, self._lasts_s = self._open(
+            given["skin"], given["fake"]
+        )
         self._classifier = edge.Classifier(
             self._model, self._skin.layout, error=given["error"] or None
         )
@@ -58,7 +62,8 @@ class ClassifyNode(Node):
         self._reading.start()
 
     def _open(self, skin: str, fake: str):
-        """The skin, where its joint angles come from, and how long there is something to read."""
+        """The skin, where its joint angles come from, and how long there is something
+        to read."""
         chain, dof = self._model.info.chain, self._model.info.dof
         if fake:
             recording = edge.load(fake)
@@ -90,7 +95,9 @@ class ClassifyNode(Node):
     def _read(self) -> None:
         """Watch the skin until the node is destroyed or the recording has ended."""
         with self._skin as skin:
-            for event in self._classifier.watch(skin, joints=self._joints, lasts_s=self._lasts_s):
+            for event in self._classifier.watch(
+                skin, joints=self._joints, lasts_s=self._lasts_s
+            ):
                 if self._closing:
                     return
                 self._publish(event)
@@ -102,7 +109,9 @@ class ClassifyNode(Node):
         message = Classification()
         message.header.stamp = self.get_clock().now().to_msg()
         message.header.frame_id = self._frame_id
-        message.results = [ObjectHypothesis(class_id=event.label, score=event.confidence)]
+        message.results = [
+            ObjectHypothesis(class_id=event.label, score=event.confidence)
+        ]
         self._tasks[event.task].publish(message)
 
     def destroy_node(self) -> None:
