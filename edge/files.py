@@ -73,9 +73,9 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
     with refusing(f"{name}: cannot be read"):
         # Without O_NONBLOCK, opening a FIFO waits until another process opens it for
         # writing.
-        file = open(
+        file = open(  # noqa: SIM115 - closed by the with statement below
             name, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)
-        )  # noqa: SIM115
+        )
     with file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):

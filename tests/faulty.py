@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from edge.bus.i2c import Transfer, bus_error, write
-from edge.bus.tca9548a import FakeTCA9548A
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses
+from edge.fake.tca9548a import FakeTCA9548A
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 

@@ -131,9 +131,8 @@ def bus_error(
 
     `remedy` replaces the words that end the message.
 
-    >>> bus_error(errno.ETIMEDOUT, "/dev/i2c-1", 0x2C)
-    BusTimeout('/dev/i2c-1, address 0x2c: the transfer hung until its timeout
-    (ETIMEDOUT)')
+    >>> bus_error(errno.EBADMSG, "/dev/i2c-1", 0x2C, remedy="look at it")
+    BusFault('/dev/i2c-1, address 0x2c: look at it (EBADMSG)')
     """
     code = code or errno.EIO
     kind = ERRORS.get(code, BusFault)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.bus.crc import sealed
 from edge.bus.i2c import (
     BusError,
     BusFault,
@@ -25,7 +26,6 @@ from edge.bus.i2c import (
     read,
     write,
 )
-from edge.bus.crc import sealed
 from edge.errors import InputError
 
 BOOT_S = 3.0

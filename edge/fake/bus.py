@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from edge.bus.i2c import Message, Transfer, bus_error, wire_bits
-from edge.bus.tca9548a import FakeTCA9548A
 from edge.chips.chip import FakeChip
 from edge.fake.clock import Hand, VirtualClock
+from edge.fake.tca9548a import FakeTCA9548A
 
 NACK_BITS = 11
 """START, the address that nobody acknowledges, and STOP."""

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from edge.bus.i2c import wire_bits
 from edge.bus.serial_bus import serial_bits
-from edge.bus.tca9548a import FakeTCA9548A
 from edge.chips import block
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec, Sense
 from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
+from edge.fake.tca9548a import FakeTCA9548A
 from edge.interrupt import delayed
 from edge.recording import Recording
 from edge.skin import file as skinfile

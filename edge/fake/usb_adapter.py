@@ -84,7 +84,7 @@ class UsbAdapter:
     request (EIO).
 
     >>> from edge.fake.bus import FakeBus
-    >>> from edge.bus.tca9548a import FakeTCA9548A
+    >>> from edge.fake.tca9548a import FakeTCA9548A
     >>> adapter = UsbAdapter(FakeBus(chips={0x70: FakeTCA9548A()}))
     >>> adapter.control(struct.pack("<BBHHH", 0xC1, FUNCTIONS, 0, 0, 4)).hex()
     '0100ff0e'

@@ -6,8 +6,8 @@ import errno
 import pytest
 
 from edge.bus.i2c import BusError, BusGone, BusRefused, fetch, read, send, write
-from edge.bus.tca9548a import FakeTCA9548A
 from edge.chips.chip import FakeChip
+from edge.fake.tca9548a import FakeTCA9548A
 from tests.faulty import Fault, FaultyBus
 
 

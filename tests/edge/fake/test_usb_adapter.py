@@ -6,9 +6,9 @@ import struct
 
 import pytest
 
-from edge.bus.tca9548a import FakeTCA9548A
 from edge.errors import EdgeError, InputError
 from edge.fake import usb_adapter
+from edge.fake.tca9548a import FakeTCA9548A
 from edge.fake.usb_adapter import UsbAdapter, data_length, free_port, plugged
 from tests.faulty import Fault, FaultyBus
 
