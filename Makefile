@@ -52,23 +52,30 @@ help:
 	@echo "  make constraints   check that constraints.txt pins exactly what the groups need"
 	@echo "  make clean         remove build and dist"
 
+# What `make demo` and `make export` need; what a target needs beyond that, it installs itself.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) "pip>=25.1"
-	$(PIP) -e . --group dev
+	$(PIP) -e . --group train
+	@touch $@
+
+DEV := $(VENV)/.dev
+
+$(DEV): $(READY)
+	$(PIP) --group dev
 	@touch $@
 
 venv: $(READY)
 
-lint: $(READY)
+lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(READY)
+types: $(DEV)
 	$(BIN)/mypy
 
 test: lint types
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml
@@ -113,7 +120,7 @@ demo: $(READY)
 	$(BIN)/edge-classify run --model $(DEMO)/model.onnx --fake $(DEMO)/unseen/cardboard-box-movable-00.npz
 
 # The committed model and outputs that the tests compare the edge with.
-golden: $(READY)
+golden: $(DEV)
 	$(BIN)/python -m tests.golden.make
 
 # The README's pictures.
@@ -130,7 +137,7 @@ docs/touch.png: $(READY)
 
 BENCHVENV := $(VENV)/.bench
 
-$(BENCHVENV): $(READY)
+$(BENCHVENV): $(DEV)
 	$(PIP) --group bench
 	@touch $@
 
@@ -177,9 +184,9 @@ $(VENV)/.docs: $(READY)
 	@touch $@
 
 docs: $(VENV)/.docs
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
+	$(BIN)/python -m mkdocs build --quiet --strict --site-dir $(OUT)/site
 
-risk: $(READY)
+risk: $(DEV)
 	$(BIN)/python -m tests.bench.risk $(RISK)
 
 ifndef DATA
@@ -200,13 +207,13 @@ stopping: $(PEERS)/.ready
 	$(PEERS)/bin/python -m tests.bench.stopping --data $(RECORDINGS) $(STOPPING)
 
 # FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
-faults: $(READY)
+faults: $(DEV)
 	$(BIN)/python -m tests.faults $(FAULTS)
 
-soak: $(READY)
+soak: $(DEV)
 	$(BIN)/python -m tests.bench.soak
 
-soak-day: $(READY)
+soak-day: $(DEV)
 	$(BIN)/python -m tests.bench.soak --minutes 1440 --every 60 --rate 15
 
 $(VENV)/.upkeep: $(READY)
@@ -224,16 +231,16 @@ wheel: $(READY)
 	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
 	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
 
-wheel-test: wheel
+wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py
 
-kernel-test: $(READY)
+kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys
 
-service-test: $(READY)
+service-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_service.py -rs
 
-board-test: wheel
+board-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_aarch64.py -rs --capture=tee-sys
 
 DEMODATA := $(OUT)/demo-data
@@ -262,11 +269,11 @@ $(OTHER)/.ready: constraints.txt
 	  $$(grep -E '^(numpy|smbus2)==' constraints.txt) onnxruntime==$(OTHER_RUNTIME)
 	@touch $@
 
-hard-cases-versions: $(READY) $(OTHER)/.ready
+hard-cases-versions: $(DEV) $(OTHER)/.ready
 	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
 	$(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $(OTHER)/bin/python
 
-$(VENV)/.mutants: $(READY)
+$(VENV)/.mutants: $(DEV)
 	$(PIP) --group mutants
 	@touch $@
 
@@ -284,7 +291,7 @@ constraints: $(VENV)/.upkeep
 	@echo "constraints.txt pins exactly what the groups need"
 
 # FUZZ="-k scene": only the readers whose names contain this.
-fuzz: $(READY)
+fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
 clean:

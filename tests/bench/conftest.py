@@ -13,6 +13,18 @@ import timeit
 
 import pytest
 
+from tests.bench import tables
+
+ROWS = pytest.StashKey()
+"""The rows of the table of all benchmarks of a run."""
+
+
+def pytest_sessionfinish(session):
+    """Write the table of a whole run; part of the benchmarks would replace it."""
+    rows = session.config.stash.get(ROWS, [])
+    if rows and not session.config.option.keyword:
+        tables.write("bench", [rows], "make bench")
+
 
 @pytest.fixture
 def note(request, capsys):
@@ -21,7 +33,14 @@ def note(request, capsys):
     name = request.node.name.removeprefix("bench_")
 
     def add(rival, ratio, bound, *seconds):
-        times = "".join(f"{each * 1e6:>10.1f} us" for each in seconds)
+        row = {"benchmark": name, "beside": rival, "ratio": f"{ratio:.3g}"}
+        row["bound"] = bound
+        row["ours"] = ""
+        row["theirs"] = ""
+        for column, duration in zip(("ours", "theirs"), seconds, strict=False):
+            row[column] = f"{duration * 1e6:.1f} us"
+        request.config.stash.setdefault(ROWS, []).append(row)
+        times = "".join(f"{duration * 1e6:>10.1f} us" for duration in seconds)
         with capsys.disabled():
             print(f"\n{name:<32} {rival:<44} {ratio:>8.3g}  {bound:<14}{times}", end="")
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.bench import mujoco_touch
+from tests.bench import mujoco_touch, tables
 from tests.bench.mujoco_touch import LEAD_S, RATE_HZ, THRESHOLD_COUNTS, Thing, Touch
 from train.simulate.convergence import kinds
 from train.simulate.engine import readings, run_physics
@@ -100,20 +100,21 @@ def measured(frames: NDArray, force: NDArray, moved: NDArray) -> dict[str, float
 
 
 def main() -> None:
-    """Print the four touches, a line a quantity."""
-    print(
-        f"{'touch':16}{'quantity':16}{'MuJoCo':>9}{'ours':>9}{'off':>7}{'allowed':>9}"
-    )
+    """Print the four touches, a row a quantity."""
+    rows = []
     for name, (thing, fixed) in SCENES.items():
-        peer, own = measured(*theirs(thing, fixed)), measured(*ours(thing, fixed))
+        peer = measured(*theirs(thing, fixed))
+        mine = measured(*ours(thing, fixed))
         for quantity, allowed in ALLOWED.items():
-            a, b = peer[quantity], own[quantity]
-            off = (
-                f"{100 * (b / a - 1):+.0f} %"
-                if a > 1.0 or quantity != "motion, mm"
-                else "-"
-            )
-            print(f"{name:16}{quantity:16}{a:>9.3g}{b:>9.3g}{off:>7}{allowed:>7} %")
+            still = quantity == "motion, mm" and peer[quantity] <= 1.0
+            difference = 100 * (mine[quantity] / peer[quantity] - 1)
+            row = {"touch": name, "quantity": quantity}
+            row["MuJoCo"] = f"{peer[quantity]:.3g}"
+            row["ours"] = f"{mine[quantity]:.3g}"
+            row["difference"] = "-" if still else f"{difference:+.0f} %"
+            row["allowed"] = f"{allowed} %"
+            rows.append(row)
+    tables.write("matched", [rows])
 
 
 if __name__ == "__main__":

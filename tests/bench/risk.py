@@ -35,6 +35,7 @@ from scipy.stats import binom
 from edge.cli import dispatch
 from edge.commands.options import within
 from edge.touch.features import SAMPLES, WINDOW_S
+from tests.bench import tables
 from train.candidates import candidates
 from train.choose import Chosen
 from train.dataset import DataSet, load_trials
@@ -213,40 +214,51 @@ def run(arguments: argparse.Namespace) -> int:
 def report(
     tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[np.float64]
 ) -> int:
-    """Print what `judged` gave; how many promises are broken too often."""
-    sets, failed = len(outcomes), 0
-    print(
-        "| task | asked | certified | of all sets, above | wrong | promised | realised | late |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
-    names = ("the smallest", *(f"{error:g}" for error in ERRORS))
+    """Print and write what `judged` gave; the number of promises broken too often."""
+    certified = []
+    shown = []
+    failed = 0
     for task, of_task in zip(tasks, outcomes.swapaxes(0, 1), strict=True):
+        names = ("the smallest", *(f"{error:g}" for error in ERRORS))
         for asked, rows in zip(names, of_task.swapaxes(0, 1), strict=True):
-            able = rows[~np.isnan(rows[:, 1])]
-            above = int((able[:, 1] > able[:, 0]).sum())
-            failed += above > binom.ppf(0.99, sets, RISK)
-            late = int((able[:, 3] > able[:, 2] + LATE_S).sum())
-            means = " | | "
-            if len(able):
-                _, wrong, promised_s, mean_s = able.mean(axis=0)
-                means = f"{wrong:.1%} | {promised_s:.2f} | {mean_s:.2f}"
-            certified = f"{len(able)} of {sets} | {above} ({above / sets:.1%})"
-            print(f"| {task} | {asked} | {certified} | {means} | {late} |")
-    print(
-        "\n| task | front | window, s | shown | realised | below the interval | above |"
-    )
-    print("|---|---|---|---|---|---|---|")
+            row = certificate(rows)
+            failed += row["above"] > binom.ppf(0.99, len(rows), RISK)
+            certified.append({"task": task, "asked": asked, **row})
     for task, of_task in zip(tasks, fronts.swapaxes(0, 1), strict=True):
         for name, rows in zip(SHOWN, of_task.swapaxes(0, 1), strict=True):
-            window, accuracy, _, _, realised = rows.mean(axis=0)
-            below, above = (
-                (rows[:, 4] < rows[:, 2]).sum(),
-                (rows[:, 4] > rows[:, 3]).sum(),
-            )
-            failed += below + above > binom.ppf(0.99, len(rows), OUTSIDE)
-            shares = f"{accuracy:.1%} | {realised:.1%} | {below} | {above}"
-            print(f"| {task} | {name} | {window:.2f} | {shares} |")
+            row = interval(rows)
+            outside = row["below the interval"] + row["above it"]
+            failed += outside > binom.ppf(0.99, len(rows), OUTSIDE)
+            shown.append({"task": task, "front": name, **row})
+    tables.write("risk", [certified, shown])
     return failed
+
+
+def certificate(rows: NDArray[np.float64]) -> dict[str, Any]:
+    """How often a requested error (sets, 4) is certified, exceeded and late."""
+    able = rows[~np.isnan(rows[:, 1])]
+    row = {"sets": len(rows), "certified": len(able)}
+    row["above"] = int((able[:, 1] > able[:, 0]).sum())
+    row |= {"wrong": "", "promised, s": "", "realised, s": ""}
+    if len(able):
+        _, wrong, promised_s, mean_s = able.mean(axis=0)
+        row["wrong"] = f"{wrong:.1%}"
+        row["promised, s"] = f"{promised_s:.2f}"
+        row["realised, s"] = f"{mean_s:.2f}"
+    row["late"] = int((able[:, 3] > able[:, 2] + LATE_S).sum())
+    return row
+
+
+def interval(rows: NDArray[np.float64]) -> dict[str, Any]:
+    """How often the accuracy lies outside the interval of a point of the front."""
+    window, accuracy, low, high, realised = rows.T
+    return {
+        "window, s": f"{window.mean():.2f}",
+        "shown": f"{accuracy.mean():.1%}",
+        "realised": f"{realised.mean():.1%}",
+        "below the interval": int((realised < low).sum()),
+        "above it": int((realised > high).sum()),
+    }
 
 
 def main(argv: Sequence[str] | None = None) -> int:

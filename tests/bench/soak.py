@@ -1,6 +1,6 @@
 """The loop in virtual time, for hours: memory and descriptors must stay flat.
 
-`python -m bench.soak` reads Cody's skin over the fake, timed by the bits on the wire,
+`python -m tests.bench.soak` reads Cody's skin over the fake, timed by the bits on the wire,
 with 0.1 % of all transactions failing, decides on each contact with the model that
 comes with the program, writes events, map and datagrams as `edge-classify run` does,
 and prints memory, descriptors, schedule and lost lines. The exit status is 1 where
@@ -18,7 +18,7 @@ import os
 import socket
 import sys
 import tempfile
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +31,11 @@ from edge.output.event_writer import Lines
 from edge.output.touch_map import map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
+from edge.touch.frame import Frame
 from edge.touch.track import MAX_CONTACTS
+from tests.bench import tables
 from tests.faulty import Fault, faulty_skin
+from train.progress import bar
 from train.touch_map import TouchMap
 
 GROWTH_KB = 2048
@@ -40,70 +43,89 @@ GROWTH_KB = 2048
 hours."""
 
 
-def main() -> int:
-    """Run and print; 1 where something was not flat."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument(
-        "--every", type=float, default=1.0, help="minutes between two lines"
-    )
-    parser.add_argument("--rate", type=float, default=100.0, help="frames a second")
-    arguments = parser.parse_args()
-    model, process = Model(demo.MODEL), psutil.Process()
-    touches = np.random.default_rng(0).integers(0, 3000, (50, 16, 24)).astype(np.uint16)
+@dataclass(frozen=True)
+class Soaked:
+    """The run: a row of the table every so many minutes, and what it has lost."""
+
+    rows: list[dict[str, float]]
+    lost: int
+    """Lines that were not written, and ticks left out."""
+    placed: int
+    """Contacts on the map."""
+
+    @property
+    def flat(self) -> bool:
+        """Whether memory and descriptors stay, and nothing is lost."""
+        early = self.rows[max(len(self.rows) // 10 - 1, 0)]
+        grown_kb = max(row["kB"] for row in self.rows) - early["kB"]
+        descriptors = self.rows[-1]["descriptors"]
+        if grown_kb > GROWTH_KB or descriptors != early["descriptors"]:
+            return False
+        return self.lost == 0 and self.placed > 0
+
+
+def soak(minutes: float, every: float, rate_hz: float) -> Soaked:
+    """Run the loop for so many virtual minutes, with a row for each `every` of them."""
+    model = Model(demo.MODEL)
+    process = psutil.Process()
+    rng = np.random.default_rng(0)
+    touches = rng.integers(0, 3000, (50, 16, 24)).astype(np.uint16)
     touches[::2] = 0  # a second of contact, a second without
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
     file = skinfile.load(skinfile.shipped("cody"))
-    file = replace(file, reading=replace(file.reading, rate_hz=arguments.rate))
-    minute_frames = 60.0 * arguments.rate
-    rows: list[list[float]] = []
+    file = replace(file, reading=replace(file.reading, rate_hz=rate_hz))
+    frames_a_row = round(60.0 * rate_hz * every)
+    rows: list[dict[str, float]] = []
     written = 0
-    print(
-        "| minute | frames | events | ticks left out | lines lost | descriptors | kB |"
-    )
-    print("|---|---|---|---|---|---|---|", flush=True)
     with (
         tempfile.TemporaryDirectory() as folder,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener,
         open(os.devnull, "w") as out,
         faulty_skin(file, lambda t: touches[int(t) % 50], faults, timed=True) as skin,
     ):
-        listener.bind(("127.0.0.1", 0))
-        place, waiting = Path(folder) / "map.jsonl", {"patient": lambda: True}
-        address = "{}:{}".format(
-            *listener.getsockname()
-        )  # nobody reads what arrives there
+        listener.bind(("127.0.0.1", 0))  # nobody reads what arrives there
+        host, port = listener.getsockname()
+        place = Path(folder) / "map.jsonl"
+        waiting = {"patient": lambda: True}
         more = [map_writer(place, model.info, **waiting)]
-        lines = Lines(out, address, more=more, **waiting)
+        lines = Lines(out, f"{host}:{port}", more=more, **waiting)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
-        loop = Loop(skin, lasts_s=60.0 * arguments.minutes)
+        loop = Loop(skin, lasts_s=60.0 * minutes)
         pose = np.zeros(model.info.chain.dof)
-        for frames, frame in enumerate(loop.frames(), 1):
-            frame = type(frame)(frame.t, frame.counts, frame.valid, frame.times, pose)
-            events = [event.to_dict() for event in classifier.push(frame)]
+        total = round(60.0 * rate_hz * minutes)
+        for number, frame in enumerate(bar(loop.frames(), total=total, desc="soak"), 1):
+            posed = Frame(frame.t, frame.counts, frame.valid, frame.times, pose)
+            events = [event.to_dict() for event in classifier.push(posed)]
             written += len(events)
             lines.write(events)
-            if frames % round(arguments.every * minute_frames) == 0:
+            if number % frames_a_row == 0:
                 gc.collect()
-                row = [
-                    frames / minute_frames,
-                    frames,
-                    written,
-                    loop.schedule.missed_ticks,
-                ]
-                row += [sum(lines.lost.values()), process.num_fds()]
-                rows.append([*row, process.memory_info().rss // 1024])
-                print(
-                    f"| {' | '.join(f'{cell:.10g}' for cell in rows[-1])} |", flush=True
-                )
+                row = {"minute": round(number / (60.0 * rate_hz), 2), "frames": number}
+                row["events"] = written
+                row["ticks left out"] = loop.schedule.missed_ticks
+                row["lines lost"] = sum(lines.lost.values())
+                row["descriptors"] = process.num_fds()
+                row["kB"] = process.memory_info().rss // 1024
+                rows.append(row)
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
-    print(f"{placed} contacts on the map")
     lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
-    early = rows[max(len(rows) // 10 - 1, 0)]
-    grown = max(row[-1] for row in rows) - early[-1]
-    flat = grown <= GROWTH_KB and rows[-1][-2] == early[-2]
-    return 0 if flat and lost == 0 and placed else 1
+    return Soaked(rows, lost, placed)
+
+
+def main() -> int:
+    """Run and print; 1 where something was not flat."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument(
+        "--every", type=float, default=1.0, help="minutes between two rows"
+    )
+    parser.add_argument("--rate", type=float, default=100.0, help="frames a second")
+    arguments = parser.parse_args()
+    soaked = soak(arguments.minutes, arguments.every, arguments.rate)
+    tables.write("soak", [soaked.rows])
+    print(f"{soaked.placed} contacts on the map")
+    return 0 if soaked.flat else 1
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ from sklearn.preprocessing import StandardScaler
 from edge.cli import dispatch
 from edge.model.stopping import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
+from tests.bench import tables
 from train.dataset import read
 from train.evaluate import stratified_folds
 from train.feature_sets import expand
@@ -193,51 +194,58 @@ def when_sure(course: Course) -> Curve:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure and print the tables."""
+    """Measure; print and write the tables."""
     dataset = followed(read(arguments.data), NAMES, quick=arguments.quick)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
-    X = np.stack(
-        [dataset.features(s, SAMPLES, expand(NAMES)) for s in DECISION_POINTS_S]
-    )
+    names = expand(NAMES)
+    X = np.stack([dataset.features(s, SAMPLES, names) for s in DECISION_POINTS_S])
     frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
-    paper, n = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES), len(folds)
+    paper = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES)
+    n = len(folds)
     series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
-    form = {"quick": arguments.quick, "jobs": arguments.jobs}
-    compared = compare_stopping(dataset, DECISION_POINTS_S, **form)
-    others = Parallel(n_jobs=arguments.jobs)(
+    compared = compare_stopping(
+        dataset, DECISION_POINTS_S, quick=arguments.quick, jobs=arguments.jobs
+    )
+    rivals = Parallel(n_jobs=arguments.jobs)(
         delayed(peers)(X, series, y[task], folds) for task in compared
     )
-    print(
-        "| task | mean time, s | fixed window, % wrong | when sure | gain | trees | CALIMERA |"
-    )
-    print("|---" * 7 + "|")
-    table = [
-        "| task | rule | mean time, s | % wrong | when sure, at that time |",
-        "|---" * 5 + "|",
-    ]
-    for (task, ours), (curves, points) in zip(compared.items(), others, strict=True):
+    at_each_time = []
+    at_its_own_time = []
+    certified = []
+    for (task, ours), (curves, points) in zip(compared.items(), rivals, strict=True):
         fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
         sure = when_sure(ours.course)
         for seconds in DECISION_POINTS_S:
-            waited, stopped, *others_wrong = (
-                at(way, seconds) for way in (fixed, sure, *curves)
-            )
-            error = np.sqrt((waited * (100 - waited) + stopped * (100 - stopped)) / n)
-            gain = "-" if np.isnan(error) else f"{waited - stopped:.1f} ± {error:.1f}"
-            cells = [cell(waited), cell(stopped), gain, *map(cell, others_wrong)]
-            print(f"| {task} | {seconds:.1f} |", " | ".join(cells), "|")
+            row = {"task": task, "mean time, s": f"{seconds:.1f}"}
+            at_each_time.append(row | compare([fixed, sure, *curves], seconds, n))
         for name, (seconds, wrong) in points.items():
-            cells = f"{seconds:.2f} | {100 * wrong:.1f} | {cell(at(sure, seconds))}"
-            table.append(f"| {task} | {name} | {cells} |")
-    print("", *table, "", sep="\n")
-    for task, ours in compared.items():
+            row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
+            row["wrong, %"] = cell(100 * wrong)
+            row["when sure, at that time"] = cell(at(sure, seconds))
+            at_its_own_time.append(row)
         for rule in ours.certified:
-            print(
-                f"{task}, at most {rule.asked:g} wrong: certified in {rule.folds} of {FOLDS} "
-                f"folds, {rule.wrong:.1%} wrong ({rule.unknown:.1%} unknown) at {rule.mean_s:.2f} s"
-            )
+            row = {"task": task, "at most wrong": f"{rule.asked:g}"}
+            row["certified in folds"] = f"{rule.folds} of {FOLDS}"
+            row["wrong"] = f"{rule.wrong:.1%}"
+            row["unknown"] = f"{rule.unknown:.1%}"
+            row["mean time, s"] = f"{rule.mean_s:.2f}"
+            certified.append(row)
+    tables.write("stopping", [at_each_time, at_its_own_time, certified])
     return 0
+
+
+def compare(curves: Sequence[Curve], seconds: float, n: int) -> dict[str, str]:
+    """Percentages wrong at a mean time: fixed window, when sure, trees, CALIMERA."""
+    fixed, sure, trees, ridges = (at(curve, seconds) for curve in curves)
+    error = np.sqrt((fixed * (100 - fixed) + sure * (100 - sure)) / n)
+    return {
+        "fixed window, % wrong": cell(fixed),
+        "when sure": cell(sure),
+        "gain": "-" if np.isnan(error) else f"{fixed - sure:.1f} ± {error:.1f}",
+        "extra trees": cell(trees),
+        "CALIMERA": cell(ridges),
+    }
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -27,6 +27,7 @@ from edge.model.model import Model
 from edge.model.stopping import UNKNOWN
 from edge.recording import Recording, save
 from edge.tools.replay import Summary, decide
+from tests.bench import tables
 from tests.bench.mujoco_touch import (
     ONSET_COUNTS,
     PLACE_M,
@@ -181,10 +182,13 @@ def run(arguments: argparse.Namespace) -> int:
             unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
             for name in (habit, "all"):
                 summaries[name].add(labels, events)
-    print(f"{'right':<20}" + "".join(f"{task:>12}" for task in tasks))
+    rows = []
     for name, summary in summaries.items():
-        right = "".join(f"{summary.right(task)[0]:>12}" for task in tasks)
-        print(f"{name:<20}{right} of {summary.recordings}")
+        row: dict[str, Any] = {"trials": name, "number": summary.recordings}
+        for task in tasks:
+            row[f"{task} right"] = summary.right(task)[0]
+        rows.append(row)
+    tables.write("transfer", [rows])
     print(f"unknown: {unknown} of {2 * len(habits)}\n\n{summaries['all'].text()}")
     return 0
 
