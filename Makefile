@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz bench transfer matched docs faults risk \
+  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz accuracy bench transfer matched docs faults risk \
   stopping soak soak-day constraints clean
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
+	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
 	@echo "  make matched       four touches in MuJoCo and in our simulator"
@@ -126,6 +127,15 @@ golden: $(DEV)
 # The README's pictures.
 docs/tradeoff.png: tradeoff
 	cp $(OUT)/tradeoff/tradeoff.png $@
+	$(BIN)/python -m tests.bench.tables tradeoff "make tradeoff" $(OUT)/tradeoff/answer_*.csv
+
+# The tables of docs/measured.md that a report has measured.
+docs/measured/study.md: STUDY := --seeds 8
+docs/measured/study.md: study
+	$(BIN)/python -m tests.bench.tables study 'make study STUDY="$(STUDY)"' $(OUT)/study/headline.csv
+
+accuracy: $(DEV)
+	$(BIN)/python -m tests.bench.accuracy $(if $(GRASPS),--grasps "$(GRASPS)")
 
 docs/touches.png docs/touches-dark.png: $(READY)
 	$(BIN)/python -m train show edge/demo/*.npz --model edge/demo/model.onnx \

@@ -5,6 +5,7 @@ include the files, so nobody copies a figure by hand, and `tests/test_measured.p
 compares the figures in README.md and docs/recipes.md with them.
 """
 
+import csv
 import os
 import platform
 import subprocess
@@ -56,6 +57,12 @@ def head(command: str) -> str:
     return f"*`{command}`, commit {commit()}, {processor()}, {today}*"
 
 
+def rows_of(path: Path) -> Rows:
+    """The rows of a CSV file that a report wrote."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def write(name: str, tables: Sequence[Rows], command: str = "") -> None:
     """Print the tables and write them to docs/measured/NAME.md.
 
@@ -72,3 +79,13 @@ def write(name: str, tables: Sequence[Rows], command: str = "") -> None:
     FOLDER.mkdir(exist_ok=True)
     path = FOLDER / f"{name}.md"
     path.write_text(f"{head(command)}\n\n{text}\n", encoding="utf-8")
+
+
+def main() -> None:
+    """Write the tables of a report: `python -m tests.bench.tables NAME COMMAND CSV...`."""
+    name, command, *files = sys.argv[1:]
+    write(name, [rows_of(Path(file)) for file in files], command)
+
+
+if __name__ == "__main__":
+    main()
