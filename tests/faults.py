@@ -66,7 +66,7 @@ def skins():
     single = one_bus(cody)
     single = replace(single, reading=replace(single.reading, rate_hz=36.0))
     taxels = [tuple(range(128 * i, 128 * i + 128)) for i in range(3)]
-    chips = [ChipSpec(block.KIND, 0x28, t) for t in taxels]
+    chips = [ChipSpec(block.Block, 0x28, t) for t in taxels]
     buses = tuple(BusSpec(f"/dev/i2c-{i + 1}", (chip,)) for i, chip in enumerate(chips))
     return {
         "cody": cody,

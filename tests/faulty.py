@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from edge.bus.i2c import Transfer, bus_error, write
+from edge.bus.protocol import Transfer, bus_error, write
 from edge.fake.bus import FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses

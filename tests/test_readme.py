@@ -10,7 +10,7 @@ import subprocess
 import pytest
 
 from edge import cli
-from edge.bus import i2c
+from edge.bus import protocol
 from edge.recording import Recording, load, save
 from edge.skin import file as skinfile
 from export.cli import parser as export_parser
@@ -147,7 +147,7 @@ def test_each_picture_is_there_and_made_by_a_target(picture):
 def test_the_table_of_errnos_has_all_that_the_driver_answers():
     rows = re.findall(r"^\| (E[A-Z]+(?:, E[A-Z]+)*) \|", TEXT, re.M)
     named = [name for row in rows for name in row.split(", ")]
-    assert sorted(getattr(errno, name) for name in named) == sorted(i2c.ERRORS)
+    assert sorted(getattr(errno, name) for name in named) == sorted(protocol.ERRORS)
 
 
 def test_each_command_of_python_is_there():

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from edge.bus.crc import sealed
-from edge.bus.i2c import (
+from edge.bus.protocol import (
     BusError,
     BusFault,
     BusTimeout,

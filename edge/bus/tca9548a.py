@@ -11,7 +11,7 @@ import errno
 from collections.abc import Collection
 from contextlib import suppress
 
-from edge.bus.i2c import (
+from edge.bus.protocol import (
     Bus,
     BusError,
     BusNack,

@@ -5,17 +5,19 @@ Registers have 16 bits behind a 16-bit pointer, both big-endian, with auto-incre
 Linux's driver ad714x.
 """
 
-import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.i2c import Bus, fetch, read, send, write
-from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Parsed, Sense
+from edge.bus.protocol import Bus, fetch, read, send, write
+from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
 STAGES, STAGE_REGISTERS = 12, 8
 SYSTEM, STATUS, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x08, 0x0B, 0x17, 0x80
+REST = 20946
+"""Cody's real skin rests there."""
 REFRESH_S = 0.009216
 """Time of a conversion of 12 stages at a decimation of 64; slower ones miss 100 Hz."""
 WRITTEN_AT_ONCE = 3 * STAGE_REGISTERS
@@ -70,35 +72,17 @@ def words(values: tuple[int, ...]) -> bytes:
     return b"".join(v.to_bytes(2, "big") for v in values)
 
 
-def parse(data: NDArray[np.uint8]) -> Parsed:
-    """12 big-endian words a chip.
-
-    No converting stage reads 0: a chip without settings serves it, or converts stage 0
-    alone. Words of 0xFFFF up to the end of a frame come from a bus that nothing drives
-    any more; the word before them is damaged too where it ends in 0xFF.
-
-    Args:
-        data: (n, 24) bytes.
-
-    Returns:
-        (n, 12) values and which of them are intact.
-    """
-    values = data.view(">u2").astype(np.uint16)
-    intact = values != 0
-    intact[:, 0] &= intact[:, 1:].any(axis=1)
-    for row in np.flatnonzero(values[:, -1] == 0xFFFF).tolist():
-        driven = np.flatnonzero(data[row] != 0xFF)
-        intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
-    return values, intact
-
-
 class AD7147(Chip):
     """One AD7147-1.
 
     >>> chip = AD7147(bus, 0x2C)                                 # doctest: +SKIP
     >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
-    >>> parse(chip.frame.buffer[None])                           # doctest: +SKIP
     """
+
+    name = "ad7147"
+    addresses = range(0x2C, 0x30)
+    stages = STAGES
+    pointer_bytes = 2
 
     def __init__(
         self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * STAGES
@@ -128,6 +112,39 @@ class AD7147(Chip):
             raise self.wrong(
                 f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
             )
+
+    @classmethod
+    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
+        """The driver of a skin's chip, which reads frames into these bytes."""
+        return cls(bus, spec.address, into=into)
+
+    @staticmethod
+    def traits(taxels: int, options: Mapping[str, int]) -> Traits:
+        """A word of 16 bits for each stage; 0xFFFF is the end of its range."""
+        defaults = Defaults(threshold_counts=40, onset_counts=60)
+        return Traits(2 * STAGES, highest=0xFFFE, rest=REST, defaults=defaults)
+
+    @staticmethod
+    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+        """12 big-endian words a chip.
+
+        No converting stage reads 0: a chip without settings serves it, or converts stage 0
+        alone. Words of 0xFFFF up to the end of a frame come from a bus that nothing drives
+        any more; the word before them is damaged too where it ends in 0xFF.
+
+        Args:
+            data: (n, 24) bytes.
+
+        Returns:
+            (n, 12) values and which of them are intact.
+        """
+        values = data.view(">u2").astype(np.uint16)
+        intact = values != 0
+        intact[:, 0] &= intact[:, 1:].any(axis=1)
+        for row in np.flatnonzero(values[:, -1] == 0xFFFF).tolist():
+            driven = np.flatnonzero(data[row] != 0xFF)
+            intact[row, (int(driven[-1]) + 1 if driven.size else 0) // 2 :] = False
+        return values, intact
 
     def settings(self) -> Iterator[None]:
         """Write all rows, read the status registers, which clears them, and read the
@@ -168,81 +185,3 @@ class AD7147(Chip):
         self.bus.transfer(self.frame)
         if self.frame.buffer[-1] == 0xFF:
             self.bus.transfer(self.frame)
-
-
-class FakeAD7147(FakeChip):
-    """A model of the AD7147-1: the registers that the driver uses, and the results.
-
-    A running stage serves its taxel where its own input is connected, else something
-    else. A stage that does not run serves 0.
-    """
-
-    def __init__(
-        self,
-        sense: Sense,
-        *,
-        refresh_s: float = 0.0,
-        power_up: random.Random | None = None,
-    ) -> None:
-        """Model a chip.
-
-        Args:
-            sense: raw values of the 12 taxels at a time.
-            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the
-                last one; 0 for results that are always fresh.
-            power_up: draws the stage registers, which power-up leaves undefined.
-        """
-        self._sense, self._refresh = sense, refresh_s
-        self._power_up = power_up or random.Random("power-up")
-        self.reset()
-
-    def reset(self) -> None:
-        """Registers as after power-on."""
-        self.registers = np.zeros(0x400, dtype=np.uint16)
-        undefined = [self._power_up.randrange(1 << 16) for _ in BANKS]
-        self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
-        self.registers[DEVICE_ID] = 0x1472
-        self._pointer = 0
-
-    def write(self, data: bytes, t: float) -> None:
-        """Pointer, then words; writes to the read-only registers are lost."""
-        for i, word in enumerate(
-            np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()
-        ):
-            if i and not STATUS <= self._pointer <= DEVICE_ID:
-                self.registers[self._pointer] = word
-            self._pointer = (self._pointer + 1 if i else word) & 0x3FF
-
-    def read(self, n: int, t: float) -> bytes:
-        """Words from the pointer on."""
-        if self._refresh > 0.0:
-            t = t // self._refresh * self._refresh
-        banks = self.registers[STAGE_BANK : STAGE_BANK + len(BANKS)]
-        connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
-        power = int(self.registers[SYSTEM])
-        last = power >> 4 & 15 if power & 3 == 0 else -1
-        as_set = (connections == CONNECTIONS).all(axis=1)
-        results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
-        results[last + 1 :] = 0
-        self.registers[RESULTS : RESULTS + STAGES] = results
-        first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
-        served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
-        return served.ljust(n, b"\0")[:n]
-
-
-KIND = ChipKind(
-    name="ad7147",
-    description="a capacitance-to-digital converter",
-    driver=lambda bus, spec, into: AD7147(bus, spec.address, into=into),
-    parse=lambda data, spec: parse(data),
-    fake=lambda spec, sense, timed, power_up: FakeAD7147(
-        sense, refresh_s=REFRESH_S if timed else 0.0, power_up=power_up
-    ),
-    frame_bytes=lambda spec: 2 * STAGES,
-    highest=lambda spec: 0xFFFE,  # 0xFFFF is the end of its range
-    rest=lambda spec: 20946,  # Cody's real skin rests there
-    addresses=range(0x2C, 0x30),
-    stages=STAGES,
-    pointer_bytes=2,
-    defaults=lambda options: Defaults(threshold_counts=40, onset_counts=60),
-)

@@ -9,30 +9,29 @@ docs/block-protocol.md describes the protocol for whoever writes the firmware, a
 docs/examples/firmware/ has one.
 """
 
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.bus.crc import crc16, sealed
-from edge.bus.i2c import Bus, fetch, read, write
-from edge.chips.chip import (
-    Chip,
-    ChipKind,
-    ChipSpec,
-    Defaults,
-    FakeChip,
-    Option,
-    Parsed,
-    Sense,
-)
-from edge.clock import TIME_ROUNDING_S
+from edge.bus.protocol import Bus, fetch, read, write
+from edge.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
 
 IDENTITY, FRAME = b"\x00", b"\x10"
 MAGIC = b"TAXL\x01"
 BITS = (8, 12, 16)
 UNCHANGED_FRAMES = 25
 """Readings with one sequence number after which the microcontroller hangs."""
-FAKE_RATE_HZ = 100.0
-"""Samples a second of the model; its sequence number counts them."""
+REST = 20946
+"""Raw value at rest of a fake chip, where its bits can hold it."""
+DEFAULTS = {
+    16: Defaults(),
+    12: Defaults(drift_counts_per_s=1.25, drift_limit_counts=125),
+    8: Defaults(drift_counts_per_s=0.08, drift_limit_counts=8),
+}
+"""By bits: the drift of 16 bits, scaled to their range."""
 
 
 def data_bytes(taxels: int, bits: int) -> int:
@@ -59,23 +58,6 @@ def unpack(data: NDArray[np.uint8], taxels: int, bits: int) -> NDArray[np.uint16
     return np.packbits(digits, axis=2).view(">u2")[:, :, 0].astype(np.uint16)
 
 
-def parse(data: NDArray[np.uint8], taxels: int, bits: int) -> Parsed:
-    """Taxels of n microcontrollers, and whether the CRC of their frame holds.
-
-    Args:
-        data: (n, 4 + data_bytes) bytes.
-        taxels: of each.
-        bits: of one taxel.
-
-    Returns:
-        (n, taxels) values and which of them are intact: all of a frame or none.
-    """
-    # The CRC over bytes with their own CRC is 0.
-    intact = np.array([[crc16(row.tobytes()) == 0] for row in data])
-    values = unpack(data[:, 2:-2], taxels, bits)
-    return values, np.broadcast_to(intact, values.shape)
-
-
 def identity(taxels: int, bits: int) -> bytes:
     """The identity register of a microcontroller."""
     return sealed(MAGIC + bytes([bits]) + taxels.to_bytes(2, "big"))
@@ -86,6 +68,12 @@ class Block(Chip):
 
     >>> chip = Block(bus, 0x28, taxels=384, bits=8)              # doctest: +SKIP
     """
+
+    name = "block"
+    options: ClassVar[Mapping[str, Option]] = {"bits": Option(16, BITS)}
+    unchanged_frames = UNCHANGED_FRAMES
+    serial = True
+    rests_at_zero = True
 
     def __init__(
         self,
@@ -123,72 +111,38 @@ class Block(Chip):
             )
         raise self.wrong("not a microcontroller that serves frames")
 
+    @classmethod
+    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
+        """The driver of a skin's chip, which reads frames into these bytes."""
+        bits = spec.option("bits")
+        return cls(bus, spec.address, taxels=len(spec.taxels), bits=bits, into=into)
+
+    @staticmethod
+    def traits(taxels: int, options: Mapping[str, int]) -> Traits:
+        """Every value of its bits may be a taxel's."""
+        bits = options["bits"]
+        full = 1 << bits
+        defaults = DEFAULTS[bits]
+        size = 4 + data_bytes(taxels, bits)
+        return Traits(size, full - 1, rest=min(REST, full // 2), defaults=defaults)
+
+    @staticmethod
+    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+        """Taxels of n microcontrollers, and whether the CRC of their frame holds.
+
+        Args:
+            data: (n, 4 + data_bytes) bytes.
+            spec: of one of them.
+
+        Returns:
+            (n, taxels) values and which of them are intact: all of a frame or none.
+        """
+        # The CRC over bytes with their own CRC is 0.
+        intact = np.array([[crc16(row.tobytes()) == 0] for row in data])
+        values = unpack(data[:, 2:-2], len(spec.taxels), spec.option("bits"))
+        return values, np.broadcast_to(intact, values.shape)
+
     def healthy(self) -> bool:
         """Whether its identity is still the same."""
         self.bus.transfer(self._identity)
         return self._identity.buffer.tobytes() == self._expected
-
-
-class FakeBlock(FakeChip):
-    """A model of a microcontroller that serves frames."""
-
-    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
-        """Model one.
-
-        Args:
-            sense: raw values at a time.
-            taxels: number of taxels that it serves.
-            bits: of one taxel.
-        """
-        self._sense, self._taxels, self._bits = sense, taxels, bits
-        self._pointer = 0
-
-    def reset(self) -> None:
-        """Start again, which takes no time and loses nothing."""
-
-    def write(self, data: bytes, t: float) -> None:
-        """The pointer; nothing can be written."""
-        if data:
-            self._pointer = data[0]
-
-    def read(self, n: int, t: float) -> bytes:
-        """The identity or the frame, then zeros."""
-        out = b""
-        if self._pointer == IDENTITY[0]:
-            out = identity(self._taxels, self._bits)
-        elif self._pointer == FRAME[0]:
-            sample = int((t + TIME_ROUNDING_S) * FAKE_RATE_HZ)
-            values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
-            out = sealed(
-                (sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits)
-            )
-        return out[:n].ljust(n, b"\0")
-
-
-def _highest(spec: ChipSpec) -> int:
-    return (1 << spec.option("bits")) - 1
-
-
-KIND = ChipKind(
-    name="block",
-    description="a microcontroller that serves frames",
-    driver=lambda bus, spec, into: Block(
-        bus, spec.address, taxels=len(spec.taxels), bits=spec.option("bits"), into=into
-    ),
-    parse=lambda data, spec: parse(data, len(spec.taxels), spec.option("bits")),
-    fake=lambda spec, sense, timed, power_up: FakeBlock(
-        sense, taxels=len(spec.taxels), bits=spec.option("bits")
-    ),
-    frame_bytes=lambda spec: 4 + data_bytes(len(spec.taxels), spec.option("bits")),
-    highest=_highest,
-    rest=lambda spec: min(20946, (_highest(spec) + 1) // 2),
-    options={"bits": Option(16, BITS)},
-    # The drift of 16 bits, scaled to their range.
-    defaults=lambda options: {
-        12: Defaults(drift_counts_per_s=1.25, drift_limit_counts=125),
-        8: Defaults(drift_counts_per_s=0.08, drift_limit_counts=8),
-    }.get(options["bits"], Defaults()),
-    unchanged_frames=UNCHANGED_FRAMES,
-    serial=True,
-    rests_at_zero=True,
-)

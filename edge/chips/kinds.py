@@ -1,20 +1,54 @@
-"""The kinds of chips that a skin file may name, and the defaults that follow from
-them."""
+"""The kinds of chips that a skin file may name; each is loaded when a file names it."""
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
-from edge.chips import ad7147, block, mpr121
-from edge.chips.chip import ChipKind, ChipSpec, Defaults
+from edge.chips.chip import Chip
 
-KINDS: dict[str, ChipKind] = {
-    kind.name: kind for kind in (ad7147.KIND, mpr121.KIND, block.KIND)
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of chip: words for a person, and where its classes are.
+
+    Attributes:
+        description: a few words.
+        driver: path of the driver, a `edge.chips.chip.Chip`.
+        model: path of its model for the fake bus, a `edge.fake.chip.FakeChip`.
+    """
+
+    description: str
+    driver: str
+    model: str
+
+
+KINDS = {
+    "ad7147": Kind(
+        "a capacitance-to-digital converter",
+        "edge.chips.ad7147.AD7147",
+        "edge.fake.ad7147.FakeAD7147",
+    ),
+    "mpr121": Kind(
+        "a capacitive touch controller",
+        "edge.chips.mpr121.MPR121",
+        "edge.fake.mpr121.FakeMPR121",
+    ),
+    "block": Kind(
+        "a microcontroller that serves frames",
+        "edge.chips.block.Block",
+        "edge.fake.block.FakeBlock",
+    ),
 }
-"""Descriptors by name. A further chip is added here, and nowhere else outside its
-module."""
+"""By name. A further chip is entered here, and nowhere else outside its modules."""
 
 
-def defaults_of(chips: Sequence[ChipSpec]) -> Defaults:
-    """Defaults for the chips of a skin file; for chips that differ, those of no
-    kind."""
-    first, *rest = (chip.kind.defaults(chip.options) for chip in chips)
-    return first if all(defaults == first for defaults in rest) else Defaults()
+def load(path: str) -> Any:
+    """The class at a path, such as `edge.chips.ad7147.AD7147`."""
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(module), name)
+
+
+def driver(name: str) -> type[Chip]:
+    """The driver of a kind of chip."""
+    chip: type[Chip] = load(KINDS[name].driver)
+    return chip

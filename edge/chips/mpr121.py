@@ -5,13 +5,14 @@ only while the chip is stopped (MPR121 data sheet; application note AN3944 for t
 filter).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.i2c import Bus, fetch, read, send, write
-from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Parsed, Sense
+from edge.bus.protocol import Bus, fetch, read, send, write
+from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
 ELECTRODES = 12
 TOUCH_HIGH, RESULTS, FILTER, THRESHOLDS = 0x01, 0x04, 0x2B, 0x41
@@ -33,28 +34,16 @@ baseline filter; charge current 16 uA, charge time 0.5 us and 4 samples each 1 m
 SET_CONFIG2 = SETTINGS[-1][1][1]
 
 
-def parse(data: NDArray[np.uint8]) -> Parsed:
-    """12 words a chip, low byte first, 10 bits used.
-
-    A word with one of the upper six bits set is damaged. A stopped chip serves 0, and
-    1023 is the end of the range: neither is a value.
-
-    Args:
-        data: (n, 24) bytes.
-
-    Returns:
-        (n, 12) values and which of them are intact.
-    """
-    values = data.view("<u2").astype(np.uint16)
-    return values, (values != 0) & (values < SATURATED)
-
-
 class MPR121(Chip):
     """One MPR121.
 
     >>> chip = MPR121(bus, 0x5A)                                 # doctest: +SKIP
     >>> list(chip.settings()); chip.read()                       # doctest: +SKIP
     """
+
+    name = "mpr121"
+    addresses = range(0x5A, 0x5E)
+    stages = ELECTRODES
 
     def __init__(
         self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * ELECTRODES
@@ -80,6 +69,33 @@ class MPR121(Chip):
             raise self.wrong(
                 f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20"
             )
+
+    @classmethod
+    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
+        """The driver of a skin's chip, which reads frames into these bytes."""
+        return cls(bus, spec.address, into=into)
+
+    @staticmethod
+    def traits(taxels: int, options: Mapping[str, int]) -> Traits:
+        """Of the 10 bits of an electrode, a touch takes some tens of counts."""
+        defaults = Defaults(-1, 8, 16, 3, 1.0, 200)
+        return Traits(2 * ELECTRODES, SATURATED - 1, rest=600, defaults=defaults)
+
+    @staticmethod
+    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+        """12 words a chip, low byte first, 10 bits used.
+
+        A word with one of the upper six bits set is damaged. A stopped chip serves 0, and
+        1023 is the end of the range: neither is a value.
+
+        Args:
+            data: (n, 24) bytes.
+
+        Returns:
+            (n, 12) values and which of them are intact.
+        """
+        values = data.view("<u2").astype(np.uint16)
+        return values, (values != 0) & (values < SATURATED)
 
     def settings(self) -> Iterator[None]:
         """Reset, check, write all while stopped, read back, start; one transaction a
@@ -125,66 +141,3 @@ class MPR121(Chip):
         ECR."""
         self.bus.transfer(self._state)
         return self._state.buffer.tobytes() == bytes([SET_CONFIG2, RUNNING])
-
-
-class FakeMPR121(FakeChip):
-    """A model of the MPR121: stopped it serves 0, running the filtered values.
-
-    While it runs, a write to most registers is lost.
-    """
-
-    def __init__(self, sense: Sense) -> None:
-        self._sense = sense
-        self.over_current = False
-        """The resistor at REXT is too small."""
-        self.reset()
-
-    def reset(self) -> None:
-        """Registers as after power-on or soft reset."""
-        self.registers = bytearray(256)
-        self.registers[CONFIG1] = 0x10
-        self.registers[CONFIG2] = RESET_CONFIG2
-        self._pointer = 0
-
-    def write(self, data: bytes, t: float) -> None:
-        """Pointer, then bytes."""
-        if not data:
-            return
-        self._pointer = data[0]
-        for value in data[1:]:
-            register = self._pointer
-            self._pointer = (register + 1) & 0xFF
-            if register == RESET:
-                if value == RESET_KEY:
-                    self.reset()
-            elif register == ECR or not self.registers[ECR] & 0x3F:
-                self.registers[register] = value
-        if self.over_current:
-            self.registers[TOUCH_HIGH] |= OVER_CURRENT
-            self.registers[ECR] = 0
-
-    def read(self, n: int, t: float) -> bytes:
-        """Bytes from the pointer on."""
-        bank = bytearray(self.registers)
-        if self.registers[ECR] & 0x0F:
-            values = np.minimum(self._sense(t), SATURATED).astype("<u2").tobytes()
-            bank[RESULTS : RESULTS + len(values)] = values
-        out = bytes(bank[(self._pointer + i) & 0xFF] for i in range(n))
-        self._pointer = (self._pointer + n) & 0xFF
-        return out
-
-
-KIND = ChipKind(
-    name="mpr121",
-    description="a capacitive touch controller",
-    driver=lambda bus, spec, into: MPR121(bus, spec.address, into=into),
-    parse=lambda data, spec: parse(data),
-    fake=lambda spec, sense, timed, power_up: FakeMPR121(sense),
-    frame_bytes=lambda spec: 2 * ELECTRODES,
-    highest=lambda spec: SATURATED - 1,
-    rest=lambda spec: 600,
-    addresses=range(0x5A, 0x5E),
-    stages=ELECTRODES,
-    # Of 10 bits, a touch takes some tens of counts.
-    defaults=lambda options: Defaults(-1, 8, 16, 3, 1.0, 200),
-)

@@ -8,9 +8,9 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import NamedTuple
 
 from edge import __version__
 from edge.model.info import FORMAT
@@ -22,9 +22,9 @@ LEAST_FREE_MB = 200
 """A trial of 384 taxels takes about 0.1 MB."""
 
 
-class Row(NamedTuple):
-    """A fact about the machine: its name, its value, and a remedy where it will not
-    do."""
+@dataclass(frozen=True)
+class Row:
+    """A fact about the machine, with a remedy where it will not do."""
 
     name: str
     value: str
@@ -40,31 +40,36 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
     yield Row(
         "program", f"edge-classify {__version__}; reads models of format {FORMAT}"
     )
-    wide = sys.maxsize > 2**32
     system = f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield Row(
-        "system",
-        system,
-        "" if wide else "install a 64-bit system: ONNX Runtime needs one",
-    )
+    yield Row("system", system)
     yield Row("python", platform.python_version())
     for package in PACKAGES:
         try:
             yield Row(package, version(package))
         except PackageNotFoundError:
-            yield Row(package, "missing", f"run `pip install {package}`")
+            yield _missing(package)
     yield from _devices(root)
     groups = sorted(_group(number) for number in {os.getegid(), *os.getgroups()})
-    yield Row(
-        "user", f"{pwd.getpwuid(os.geteuid()).pw_name}; groups {', '.join(groups)}"
-    )
+    user = pwd.getpwuid(os.geteuid()).pw_name
+    yield Row("user", f"{user}; groups {', '.join(groups)}")
+    yield from _state()
+
+
+def _missing(package: str) -> Row:
+    if package == "onnxruntime" and sys.maxsize <= 2**32:
+        return Row(package, "missing; numpy runs the models on this 32-bit system")
+    return Row(package, "missing", f"run `pip install {package}`")
+
+
+def _state() -> Iterator[Row]:
+    """Clock, load and disk."""
     # A board without a battery for its clock starts in the past.
     behind = time.time() < Path(__file__).stat().st_mtime
     utc = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
-    yield Row(
-        "clock", utc, "set the clock: `sudo timedatectl set-ntp true`" if behind else ""
-    )
-    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    set_clock = "set the clock: `sudo timedatectl set-ntp true`"
+    yield Row("clock", utc, set_clock if behind else "")
+    load = os.getloadavg()[0]
+    cores = os.cpu_count() or 1
     busy = "end other programs: they delay the frames" if load > cores else ""
     yield Row("load", f"{load:.1f} on {cores} cores", busy)
     free_mb = shutil.disk_usage(Path.cwd()).free // 1_000_000
@@ -74,26 +79,30 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
 
 def _devices(root: Path) -> Iterator[Row]:
     """I2C buses and serial ports, and whether this user may open them."""
-    devices = [
-        (d, group)
-        for p, group in GROUPS.items()
-        for d in sorted((root / "dev").glob(p))
-    ]
-    for device, group in devices:
-        name = root / "sys/class/i2c-dev" / device.name / "name"
-        adapter = f"{name.read_text().strip()}, " if name.exists() else ""
-        owner = f"{adapter}group {_group(device.stat().st_gid)}"
-        join = (
+    absent = True
+    for pattern, group in GROUPS.items():
+        for device in sorted((root / "dev").glob(pattern)):
+            absent = False
+            yield _device(root, device, group)
+    if absent:
+        yield Row(
+            "/dev/i2c-*",
+            "no I2C bus and no serial port",
+            "switch I2C on (`sudo raspi-config`, or `sudo modprobe i2c-dev`), or plug "
+            "it in",
+        )
+
+
+def _device(root: Path, device: Path, group: str) -> Row:
+    name = root / "sys/class/i2c-dev" / device.name / "name"
+    adapter = f"{name.read_text().strip()}, " if name.exists() else ""
+    owner = f"{adapter}group {_group(device.stat().st_gid)}"
+    remedy = ""
+    if not os.access(device, os.R_OK | os.W_OK):
+        remedy = (
             f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
         )
-        yield Row(
-            f"/dev/{device.name}",
-            owner,
-            "" if os.access(device, os.R_OK | os.W_OK) else join,
-        )
-    if not devices:
-        switch_on = "switch I2C on (`sudo raspi-config`, or `sudo modprobe i2c-dev`), or plug it in"
-        yield Row("/dev/i2c-*", "no I2C bus and no serial port", switch_on)
+    return Row(f"/dev/{device.name}", owner, remedy)
 
 
 def _group(number: int) -> str:

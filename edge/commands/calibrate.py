@@ -7,7 +7,7 @@ touched, or has taxels that cannot be read or are saturated, is refused.
 
 import argparse
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -27,7 +27,7 @@ FRAMES = 1000
 FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
-RESTLESS, RESTLESS_COUNTS = 10.0, 5.0
+NOISY, NOISY_COUNTS = 10.0, 5.0
 """A taxel is being touched, or broken, if its noise exceeds this factor times the
 median noise plus so many counts."""
 
@@ -44,36 +44,47 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
         action="store_true",
-        help="write the calibration even if something seems to touch the skin; taxels without a "
-        "usable value keep their former one",
+        help="write the calibration even if something seems to touch the skin; taxels "
+        "without a usable value keep their former one",
     )
 
 
-def measure(
-    skin: Skin, frames: int, lasts_s: float = math.inf
-) -> tuple[TaxelCalibration, NDArray[np.int64], int]:
-    """Mean and standard deviation of each taxel's raw values, from sums of whole
-    numbers.
+@dataclass(frozen=True)
+class Measurement:
+    """The rest values and noise of a skin.
+
+    Attributes:
+        calibration: mean and standard deviation of each taxel.
+        valid: (rows, cols) number of valid values.
+        frames: number of frames.
+    """
+
+    calibration: TaxelCalibration
+    valid: NDArray[np.int64]
+    frames: int
+
+
+def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
+    """Measure rest values and noise, from sums of whole numbers.
 
     Args:
         skin: set up, and touched by nothing.
         frames: the number of frames to read.
         lasts_s: the greatest time to read for.
-
-    Returns:
-        The calibration, the number of valid values of each taxel, and the number of
-        frames.
     """
     n, total, squares = np.zeros((3, *skin.layout.shape), dtype=np.int64)
-    seen = 0
-    for seen, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
+    count = 0
+    for count, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
         raw, valid = skin.raw()
         # Squares of 16 bits over 2**31 frames still fit 63 bits.
         values = np.where(valid, raw, 0).astype(np.int64)
-        n, total, squares = n + valid, total + values, squares + values * values
-        if seen == frames:
+        n += valid
+        total += values
+        squares += values * values
+        if count == frames:
             break
-    return TaxelCalibration(*mean_and_deviation(n, total, squares)), n, seen
+    mean, deviation = mean_and_deviation(n, total, squares)
+    return Measurement(TaxelCalibration(mean, deviation), n, count)
 
 
 def mean_and_deviation(
@@ -105,22 +116,54 @@ def unusable(
         baseline: (rows, cols) rest values.
         share: (rows, cols) shares of frames in which a taxel was valid.
     """
-    rest, bad = baseline.ravel(), share.ravel() < MIN_SHARE
+    rest = baseline.ravel()
+    bad = share.ravel() < MIN_SHARE
     served = np.zeros(rest.size, dtype=bool)
     for chip in file.chips:
         taxels = chip.served
         served[taxels] = True
-        bad[taxels] |= rest[taxels] >= chip.highest
+        bad[taxels] |= rest[taxels] >= chip.traits.highest
         if not chip.kind.rests_at_zero:
             bad[taxels] |= rest[taxels] == 0
     return np.asarray((served & bad).reshape(baseline.shape) & file.layout.alive)
 
 
-def restless(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
+def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Taxels (row, col) that vary far more than the others, the worst first."""
-    limit = RESTLESS * float(np.median(noise)) + RESTLESS_COUNTS
+    limit = NOISY * float(np.median(noise)) + NOISY_COUNTS
     taxels = [(row, col) for row, col in np.argwhere(noise > limit).tolist()]
     return sorted(taxels, key=lambda taxel: -noise[taxel])
+
+
+def replace_unusable(
+    file: SkinFile, measured: Measurement, former: TaxelCalibration | None, force: bool
+) -> int:
+    """Give taxels without a usable rest value their former one; returns their number.
+
+    Raises:
+        InputError: there are such taxels, without `force` or without former values.
+    """
+    calibration = measured.calibration
+    share = measured.valid / measured.frames
+    lost = unusable(file, calibration.baseline, share)
+    if not lost.any():
+        return 0
+    row, col = np.argwhere(lost)[0].tolist()
+    problem = (
+        f"taxels that cannot be calibrated: {lost.sum()}, the first at [{row}, {col}], "
+        f"which was valid in {measured.valid[row, col]} of {measured.frames} frames "
+        f"and rests at {calibration.baseline[row, col]}"
+    )
+    if former is None or not force:
+        raise InputError(
+            f"{problem}; check the chips with `edge-classify scan`, list broken taxels "
+            "under dead in [signal], or keep the taxels' former values, if any, with "
+            "--force"
+        )
+    LOG.warning(f"{problem}; their former values are kept")
+    calibration.baseline[lost] = former.baseline[lost]
+    calibration.noise[lost] = former.noise[lost]
+    return int(lost.sum())
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -132,54 +175,42 @@ def run(arguments: argparse.Namespace) -> int:
     former = load(arguments.skin).calibration
     with open_skin(arguments, calibrated=False) as opened:
         LOG.info("measuring; keep everything off the skin")
-        calibration, valid, seen = measure(
-            opened.skin, arguments.frames, opened.lasts_s
-        )
+        measured = measure(opened.skin, arguments.frames, opened.lasts_s)
         file = opened.skin.file
-    if seen < FEWEST_FRAMES:
+    if measured.frames < FEWEST_FRAMES:
         raise InputError(
-            f"only {seen} frames could be read; at least {FEWEST_FRAMES} are needed"
+            f"only {measured.frames} frames could be read; at least {FEWEST_FRAMES} "
+            "are needed"
         )
-    lost = unusable(file, calibration.baseline, valid / seen)
-    if lost.any():
-        row, col = np.argwhere(lost)[0].tolist()
-        problem = (
-            f"taxels that cannot be calibrated: {lost.sum()}, the first at [{row}, {col}], which "
-            f"was valid in {valid[row, col]} of {seen} frames and rests at "
-            f"{calibration.baseline[row, col]}"
-        )
-        if former is None or not arguments.force:
-            raise InputError(
-                f"{problem}; check the chips with `edge-classify scan`, list broken taxels under "
-                "dead in [signal], or keep the taxels' former values, if any, with --force"
-            )
-        LOG.warning(f"{problem}; their former values are kept")
-        calibration.baseline[lost] = former.baseline[lost]
-        calibration.noise[lost] = former.noise[lost]
-    moving = restless(calibration.noise)
+    kept = replace_unusable(file, measured, former, arguments.force)
+    noise = measured.calibration.noise
+    moving = noisiest_taxels(noise)
     if moving and not arguments.force:
         row, col = moving[0]
         raise InputError(
-            f"taxels that vary while they should be at rest: {len(moving)}, most of all "
-            f"[{row}, {col}], by {calibration.noise[row, col]:.1f} counts; keep everything off "
+            f"taxels that vary while they should be at rest: {len(moving)}, most of "
+            f"all [{row}, {col}], by {noise[row, col]:.1f} counts; keep everything off "
             "the skin, list broken taxels under dead in [signal], or use --force"
         )
-    calibration = replace(calibration, taken=datetime.now(UTC).replace(microsecond=0))
+    now = datetime.now(UTC).replace(microsecond=0)
+    calibration = replace(measured.calibration, taken=now)
     backup = save_calibration(arguments.skin, calibration)
-    median, largest = (
-        float(np.median(calibration.noise)),
-        float(calibration.noise.max()),
-    )
+    median = float(np.median(noise))
+    largest = float(noise.max())
     event = {
         "event": "calibrated",
         "skin": arguments.skin,
         "backup": str(backup),
-        "frames": seen,
+        "frames": measured.frames,
+        "noise_median": round(median, 3),
+        "noise_largest": round(largest, 3),
+        "kept": kept,
+        "moving": moving,
     }
-    event |= {"noise_median": round(median, 3), "noise_largest": round(largest, 3)}
     Output.of(arguments).event(
-        {**event, "kept": int(lost.sum()), "moving": moving},
-        f"{arguments.skin}: calibrated from {seen} frames; noise in counts: median {median:.1f}, "
-        f"largest {largest:.1f}. The old file is kept as {backup}.",
+        event,
+        f"{arguments.skin}: calibrated from {measured.frames} frames; noise in counts: "
+        f"median {median:.1f}, largest {largest:.1f}. The old file is kept as "
+        f"{backup}.",
     )
     return 0

@@ -36,8 +36,7 @@ def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print each chip and the map; 1 if a chip does not answer or a taxel is not
-    valid."""
+    """Print each chip and the map; 1 if a chip is silent or a taxel is not valid."""
     output = Output.of(arguments)
     with open_skin(arguments, calibrated=False) as opened:
         skin = opened.skin
@@ -45,18 +44,21 @@ def run(arguments: argparse.Namespace) -> int:
             pass
         invalid = skin.invalid_for > 0
         statuses = skin.status()
-        silent = 0
-        for status in statuses:
-            spec = status.spec
-            bad = int(invalid.flat[spec.served].sum())
-            fault = status.error or (f"{spec.route}: {SILENT}: {bad}" if bad else "")
-            silent += status.state != "running" or bad == len(spec.served)
-            if output.as_json or fault:
-                event = chip_event(status, kind=spec.kind.name, invalid=bad)
-                output.event(event, f"{spec.kind.name}: {fault}")
-        output.text(skin_map(statuses, invalid))
-    silent_taxels = f"; {SILENT}: {invalid.sum()}" if invalid.any() else ""
-    output.text(
-        f"{len(statuses) - silent} of {len(statuses)} chips answer{silent_taxels}"
-    )
-    return 1 if silent or silent_taxels else 0
+    silent = 0
+    for status in statuses:
+        spec = status.spec
+        bad = int(invalid.flat[spec.served].sum())
+        fault = status.error
+        if bad and not fault:
+            fault = f"{spec.route}: {SILENT}: {bad}"
+        if status.state != "running" or bad == len(spec.served):
+            silent += 1
+        if output.as_json or fault:
+            event = chip_event(status, kind=spec.kind.name, invalid=bad)
+            output.event(event, f"{spec.kind.name}: {fault}")
+    output.text(skin_map(statuses, invalid))
+    answer = f"{len(statuses) - silent} of {len(statuses)} chips answer"
+    if invalid.any():
+        answer += f"; {SILENT}: {invalid.sum()}"
+    output.text(answer)
+    return 1 if silent or invalid.any() else 0

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from edge.bus.i2c import Message, Transfer, bus_error, wire_bits
-from edge.chips.chip import FakeChip
+from edge.bus.protocol import Message, Transfer, bus_error, wire_bits
+from edge.fake.chip import FakeChip
 from edge.fake.clock import Hand, VirtualClock
 from edge.fake.tca9548a import FakeTCA9548A
 
@@ -21,7 +21,7 @@ class FakeBus:
     It refuses the shapes that some real adapter refuses: a read anywhere but last
     (EOPNOTSUPP, Raspberry Pi up to 4), or a second address in one call (EINVAL, Pi 5).
 
-    >>> from edge.bus.i2c import fetch, send
+    >>> from edge.bus.protocol import fetch, send
     >>> bus = FakeBus(chips={0x70: FakeTCA9548A()})
     >>> send(bus, 0x70, [4])
     >>> fetch(bus, 0x70, b"", 1)

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.i2c import wire_bits
+from edge.bus.protocol import wire_bits
 from edge.bus.serial_bus import serial_bits
-from edge.chips import block
-from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec, Sense
+from edge.chips import kinds
+from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
+from edge.fake.chip import FakeChip, Sense
 from edge.fake.clock import VirtualClock
 from edge.fake.tca9548a import FakeTCA9548A
 from edge.interrupt import delayed
@@ -86,7 +87,7 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
         return file
     baseline = np.zeros(file.layout.shape, dtype=np.uint16)
     for chip in file.chips:
-        baseline.flat[chip.served] = chip.kind.rest(chip)
+        baseline.flat[chip.served] = chip.traits.rest
     noise = np.full(baseline.shape, noise_counts)
     return replace(file, calibration=TaxelCalibration(baseline, noise))
 
@@ -135,7 +136,8 @@ def fake_buses(
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
             sense = _sense(chip, scene, calibration.baseline.ravel(), noise)
-            model = chip.kind.fake(chip, sense, timed, power_up)
+            fake: type[FakeChip] = kinds.load(kinds.KINDS[chip.kind.name].model)
+            model = fake.of(chip, sense, timed=timed, power_up=power_up)
             if chip.mux is None or chip.channel is None:
                 bus.chips[chip.address] = model
                 continue
@@ -153,13 +155,13 @@ def _sense(
     its sign and noise. A stage without a taxel rests."""
     taxels = np.array(chip.taxels)
     used = taxels != UNUSED
-    at_rest = np.where(used, rest[taxels], chip.kind.rest(chip)).astype(np.int64)
+    at_rest = np.where(used, rest[taxels], chip.traits.rest).astype(np.int64)
 
     def sense(t: float) -> NDArray[np.uint16]:
         counts = scene(t).reshape(-1)[taxels].astype(np.int64)
         noisy = noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(noise)]
         raw = at_rest + used * (chip.sign * counts + noisy[taxels])
-        return np.asarray(np.clip(raw, 1, chip.highest), dtype=np.uint16)
+        return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
 
     return sense
 
@@ -224,8 +226,7 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
     The software's time of each transaction counts as the bits that the wire would carry
     in it.
     """
-    every_chip = replace(file, reading=replace(file.reading, region_of_interest=False))
-    with still(every_chip) as skin:
+    with still(file) as skin:
         buses = [
             reader.bus for reader in skin.readers if isinstance(reader.bus, FakeBus)
         ]
@@ -250,6 +251,7 @@ def skin_file(layout: SkinLayout) -> SkinFile:
     taxels = range(layout.rows * layout.cols)
     shares = [taxels[first : first + MOST_TAXELS] for first in taxels[::MOST_TAXELS]]
     chips = tuple(
-        ChipSpec(block.KIND, 0x08 + i, tuple(share)) for i, share in enumerate(shares)
+        ChipSpec(kinds.driver("block"), 0x08 + i, tuple(share))
+        for i, share in enumerate(shares)
     )
     return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

@@ -1,7 +1,7 @@
 """A model of the mux for the fake bus."""
 
 from edge.bus.tca9548a import CHANNELS
-from edge.chips.chip import FakeChip
+from edge.fake.chip import FakeChip
 
 
 class FakeTCA9548A(FakeChip):

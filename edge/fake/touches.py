@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from edge import demo
 from edge.fake.player import calibrated
 from edge.recording import Recording, load
-from edge.skin.decoder import Decoder
+from edge.skin.decoder import taxel_map
 from edge.skin.file import SkinFile
 from edge.touch.layout import SkinLayout
 
@@ -60,7 +60,7 @@ def touches(
             WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
         )
     most = reach(file)
-    covered = Decoder(file).served.reshape(file.layout.shape)
+    covered = taxel_map(file).served.reshape(file.layout.shape)
     for number in range(trials):
         for kind, (path, source) in enumerate(sources):
             t, forces = trial(kind, number)
@@ -95,7 +95,7 @@ def reach(file: SkinFile) -> int:
     assert calibration is not None
     at_rest = calibration.baseline.ravel().tolist()
     return min(
-        at_rest[taxel] - 1 if chip.sign < 0 else chip.highest - at_rest[taxel]
+        at_rest[taxel] - 1 if chip.sign < 0 else chip.traits.highest - at_rest[taxel]
         for chip in file.chips
         for taxel in chip.served
     )

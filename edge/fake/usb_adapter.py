@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from edge.bus.i2c import (
+from edge.bus.protocol import (
     Bus,
     BusError,
     BusNack,

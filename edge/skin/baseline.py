@@ -1,8 +1,12 @@
-"""Counts above a baseline that follows slow drift, in integers, so that results
-repeat."""
+"""Counts above a baseline that follows slow drift, in integers: results repeat."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from edge.skin.file import SkinFile
 
 SCALE_BITS = 12
 """The baseline is kept in 1/4096 counts, so that a slow drift is not lost to
@@ -69,3 +73,13 @@ class Baseline:
         error >>= FOLLOW_BITS
         self._now += np.clip(error, -self._step, self._step) * valid
         np.clip(self._now, self._low, self._high, out=self._now)
+
+
+def dead_band(skin: "SkinFile") -> NDArray[np.int32]:
+    """(taxels,) counts under which a taxel reads 0; at least 1, as none is negative."""
+    least = max(1, skin.signal.dead_band_counts)
+    if skin.calibration is None:
+        return np.full(skin.layout.rows * skin.layout.cols, least, dtype=np.int32)
+    noise = skin.calibration.noise.ravel()
+    sigma = np.ceil(np.minimum(skin.signal.dead_band_sigma * noise, 65535.0))
+    return np.maximum(least, sigma.astype(np.int32))

@@ -9,12 +9,13 @@ read in every fourth frame, and the time saved goes to it, one transaction at a 
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from enum import StrEnum
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.i2c import (
+from edge.bus.protocol import (
     Adapter,
     Bus,
     BusError,
@@ -28,27 +29,38 @@ from edge.chips.chip import Chip, ChipSpec
 from edge.skin.file import Reading
 from edge.skin.wiring import BusSpec
 
-PAUSE_S, LONG_PAUSE_S = 0.1, 0.3
-"""Time between two attempts to bring the same chip back; the longer one also from a
-timeout to the next attempt on its bus. All taxels must be back 0.5 s after a fault's
-end."""
+PAUSE_S = 0.1
+"""Time between two attempts to bring the same chip back. All taxels must be back 0.5 s
+after a fault's end."""
+LONG_PAUSE_S = 0.3
+"""The same for a chip that failed again soon, and from a timeout to the next attempt on
+its bus."""
 FLAPS_S = 1.0
 """A chip that fails again within this time of its return is not tried again at once."""
 LONGEST_PAUSE_S = 1.0
 """Longest time between two attempts to open a lost bus again. It is a tenth of the time
 since the loss, and no less than `PAUSE_S`."""
-SET_UP_AFTER, SET_UP_EVERY = 8, 64
-"""A chip that keeps its settings but serves damaged bytes is set up again after the
-first number of frames in a row, and then each time the second has passed. At 100 Hz a
-conversion takes at most four frames."""
+SET_UP_AFTER = 8
+"""A chip that keeps its settings but serves damaged bytes is set up again after this
+many frames in a row. At 100 Hz a conversion takes at most four frames."""
+SET_UP_EVERY = 64
+"""It is set up again each time that so many further frames are damaged."""
 LONGEST_STEP_S = 0.0015
 """A step of a set-up takes no longer at 400 kHz; none begins closer to a frame's
 end."""
 OLDEST_FRAMES = 4
 """While a chip is being set up, each of the others is read once in this many frames. A
-taxel stays valid for as long."""
+taxel stays valid for that many frames."""
 NEVER = -1.0e9
 """Read time of a chip not read yet."""
+
+
+class State(StrEnum):
+    """The state of a chip; one that is down stays so until it runs again."""
+
+    STARTING = "starting"
+    RUNNING = "running"
+    DOWN = "down"
 
 
 class Slot:
@@ -58,7 +70,7 @@ class Slot:
         spec: from the skin file.
         row: (frame_bytes,) buffer for its bytes.
         chip: its driver, once it has been identified.
-        running: whether it is set up and answers.
+        state: whether it is set up and answers.
         error: why it is down.
         at: when it was last read, on the bus's clock.
         good: whether `row` holds a complete reading of a chip with its settings.
@@ -67,29 +79,75 @@ class Slot:
         has_settings: the settings were written and read back, and no loss was seen
             since.
         steps: the steps left until it runs, while it is being set up.
+        retry_at: when it may be brought back.
+        back_at: when it last came back.
     """
 
+    chip: Chip
+
     def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
-        self.spec, self.row = spec, row
-        self.chip: Chip | None = None
+        self.spec = spec
+        self.row = row
+        self.state = State.STARTING
         self.error: BusError | None = None
         self.steps: Iterator[None] | None = None
-        self.running = self.good = self.has_settings = False
         self.at = NEVER
+        self.good = False
         self.damaged = 0
-        self.retry_at = self.back_at = -math.inf
+        self.has_settings = False
+        self.retry_at = -math.inf
+        self.back_at = -math.inf
 
     @property
-    def state(self) -> str:
-        """`running`, `starting`, or after a failure `down` until it runs, whatever is
-        tried."""
-        return (
-            "running" if self.running else "starting" if self.error is None else "down"
-        )
+    def running(self) -> bool:
+        """Whether it is set up and answers."""
+        return self.state is State.RUNNING
+
+    def read(self, bus: Bus) -> None:
+        """Read the chip, and note the time on its bus.
+
+        Raises:
+            BusError: the transaction failed.
+        """
+        self.chip.read()
+        self.good = True
+        self.at = bus.now()
+
+    def begin(self, steps: Iterator[None]) -> None:
+        """Begin to set up a running chip that has lost its settings."""
+        self.state = State.STARTING
+        self.good = False
+        self.has_settings = False
+        self.steps = steps
+
+    def run(self, now: float) -> None:
+        """Take it as running, after its last step."""
+        if self.error is not None:
+            self.back_at = now
+        self.state = State.RUNNING
+        self.error = None
+        self.steps = None
+
+    def fail(self, error: BusError, now: float) -> None:
+        """Take it down; a chip that ran for a while is tried again at once."""
+        flaps = now - self.back_at < FLAPS_S
+        if self.running and not flaps:
+            self.retry_at = now
+        else:
+            self.retry_at = now + (LONG_PAUSE_S if flaps else PAUSE_S)
+        self.state = State.DOWN
+        self.good = False
+        self.error = error
+        self.steps = None
 
 
 class BusReader:
-    """The chips of one bus, used by one thread at a time."""
+    """The chips of one bus, used by one thread at a time.
+
+    Attributes:
+        bus: the open bus.
+        slots: its chips, in reading order.
+    """
 
     def __init__(
         self,
@@ -107,12 +165,12 @@ class BusReader:
             reading: `verify_mux` and `recheck_frames` apply.
         """
         self.bus = bus
-        self.slots = [
-            Slot(chip, row) for chip, row in zip(spec.chips, rows, strict=True)
-        ]
+        self.slots = list(map(Slot, spec.chips, rows))
         self._reading = reading
         self._muxes: dict[int, TCA9548A] = {}
-        self._frame = self._turn = self._timeouts = 0
+        self._frame = 0
+        self._turn = 0
+        self._timeouts = 0
         self._rest_until = -math.inf
         """No chip is brought back before this time."""
         self._lost_at = math.inf
@@ -121,8 +179,7 @@ class BusReader:
 
     @property
     def lost(self) -> bool:
-        """Whether every chip has failed, so that the bus is closed and opened again and
-        again."""
+        """Whether every chip has failed; the bus is then opened again and again."""
         return self._lost_at < math.inf
 
     def start(self) -> None:
@@ -136,39 +193,37 @@ class BusReader:
                 self._timeouts = 0
                 while not slot.running and self._step(slot):
                     pass
-            if not any(slot.running for slot in self.slots) and not self._reopened():
+            if not self._any_runs() and not self._reopened():
                 break
         for slot in self.slots:
             if isinstance(slot.error, BusRefused):
                 raise slot.error
 
-    def read(self, slots: Sequence[Slot], deadline: float = math.inf) -> None:
-        """Read these chips once; `good` and `at` of each tell the outcome.
+    def read(self, deadline: float = math.inf) -> None:
+        """Read the chips once; `good` and `at` of each slot tell the outcome.
 
         Args:
-            slots: of this bus, in reading order.
             deadline: on the bus's clock; after it, chips are brought back by one step
                 only.
         """
         self._frame += 1
         self._timeouts = 0
+        slots = self.slots
         if self._setting_up():
             share = -(-len(slots) // OLDEST_FRAMES)
             first = self._frame % OLDEST_FRAMES * share
             slots = slots[first : first + share]
-        for _, channel in groupby(
-            slots, key=lambda slot: (slot.spec.mux, slot.spec.channel)
-        ):
+        for _, channel in groupby(slots, key=_channel_of):
             self._read_channel([*channel])
-        running = [slot for slot in self.slots if slot.running]
-        if running and self._frame % self._reading.recheck_frames == 0:
-            self._turn += 1
-            self._check(running[self._turn % len(running)])
+        self._recheck()
         # After the reading, so that a broken chip costs the intact ones no time.
         self._bring_back(deadline)
 
     def _setting_up(self) -> bool:
         return any(slot.steps is not None for slot in self.slots)
+
+    def _any_runs(self) -> bool:
+        return any(slot.running for slot in self.slots)
 
     def _read_channel(self, slots: Sequence[Slot]) -> None:
         """Read the chips on one channel of a mux, or on the bus itself.
@@ -185,9 +240,8 @@ class BusReader:
         mux.verify = False
         for _ in range(2):
             on_its_channel = [self._read(slot, mux) for slot in slots]
-            if all(on_its_channel) and (
-                not any(slot.good for slot in slots) or self._kept(mux)
-            ):
+            nothing_read = not any(slot.good for slot in slots)
+            if all(on_its_channel) and (nothing_read or self._kept(mux)):
                 break
             mux.forget()
             for slot in slots:
@@ -207,20 +261,14 @@ class BusReader:
             False if a chip did not answer because the mux no longer had its channel
             connected.
         """
-        on_its_channel, tries = True, 0
         slot.good = False
-        if slot.running and slot.damaged == 1 and not self._setting_up():
-            self._check(slot)
-        elif slot.running and (
-            slot.damaged == 1 or slot.damaged % SET_UP_EVERY == SET_UP_AFTER
-        ):
-            # Whatever reset another chip has probably reset this one.
-            self._set_up_again(slot)
+        if slot.running:
+            self._doubt(slot)
+        on_its_channel = True
+        tries = 0
         while slot.running and not slot.good:
-            assert slot.chip is not None
             try:
-                slot.chip.read()
-                slot.good, slot.at = True, self.bus.now()
+                slot.read(self.bus)
             except BusError as error:
                 if mux is not None and isinstance(error, BusNack):
                     on_its_channel = on_its_channel and self._kept(mux)
@@ -229,56 +277,69 @@ class BusReader:
                 tries += 1
         return on_its_channel
 
+    def _doubt(self, slot: Slot) -> None:
+        """Check a chip after damaged bytes, or set it up again."""
+        first = slot.damaged == 1
+        if first and not self._setting_up():
+            self._check(slot)
+        elif first or slot.damaged % SET_UP_EVERY == SET_UP_AFTER:
+            # Whatever reset another chip has probably reset this one.
+            slot.begin(self._set_up(slot))
+
+    def _recheck(self) -> None:
+        """Check the settings of the next running chip, where one is due."""
+        running = [slot for slot in self.slots if slot.running]
+        if running and self._frame % self._reading.recheck_frames == 0:
+            self._turn += 1
+            self._check(running[self._turn % len(running)])
+
     def _check(self, slot: Slot) -> None:
         """Set a running chip up again if it has lost its settings."""
-        assert slot.chip is not None
         try:
             if not slot.chip.healthy():
-                self._set_up_again(slot)
+                slot.begin(self._set_up(slot))
         except BusError as error:
             self._fail(slot, error)
 
-    def _set_up_again(self, slot: Slot) -> None:
-        slot.running = slot.good = slot.has_settings = False
-        slot.steps = self._set_up(slot)
-
     def _fail(self, slot: Slot, error: BusError) -> None:
         """Take a chip down, or all chips where the bus is gone or hangs."""
-        now, failed = self.bus.now(), [slot]
+        now = self.bus.now()
         for mux in self._muxes.values():
             mux.forget()
         if isinstance(error, BusTimeout):
             self._timeouts += 1
             self._rest_until = now + LONG_PAUSE_S
-        if isinstance(error, BusGone):
+        gone = isinstance(error, BusGone)
+        if gone:
             self.bus.close()
-        if isinstance(error, BusGone) or self._timeouts > 1:
-            failed = self.slots
-        for slot in failed:
-            flaps = now - slot.back_at < FLAPS_S
-            pause = LONG_PAUSE_S if flaps else PAUSE_S
-            # A running chip is tried again at once.
-            slot.retry_at = now if slot.running and not flaps else now + pause
-            slot.running, slot.good, slot.error, slot.steps = False, False, error, None
+        failed = self.slots if gone or self._timeouts > 1 else [slot]
+        for failing in failed:
+            failing.fail(error, now)
+
+    def _is_due(self, slot: Slot) -> bool:
+        return not slot.running and slot.retry_at <= self.bus.now()
+
+    def _rests(self) -> bool:
+        return self.bus.now() < self._rest_until
 
     def _bring_back(self, deadline: float) -> None:
-        """Bring chips back, the one that has waited longest first, until the
-        deadline."""
-        now, steps = self.bus.now, 0
-        waiting = [
-            slot for slot in self.slots if not slot.running and slot.retry_at <= now()
-        ]
-        if not waiting or now() < self._rest_until:
+        """Bring chips back, the longest waiting first, until the deadline."""
+        due = [slot for slot in self.slots if self._is_due(slot)]
+        if not due or self._rests() or not self._reachable():
             return
-        failed = not self._setting_up() and not any(slot.running for slot in self.slots)
-        if failed and (now() < self._reopen_at or not self._reopened()):
-            return
-        for slot in sorted(waiting, key=lambda slot: slot.retry_at):
-            while not slot.running and slot.retry_at <= now():
-                if steps and (now() >= deadline or now() < self._rest_until):
+        due.sort(key=lambda slot: slot.retry_at)
+        self._step(due[0])
+        for slot in due:
+            while self._is_due(slot):
+                if self.bus.now() >= deadline or self._rests():
                     return
-                steps += 1
                 self._step(slot)
+
+    def _reachable(self) -> bool:
+        """Whether the bus is open; one on which no chip runs is opened again."""
+        if self._setting_up() or self._any_runs():
+            return True
+        return self.bus.now() >= self._reopen_at and self._reopened()
 
     def _reopened(self) -> bool:
         """Close and open a bus on which no chip runs.
@@ -288,9 +349,8 @@ class BusReader:
         """
         now = self.bus.now()
         self._lost_at = min(self._lost_at, now)
-        self._reopen_at = now + min(
-            max(PAUSE_S, 0.1 * (now - self._lost_at)), LONGEST_PAUSE_S
-        )
+        pause = max(PAUSE_S, 0.1 * (now - self._lost_at))
+        self._reopen_at = now + min(pause, LONGEST_PAUSE_S)
         with suppress(BusError):
             self.bus.reopen()
             return True
@@ -302,35 +362,41 @@ class BusReader:
         try:
             next(slot.steps)
         except StopIteration:
-            if slot.error is not None:
-                slot.back_at = self.bus.now()
-            slot.running, slot.error, slot.steps = True, None, None
-            self._lost_at, self._reopen_at = math.inf, -math.inf
+            slot.run(self.bus.now())
+            self._lost_at = math.inf
+            self._reopen_at = -math.inf
         except BusError as error:
             self._fail(slot, error)
             return False
         return True
 
     def _set_up(self, slot: Slot) -> Iterator[None]:
-        """Steps from down to running; a chip that kept its settings needs only the last
-        one, which reads a frame: a chip that cannot serve one does not run."""
-        if not (slot.has_settings and slot.chip is not None and slot.chip.healthy()):
+        """Steps from down to running.
+
+        A chip that kept its settings needs only the last one, which reads a frame: a
+        chip that cannot serve one does not run.
+        """
+        if not (slot.has_settings and slot.chip.healthy()):
             slot.has_settings = False
-            slot.chip = self._driver(slot)
+            slot.chip = slot.spec.kind.of(self._bus_of(slot.spec), slot.spec, slot.row)
             yield
             yield from slot.chip.settings()
             slot.has_settings = True
-        slot.chip.read()
-        slot.good, slot.at = True, self.bus.now()
+        slot.read(self.bus)
 
-    def _driver(self, slot: Slot) -> Chip:
-        spec = slot.spec
-        bus: Bus = self.bus
-        if spec.mux is not None and spec.channel is not None:
-            if spec.mux not in self._muxes:
-                verify, muxes = self._reading.verify_mux, self._muxes.values()
-                self._muxes[spec.mux] = TCA9548A(
-                    bus, spec.mux, verify=verify, beside=muxes
-                )
-            bus = self._muxes[spec.mux].channel(spec.channel)
-        return spec.kind.driver(bus, spec, slot.row)
+    def _bus_of(self, spec: ChipSpec) -> Bus:
+        """The bus of a chip: this one, or the channel of a mux on it."""
+        if spec.mux is None or spec.channel is None:
+            return self.bus
+        if spec.mux not in self._muxes:
+            self._muxes[spec.mux] = TCA9548A(
+                self.bus,
+                spec.mux,
+                verify=self._reading.verify_mux,
+                beside=self._muxes.values(),
+            )
+        return self._muxes[spec.mux].channel(spec.channel)
+
+
+def _channel_of(slot: Slot) -> tuple[int | None, int | None]:
+    return slot.spec.mux, slot.spec.channel

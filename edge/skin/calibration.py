@@ -1,17 +1,20 @@
-"""A skin's calibration: written into its file, and the dead band that follows from its
-noise."""
+"""A skin's calibration, written into its file."""
 
 import os
 import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from edge.errors import InputError
 from edge.files import read_text, write_whole
-from edge.skin.file import SkinFile, TaxelCalibration, parse
+from edge.skin.file import TaxelCalibration, parse
+
+CALIBRATION = re.compile(
+    r"^[ \t]*\[calibration\][ \t]*(#.*)?\n"
+    r"(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*",
+    re.M,
+)
+"""The table, up to the next one."""
 
 
 def calibration_text(calibration: TaxelCalibration) -> str:
@@ -19,12 +22,15 @@ def calibration_text(calibration: TaxelCalibration) -> str:
     lines = ["[calibration]\n"]
     if calibration.taken is not None:
         lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
-    for key, values in (
-        ("baseline", calibration.baseline),
-        ("noise", calibration.noise.round(3)),
-    ):
-        rows = "".join(f"  {row},\n" for row in values.tolist())
-        lines.append(f"{key} = [\n{rows}]\n")
+    arrays = {
+        "baseline": calibration.baseline.tolist(),
+        "noise": calibration.noise.round(3).tolist(),
+    }
+    for key, rows in arrays.items():
+        lines.append(f"{key} = [\n")
+        for row in rows:
+            lines.append(f"  {row},\n")
+        lines.append("]\n")
     return "".join(lines)
 
 
@@ -38,13 +44,8 @@ def with_calibration(
         InputError: the calibration in the file has a form that cannot be replaced.
     """
     former = parse(text, where)
-    table = re.compile(
-        r"^[ \t]*\[calibration\][ \t]*(#.*)?\n(?:(?![ \t]*\[\[?[ \t]*[A-Za-z_\"']).*\n?)*",
-        re.M,
-    )
-    without_table = table.sub("", text if text.endswith("\n") else text + "\n").rstrip(
-        "\n"
-    )
+    ended = text if text.endswith("\n") else text + "\n"
+    without_table = CALIBRATION.sub("", ended).rstrip("\n")
     new_text = f"{without_table}\n\n{calibration_text(calibration)}"
     new = parse(new_text, where)
     same = replace(former, calibration=None) == replace(new, calibration=None)
@@ -75,15 +76,3 @@ def save_calibration(
         with write_whole(name) as file:
             file.write(contents.encode())
     return backup
-
-
-def dead_band(skin: SkinFile) -> NDArray[np.int32]:
-    """(rows * cols,) counts under which a taxel reads 0; at least 1: no count is
-    negative."""
-    noise = (
-        np.zeros(skin.layout.shape)
-        if skin.calibration is None
-        else skin.calibration.noise
-    )
-    sigma = np.ceil(np.minimum(skin.signal.dead_band_sigma * noise.ravel(), 65535.0))
-    return np.maximum(max(1, skin.signal.dead_band_counts), sigma.astype(np.int32))

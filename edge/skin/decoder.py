@@ -1,6 +1,7 @@
 """From the bytes of all chips to raw taxel values, and which of them can be trusted."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -15,75 +16,146 @@ NOISY_COUNTS = 1.0
 conversion."""
 
 
+@dataclass(frozen=True)
+class TaxelMap:
+    """The place of each taxel of a skin among the stages of its chips.
+
+    One stage and one chip beyond the last stand for a taxel that no chip serves.
+
+    Attributes:
+        stage: (taxels,) index of its stage among the stages of all chips.
+        chip: (taxels,) index of its chip.
+        sign: (taxels,) 1 where a touch raises the raw value, -1 where it lowers it.
+        highest: (taxels,) the largest raw value that is not saturated.
+        served: (taxels,) which have a chip and are not dead.
+    """
+
+    stage: NDArray[np.intp]
+    chip: NDArray[np.intp]
+    sign: NDArray[np.int32]
+    highest: NDArray[np.int32]
+    served: NDArray[np.bool_]
+
+
+def taxel_map(file: SkinFile) -> TaxelMap:
+    """The map of a skin's taxels."""
+    taxels = file.layout.rows * file.layout.cols
+    stages = sum(len(chip.taxels) for chip in file.chips)
+    stage_of = np.full(taxels, stages, dtype=np.intp)
+    chip_of = np.full(taxels, len(file.chips), dtype=np.intp)
+    sign = np.ones(taxels, dtype=np.int32)
+    highest = np.full(taxels, 0xFFFF, dtype=np.int32)
+    stage = 0
+    for number, chip in enumerate(file.chips):
+        for taxel in chip.taxels:
+            if taxel != UNUSED:
+                stage_of[taxel] = stage
+                chip_of[taxel] = number
+                sign[taxel] = chip.sign
+                highest[taxel] = chip.traits.highest
+            stage += 1
+    served = chip_of < len(file.chips)
+    for row, col in file.signal.dead:
+        served[row * file.layout.cols + col] = False
+    return TaxelMap(stage_of, chip_of, sign, highest, served)
+
+
+@dataclass(frozen=True)
+class ValueRange:
+    """The raw values that a touch can reach, (taxels,) each."""
+
+    lowest: NDArray[np.uint16]
+    span: NDArray[np.uint16]
+
+    def holds(self, values: NDArray[np.uint16]) -> NDArray[np.bool_]:
+        """Which values (taxels,) lie in the range."""
+        # A value under the lowest wraps round to above every span.
+        return np.asarray(values - self.lowest <= self.span)
+
+
+def value_range(file: SkinFile, taxels: TaxelMap) -> ValueRange:
+    """The range of each taxel's values, from its chip and the skin's calibration."""
+    lowest = np.zeros_like(taxels.highest)
+    highest = taxels.highest
+    if file.calibration is not None:
+        baseline = file.calibration.baseline.ravel().astype(np.int32)
+        reach = file.signal.saturation_counts + file.signal.drift_limit_counts
+        lowest = np.maximum(baseline - reach, 0)
+        highest = np.minimum(highest, baseline + reach)
+    span = highest - lowest
+    return ValueRange(lowest.astype(np.uint16), span.astype(np.uint16))
+
+
+def stuck_limits(file: SkinFile, taxels: TaxelMap) -> NDArray[np.int64]:
+    """(chips,) equal readings in a row after which a chip is stuck.
+
+    Only of a chip with noise, and of one whose bytes hold a sequence number, must the
+    bytes change.
+    """
+    chips = file.chips
+    noisy = np.zeros(len(chips) + 1, dtype=np.bool_)
+    if file.calibration is not None:
+        varies = file.calibration.noise.ravel() >= NOISY_COUNTS
+        noisy[taxels.chip[varies]] = True
+    stuck = file.reading.stuck_frames
+    limits = np.where(noisy[:-1], stuck, np.iinfo(np.int64).max)
+    for number, chip in enumerate(chips):
+        if chip.kind.unchanged_frames is not None:
+            limits[number] = min(chip.kind.unchanged_frames, stuck)
+    return limits
+
+
+@dataclass(frozen=True)
+class ChipGroup:
+    """Neighbours of one kind, options and number of taxels, which one call parses."""
+
+    first: ChipSpec
+    data: NDArray[np.uint8]
+    """(n, frame_bytes) bytes."""
+
+
 class Decoder:
     """Values and trust of all taxels of a skin, frame by frame.
 
     Attributes:
         rows: for each chip, in the file's order, the buffer for its bytes.
+        taxels: the map of the taxels.
         values: (taxels,) raw values of the last call.
         times: (taxels,) when each was read.
-        sign: (taxels,) 1 where a touch raises the raw value, -1 where it lowers it.
-        served: (taxels,) which have a chip and are not dead.
     """
 
     def __init__(self, file: SkinFile) -> None:
         """Map stages to taxels."""
-        chips, n = file.chips, file.layout.rows * file.layout.cols
-        self._groups: list[tuple[ChipSpec, NDArray[np.uint8]]] = []
-        """Neighbours of one kind with equal options and number of taxels, which one
-        call parses: the first of them, and their bytes (n, frame_bytes) in `_bytes`."""
-        starts = np.cumsum([0, *(chip.kind.frame_bytes(chip) for chip in chips)])
-        self._bytes = np.zeros(starts[-1], dtype=np.uint8)
-        self._before, self._starts = self._bytes.copy(), starts[:-1]
-        self._unchanged = np.zeros(len(chips), dtype=np.int64)
+        sizes = [chip.traits.frame_bytes for chip in file.chips]
+        ends = np.cumsum(sizes, dtype=np.int64)
+        self._starts: NDArray[np.int64] = ends - sizes
+        self._bytes = np.zeros(ends[-1], dtype=np.uint8)
+        self._before = self._bytes.copy()
+        self.rows = np.split(self._bytes, ends[:-1])
+        self._groups = self._grouped(file.chips)
+        self.taxels = taxel_map(file)
+        self._range = value_range(file, self.taxels)
+        self._limits = stuck_limits(file, self.taxels)
+        self._unchanged = np.zeros(len(file.chips), dtype=np.int64)
         """Readings in a row that gave the same bytes."""
-        self.rows = np.split(self._bytes, starts[1:-1])
+        stages = sum(len(chip.taxels) for chip in file.chips)
+        self._raw = np.zeros(stages + 1, dtype=np.uint16)
+        self._intact = np.zeros(stages + 1, dtype=np.bool_)
+        self.values = self._raw.take(self.taxels.stage)
+        self.times = np.full(len(self.values), NEVER)
+
+    def _grouped(self, chips: Sequence[ChipSpec]) -> list[ChipGroup]:
+        groups = []
         first = 0
-        for _, group in groupby(
-            chips, key=lambda c: (c.kind.name, len(c.taxels), c.options)
-        ):
-            spec, *others = group
-            last = first + 1 + len(others)
-            data = self._bytes[starts[first] : starts[last]].reshape(last - first, -1)
-            self._groups.append((spec, data))
+        for _, group in groupby(chips, key=_form):
+            spec, *neighbours = group
+            last = first + 1 + len(neighbours)
+            start = self._starts[first]
+            size = spec.traits.frame_bytes
+            data = self._bytes[start : start + (last - first) * size]
+            groups.append(ChipGroup(spec, data.reshape(-1, size)))
             first = last
-        # The last stage and the last chip stand for a taxel that no chip serves.
-        stages = [(i, taxel) for i, chip in enumerate(chips) for taxel in chip.taxels]
-        self._raw = np.zeros(len(stages) + 1, dtype=np.uint16)
-        self._intact = np.zeros(len(stages) + 1, dtype=np.bool_)
-        self._stage_of = np.full(n, len(stages), dtype=np.intp)
-        self._chip_of = np.full(n, len(chips), dtype=np.intp)
-        self.sign = np.ones(n, dtype=np.int32)
-        highest = np.full(n, 0xFFFF, dtype=np.int32)
-        for stage, (i, taxel) in enumerate(stages):
-            if taxel != UNUSED:
-                self._stage_of[taxel], self._chip_of[taxel] = stage, i
-                self.sign[taxel], highest[taxel] = chips[i].sign, chips[i].highest
-        self.served = self._chip_of < len(chips)
-        for row, col in file.signal.dead:
-            self.served[row * file.layout.cols + col] = False
-        self.values = self._raw.take(self._stage_of)
-        self.times = np.full(n, NEVER)
-        lowest = np.zeros(n, dtype=np.int32)
-        noisy = np.zeros(len(chips) + 1, dtype=np.bool_)
-        if file.calibration is not None:
-            baseline = file.calibration.baseline.ravel().astype(np.int32)
-            reach = file.signal.saturation_counts + file.signal.drift_limit_counts
-            lowest = np.maximum(baseline - reach, 0)
-            highest = np.minimum(highest, baseline + reach)
-            np.logical_or.at(
-                noisy, self._chip_of, file.calibration.noise.ravel() >= NOISY_COUNTS
-            )
-        stuck = file.reading.stuck_frames
-        self._limits = np.where(noisy[:-1], stuck, np.iinfo(np.int64).max)
-        """Equal readings in a row after which a chip is stuck, if its bytes must
-        change."""
-        for i, chip in enumerate(chips):
-            if chip.kind.unchanged_frames is not None:
-                self._limits[i] = min(chip.kind.unchanged_frames, stuck)
-        self._lowest = lowest.astype(np.uint16)
-        self._range = (highest - lowest).astype(np.uint16)
-        """A taxel's values lie from `_lowest` to so much above it."""
+        return groups
 
     def decode(
         self, slots: Sequence[Slot], began: float, oldest: float
@@ -101,27 +173,46 @@ class Decoder:
         Returns:
             (taxels,) which values are valid.
         """
-        at = np.array([slot.at for slot in slots] + [NEVER])
+        read_at = np.array([slot.at for slot in slots] + [NEVER])
         good = np.array([slot.good for slot in slots] + [False])
-        parsed = [spec.kind.parse(data, spec) for spec, data in self._groups]
-        self._raw[:-1] = np.concatenate([values for values, _ in parsed], axis=None)
-        self._intact[:-1] = np.concatenate([intact for _, intact in parsed], axis=None)
-        fresh = at[:-1] >= began
+        self._parse()
+        fresh = read_at[:-1] >= began
+        damaged = np.append(self._stuck(fresh), False)
+        good &= ~damaged & (read_at >= oldest)
+        taxels = self.taxels
+        self.values = self._raw.take(taxels.stage)
+        self.times = read_at.take(taxels.chip)
+        intact = self._intact.take(taxels.stage) & self._range.holds(self.values)
+        damaged[taxels.chip[~intact & taxels.served]] = True
+        for number in np.flatnonzero(fresh).tolist():
+            slot = slots[number]
+            if slot.good:
+                slot.damaged = slot.damaged + 1 if damaged[number] else 0
+        return good.take(taxels.chip) & intact & taxels.served
+
+    def _parse(self) -> None:
+        """Parse the bytes of all chips into the stages' values."""
+        values = []
+        intact = []
+        for group in self._groups:
+            parsed = group.first.kind.parse(group.data, group.first)
+            values.append(parsed[0])
+            intact.append(parsed[1])
+        self._raw[:-1] = np.concatenate(values, axis=None)
+        self._intact[:-1] = np.concatenate(intact, axis=None)
+
+    def _stuck(self, fresh: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which chips have served the same bytes for too long.
+
+        Args:
+            fresh: (chips,) which were read in this frame.
+        """
+        changed = np.logical_or.reduceat(self._bytes != self._before, self._starts)
         self._unchanged += fresh
-        self._unchanged[
-            np.logical_or.reduceat(self._bytes != self._before, self._starts)
-        ] = 0
+        self._unchanged[changed] = 0
         np.copyto(self._before, self._bytes)
-        damaged = np.append(self._unchanged >= self._limits, False)
-        good &= ~damaged & (at >= oldest)
-        self.values = values = self._raw.take(self._stage_of)
-        self.times = at.take(self._chip_of)
-        # A value under the lowest wraps round to above every range.
-        intact = self._intact.take(self._stage_of) & (
-            values - self._lowest <= self._range
-        )
-        damaged[self._chip_of[~intact & self.served]] = True
-        for i in np.flatnonzero(fresh).tolist():
-            if slots[i].good:
-                slots[i].damaged = slots[i].damaged + 1 if damaged[i] else 0
-        return good.take(self._chip_of) & intact & self.served
+        return self._unchanged >= self._limits
+
+
+def _form(chip: ChipSpec) -> tuple[object, ...]:
+    return chip.kind, len(chip.taxels), chip.options

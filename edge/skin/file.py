@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.chips.chip import ChipSpec, Defaults
-from edge.chips.kinds import defaults_of
 from edge.config import ConfigTable, parse_toml
 from edge.errors import InputError
 from edge.files import read_text
@@ -55,8 +54,6 @@ class Reading:
             bus.
         stuck_frames: a chip whose bytes do not change for this many frames is invalid,
             if it made noise during calibration.
-        region_of_interest: read the chips near the contact at full rate, the rest in
-            turn.
     """
 
     rate_hz: float = 100.0
@@ -64,7 +61,6 @@ class Reading:
     verify_mux: bool = True
     recheck_frames: int = 4
     stuck_frames: int = 100
-    region_of_interest: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,8 +126,8 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     top = parse_toml(text, where)
     skin = top.table("skin", {})
     name = skin.text("name", Path(where).stem or "skin")
-    for key in (f.name for f in fields(SkinLayout)):
-        skin.has(key)
+    for key in fields(SkinLayout):
+        skin.has(key.name)
     skin.done()
     layout = SkinLayout.from_dict(skin.raw, where=where)
     signals = top.table("signal", {})
@@ -139,33 +135,41 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     chips = [chip for bus in buses for chip in bus.chips]
-    defaults = defaults_of(chips)
+    defaults = _defaults(chips)
     signal = _signal(signals, layout, defaults)
     if not skin.has("threshold_counts") and defaults.threshold_counts:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
-    has = top.has("calibration")
-    calibration = _calibration(top.table("calibration"), layout, chips) if has else None
+    calibration = None
+    if top.has("calibration"):
+        calibration = _calibration(top.table("calibration"), layout, chips)
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where)
+
+
+def _defaults(chips: Sequence[ChipSpec]) -> Defaults:
+    """The defaults of the chips; for chips that differ, those of no kind."""
+    first = chips[0].traits.defaults
+    if all(chip.traits.defaults == first for chip in chips):
+        return first
+    return Defaults()
 
 
 def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signal:
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
+    rate = defaults.drift_counts_per_s
+    limit = defaults.drift_limit_counts
+    counts = range(65536)
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
         dead_band_counts=table.whole(
-            "dead_band_counts", defaults.dead_band_counts, range(65536)
+            "dead_band_counts", defaults.dead_band_counts, counts
         ),
-        drift_counts_per_s=table.number(
-            "drift_counts_per_s", defaults.drift_counts_per_s, 0.0, 65535.0
-        ),
-        drift_limit_counts=table.whole(
-            "drift_limit_counts", defaults.drift_limit_counts, range(65536)
-        ),
+        drift_counts_per_s=table.number("drift_counts_per_s", rate, 0.0, 65535.0),
+        drift_limit_counts=table.whole("drift_limit_counts", limit, counts),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
-        saturation_counts=table.whole("saturation_counts", 65535, range(1, 65536)),
+        saturation_counts=table.whole("saturation_counts", 65535, counts[1:]),
         dead=tuple(taxel_at(table, "dead", entry, layout) for entry in dead),
     )
     table.done()
@@ -179,7 +183,6 @@ def _reading(table: ConfigTable) -> Reading:
         verify_mux=table.flag("verify_mux", True),
         recheck_frames=table.whole("recheck_frames", 4, range(1, 100_001)),
         stuck_frames=table.whole("stuck_frames", 100, range(2, 1_000_001)),
-        region_of_interest=table.flag("region_of_interest", False),
     )
     table.done()
     return reading
@@ -188,42 +191,56 @@ def _reading(table: ConfigTable) -> Reading:
 def _calibration(
     table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]
 ) -> TaxelCalibration:
-    arrays: dict[str, NDArray[np.float64]] = {}
-    for key in ("baseline", "noise"):
-        try:
-            array = np.array(table.get(key), dtype=np.float64)
-        except (
-            TypeError,
-            ValueError,
-            OverflowError,
-        ):  # no numbers, or rows of different lengths
-            array = np.empty(0)
-        are_whole = key == "noise" or bool((array == np.floor(array)).all())
-        in_range = ((array >= 0.0) & (array <= 65535.0)).all()
-        if array.shape != layout.shape or not (are_whole and in_range):
-            numbers = "numbers" if key == "noise" else "whole numbers"
-            raise InputError(
-                f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} from "
-                "0 to 65535; delete [calibration], and calibrate again"
-            )
-        arrays[key] = array
+    rest = _array(table, "baseline", layout, "whole numbers")
+    if (rest != np.floor(rest)).any():
+        raise _no_array(table, "baseline", layout, "whole numbers")
+    noise = _array(table, "noise", layout, "numbers")
     taken = table.get("taken", None)
     if taken is not None and not isinstance(taken, datetime):
         raise table.fail("taken", "a date and time")
     table.done()
-    baseline = arrays["baseline"].astype(np.uint16)
+    baseline = rest.astype(np.uint16)
     for chip in chips:
         highest = max(baseline.flat[chip.served], default=0)
-        if highest > chip.highest:
+        if highest > chip.traits.highest:
             # The skin had other chips when it was calibrated.
             raise InputError(
-                f"{table.called('baseline')} is {highest} for a taxel of a {chip.kind.name}, "
-                f"which tells at most {chip.highest}; delete [calibration], and calibrate again"
+                f"{table.called('baseline')} is {highest} for a taxel of a "
+                f"{chip.kind.name}, which tells at most {chip.traits.highest}; delete "
+                "[calibration], and calibrate again"
             )
-    return TaxelCalibration(baseline, arrays["noise"], taken)
+    return TaxelCalibration(baseline, noise, taken)
+
+
+def _array(
+    table: ConfigTable, key: str, layout: SkinLayout, numbers: str
+) -> NDArray[np.float64]:
+    """A value for each taxel, from 0 to 65535."""
+    try:
+        array = np.array(table.get(key), dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        # No numbers, or rows of different lengths.
+        raise _no_array(table, key, layout, numbers) from None
+    if array.shape != layout.shape or not ((array >= 0) & (array <= 65535)).all():
+        raise _no_array(table, key, layout, numbers)
+    return array
+
+
+def _no_array(
+    table: ConfigTable, key: str, layout: SkinLayout, numbers: str
+) -> InputError:
+    return InputError(
+        f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
+        "from 0 to 65535; delete [calibration], and calibrate again"
+    )
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
-    """Frames a second that buses carry side by side, from each bus's bits a frame and
-    clock."""
-    return 1.0 / max(b / hz for b, hz in zip(bits, clocks, strict=True))
+    """Frames a second that buses carry side by side.
+
+    Args:
+        bits: of a frame on each bus.
+        clocks: of each bus, in Hz.
+    """
+    slowest_s = max(count / hz for count, hz in zip(bits, clocks, strict=True))
+    return 1.0 / slowest_s

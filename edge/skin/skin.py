@@ -5,22 +5,20 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
-from typing import NamedTuple, Self
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.i2c import Adapter, LinuxBus
+from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
-from edge.skin.baseline import Baseline
-from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, Slot
-from edge.skin.calibration import dead_band
+from edge.skin.baseline import Baseline, dead_band
+from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
 from edge.skin.decoder import Decoder
 from edge.skin.file import SkinFile, load
-from edge.skin.read_scheduler import OLDEST_FRAMES as SCAN_FRAMES
-from edge.skin.read_scheduler import ReadScheduler
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
@@ -29,7 +27,8 @@ SILENT_FRAMES = 50
 at 100 Hz, within which a taxel returns from any fault that has ended."""
 
 
-class ChipStatus(NamedTuple):
+@dataclass(frozen=True)
+class ChipStatus:
     """The state of one chip.
 
     Attributes:
@@ -46,8 +45,7 @@ class ChipStatus(NamedTuple):
 
 
 class Skin:
-    """A skin on its buses: `Skin.open` for real ones; those of `edge.fake` have the
-    same face.
+    """A skin on its buses; fake ones (`edge.fake.player`) have the same face.
 
     >>> from edge.fake.player import still
     >>> from edge.skin import file
@@ -72,45 +70,45 @@ class Skin:
             buses: one for each of the file's buses, in their order; `close` closes
                 them.
             clock: of the loop and the buses; the kernel's where None.
-            touch_counts: a taxel above this is touched: the baseline is frozen, and
-                region-of-interest reading turns to its chip. The file's threshold
-                applies where this is None or higher.
+            touch_counts: a taxel above this is touched, and the baseline is frozen. The
+                file's threshold applies where this is None or higher.
         """
-        self.file, self.layout = file, file.layout
+        self.file = file
+        self.layout = file.layout
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
-        self.scheduler = (
-            ReadScheduler(file) if file.reading.region_of_interest else None
-        )
-        threshold = file.layout.threshold_counts
-        self.touch_counts = (
-            threshold if touch_counts is None else min(threshold, touch_counts)
-        )
-        self.oldest_s = self.period_s * (
-            OLDEST_FRAMES if self.scheduler is None else SCAN_FRAMES
-        )
-        """How old a taxel's value may be."""
+        self.touch_counts = file.layout.threshold_counts
+        if touch_counts is not None:
+            self.touch_counts = min(self.touch_counts, touch_counts)
+        self.oldest_s = self.period_s * OLDEST_FRAMES
+        """Maximum age of a valid value, in seconds."""
         self._decoder = Decoder(file)
-        rows = iter(self._decoder.rows)
-        self.readers = [
-            BusReader(bus, spec, [next(rows) for _ in spec.chips], file.reading)
-            for bus, spec in zip(buses, file.buses, strict=True)
-        ]
+        self.readers: list[BusReader] = []
+        first = 0
+        for bus, spec in zip(buses, file.buses, strict=True):
+            last = first + len(spec.chips)
+            rows = self._decoder.rows[first:last]
+            self.readers.append(BusReader(bus, spec, rows, file.reading))
+            first = last
         self._slots = [slot for reader in self.readers for slot in reader.slots]
-        calibration, n = file.calibration, file.layout.rows * file.layout.cols
+        taxels = file.layout.rows * file.layout.cols
+        rest = np.zeros(taxels, dtype=np.uint16)
+        if file.calibration is not None:
+            rest = file.calibration.baseline.ravel()
         self.baseline = Baseline(
-            np.zeros(n) if calibration is None else calibration.baseline.ravel(),
-            sign=self._decoder.sign,
+            rest,
+            sign=self._decoder.taxels.sign,
             dead_band=dead_band(file),
             step_counts=file.signal.drift_counts_per_s * self.period_s,
             limit=file.signal.drift_limit_counts,
         )
-        self._last: Frame | None = None
-        self._valid = np.zeros(n, dtype=np.bool_)
-        self._invalid_for = np.zeros(n, dtype=np.int64)
+        self._valid = np.zeros(taxels, dtype=np.bool_)
+        self._invalid_for = np.zeros(taxels, dtype=np.int64)
         """Frames in a row without a valid value of each taxel."""
-        self._silent, self._since_silent = 0, 0
+        self._silent = 0
+        self._since_silent = 0
         self._touched_at = -math.inf
+        self._states: list[State] = []
         self._lost = [False for _ in self.readers]
         self._threads = ThreadPoolExecutor(len(self.readers))
 
@@ -143,10 +141,10 @@ class Skin:
                 f"`edge-classify calibrate --skin {file.path}` with nothing touching"
             )
         with ExitStack() as opened:
-            timeout_s = file.reading.timeout_s
-            buses = [
-                opened.enter_context(closing(_open(b, timeout_s))) for b in file.buses
-            ]
+            buses = []
+            for spec in file.buses:
+                bus = _open(spec, file.reading.timeout_s)
+                buses.append(opened.enter_context(closing(bus)))
             skin = cls(file, buses, touch_counts=touch_counts)
             opened.callback(skin.close)
             skin.start()
@@ -162,43 +160,45 @@ class Skin:
         for reader in self.readers:
             reader.start()
         self._states = [slot.state for slot in self._slots]
-        if "running" not in self._states:
+        if State.RUNNING not in self._states:
             error = self._slots[0].error
             raise EdgeError(f"no chip of the skin {self.file.name!r} answers: {error}")
 
     def status(self) -> list[ChipStatus]:
         """The state of each chip, in the file's order."""
-        return [
-            ChipStatus(reader.bus.name, slot.spec, slot.state, str(slot.error or ""))
-            for reader in self.readers
-            for slot in reader.slots
-        ]
+        statuses = []
+        for reader in self.readers:
+            for slot in reader.slots:
+                error = str(slot.error or "")
+                statuses.append(
+                    ChipStatus(reader.bus.name, slot.spec, slot.state, error)
+                )
+        return statuses
 
     def bus_changes(self) -> list[tuple[str, bool]]:
-        """The buses that were lost or have come back since the last call: name and
-        whether lost.
+        """The buses that were lost or came back since the last call: (name, lost).
 
         A bus is lost while every chip on it fails, as when its adapter is unplugged.
         """
-        former, self._lost = self._lost, [reader.lost for reader in self.readers]
-        readers = zip(self.readers, former, strict=True)
-        return [
-            (reader.bus.name, reader.lost)
-            for reader, lost in readers
-            if reader.lost != lost
-        ]
+        changes = []
+        for number, reader in enumerate(self.readers):
+            if reader.lost != self._lost[number]:
+                self._lost[number] = reader.lost
+                changes.append((reader.bus.name, reader.lost))
+        return changes
 
     def changes(self) -> list[ChipStatus]:
         """The chips whose state has changed since the last call, or since the start.
 
         A chip that is down stays so until it runs, whatever is tried.
         """
-        former, self._states = self._states, [slot.state for slot in self._slots]
-        return [
-            s
-            for s, state in zip(self.status(), former, strict=True)
-            if s.state != state
-        ]
+        states = [slot.state for slot in self._slots]
+        if states == self._states:
+            return []
+        former = self._states
+        self._states = states
+        pairs = zip(self.status(), former, strict=True)
+        return [status for status, state in pairs if status.state != state]
 
     @property
     def invalid_for(self) -> NDArray[np.int64]:
@@ -210,8 +210,7 @@ class Skin:
         return self._invalid_for.reshape(self.layout.shape)
 
     def silent_changes(self) -> int | None:
-        """Number of taxels without a valid value for `SILENT_FRAMES` frames, if it has
-        changed.
+        """Number of taxels silent for `SILENT_FRAMES` frames, if it has changed.
 
         Call it once a frame; it gives a number in one of `SILENT_FRAMES` frames at
         most.
@@ -220,12 +219,12 @@ class Skin:
         silent = int((self._invalid_for >= SILENT_FRAMES).sum())
         if silent == self._silent or self._since_silent < SILENT_FRAMES:
             return None
-        self._silent, self._since_silent = silent, 0
+        self._silent = silent
+        self._since_silent = 0
         return silent
 
     def read(self) -> Frame:
-        """Read one frame; with region-of-interest reading, some chips keep their last
-        values.
+        """Read one frame.
 
         Returns:
             A frame whose `times` tell when each taxel was read. A taxel that could not
@@ -233,20 +232,12 @@ class Skin:
             and reads 0.
         """
         clock = self.clock
-        clock.sleep_until(
-            clock.now()
-        )  # lets the buses of a virtual clock start together
+        # The buses of a virtual clock start together.
+        clock.sleep_until(clock.now())
         t = clock.now()
         # The buses are read side by side, each in a thread.
-        jobs: list[list[Slot]] = [reader.slots for reader in self.readers]
-        if self.scheduler is not None:
-            chosen = self.scheduler.plan(self._last, self.touch_counts)
-            jobs = [
-                [job[i] for i in indices]
-                for job, indices in zip(jobs, chosen, strict=True)
-            ]
-        deadlines = [t + self.period_s - LONGEST_STEP_S] * len(jobs)
-        list(self._threads.map(BusReader.read, self.readers, jobs, deadlines))
+        deadlines = [t + self.period_s - LONGEST_STEP_S] * len(self.readers)
+        list(self._threads.map(BusReader.read, self.readers, deadlines))
         return self._assemble(t)
 
     def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
@@ -255,22 +246,22 @@ class Skin:
         return self._decoder.values.reshape(shape), self._valid.reshape(shape)
 
     def _assemble(self, t: float) -> Frame:
-        self._valid = valid = self._decoder.decode(self._slots, t, t - self.oldest_s)
-        counts = self.baseline.above(self._decoder.values)
+        decoder = self._decoder
+        valid = decoder.decode(self._slots, t, t - self.oldest_s)
+        self._valid = valid
+        counts = self.baseline.above(decoder.values)
         counts *= valid
         self._invalid_for += 1
-        self._invalid_for *= self._decoder.served & ~valid
+        self._invalid_for *= decoder.taxels.served & ~valid
         # The baseline follows drift, except during a contact and shortly after it.
         if int(counts.max()) > self.touch_counts:
             self._touched_at = t
         settled = t - self._touched_at >= self.file.signal.settle_s
         if settled and self.file.calibration is not None:
-            self.baseline.follow(self._decoder.values, valid)
-        shape, times = self.layout.shape, self._decoder.times
-        self._last = Frame(
-            t, counts.reshape(shape), valid.reshape(shape), times.reshape(shape)
-        )
-        return self._last
+            self.baseline.follow(decoder.values, valid)
+        shape = self.layout.shape
+        times = decoder.times.reshape(shape)
+        return Frame(t, counts.reshape(shape), valid.reshape(shape), times)
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""
@@ -286,8 +277,11 @@ class Skin:
 
 
 def _open(spec: BusSpec, timeout_s: float) -> Adapter:
+    """The adapter of a bus; each kind is loaded only where a skin has one."""
     if spec.serial:
-        from edge.bus.serial_bus import SerialBus  # few skins have one
+        from edge.bus.serial_bus import SerialBus
 
         return SerialBus(spec.device, baud=spec.clock_hz, timeout_s=timeout_s)
+    from edge.bus.linux import LinuxBus
+
     return LinuxBus(spec.device, timeout_s=timeout_s)

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from edge.bus import tca9548a
-from edge.chips.chip import MOST_TAXELS, UNUSED, ChipKind, ChipSpec
-from edge.chips.kinds import KINDS
+from edge.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
+from edge.chips.kinds import KINDS, driver
 from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout
@@ -55,26 +55,27 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     device, clock_hz = _port(table) if serial else _adapter(table)
     if table.has("kind"):
         _kind(table)
-    options = {name for kind in KINDS.values() for name in kind.options}
-    keys = ("kind", "mux", "block", *sorted(options))
-    shared = {key: table.raw[key] for key in keys if table.has(key)}
-    chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
+    tables = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
+    kinds = [_kind(_shared(chip, table, ("kind",))) for chip in tables]
+    options = {name for kind in kinds for name in kind.options}
+    for key in ("kind", "mux", "block", *options):
+        table.has(key)
     table.done()
-    if serial and len(chips) > 1:
+    if serial and len(tables) > 1:
         raise InputError(
-            f"{table.called('chips')} has {len(chips)}; a serial port has one"
+            f"{table.called('chips')} has {len(tables)}; a serial port has one"
         )
     specs = []
-    for chip in chips:
-        kind = _kind(ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix))
-        of_others = options - set(kind.options)
-        raw = {key: value for key, value in shared.items() if key not in of_others} | {
-            **chip.raw
-        }
-        specs.append(
-            _chip(ConfigTable(raw, chip.where, chip.prefix), kind, layout, sign, serial)
-        )
+    for kind, chip in zip(kinds, tables, strict=True):
+        whole = _shared(chip, table, ("kind", "mux", "block", *kind.options))
+        specs.append(_chip(whole, kind, layout, sign, serial))
     return BusSpec(device, tuple(specs), clock_hz, serial)
+
+
+def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigTable:
+    """A chip's table with the keys that its bus gives for all chips."""
+    given = {key: bus.raw[key] for key in keys if key in bus.raw}
+    return ConfigTable({**given, **chip.raw}, chip.where, chip.prefix)
 
 
 def _port(table: ConfigTable) -> tuple[str, int]:
@@ -103,86 +104,107 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
     return path, table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 
 
-def _kind(table: ConfigTable) -> ChipKind:
+def _kind(table: ConfigTable) -> type[Chip]:
     name = table.get("kind")
     if not isinstance(name, str) or name not in KINDS:
-        kinds = ", ".join(
-            f"{kind.name} ({kind.description})" for kind in KINDS.values()
-        )
-        raise table.fail("kind", f"one of {kinds}")
-    return KINDS[name]
+        kinds = [f"{name} ({kind.description})" for name, kind in KINDS.items()]
+        raise table.fail("kind", f"one of {', '.join(kinds)}")
+    return driver(name)
 
 
 def _chip(
     table: ConfigTable,
-    kind: ChipKind,
+    kind: type[Chip],
     layout: SkinLayout,
     sign: int | None,
     serial: bool,
 ) -> ChipSpec:
     table.has("kind")
-    if serial and not kind.serial:
-        raise InputError(
-            f"{table.called('kind')} is {kind.name}; a serial port carries block only"
-        )
-    if serial and table.has("address"):
-        raise InputError(
-            f"{table.called('address')} has no meaning on a serial port; leave it out"
-        )
-    address = (
-        0 if serial else table.whole("address", allowed=kind.addresses, form="#04x")
-    )
+    address = _address(table, kind, serial)
     mux = channel = None
     if table.has("mux"):
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
         channel = table.whole("channel", allowed=range(tca9548a.CHANNELS))
     elif table.has("channel"):
         raise InputError(f"{table.called('channel')} needs mux, the address of the mux")
-    options = {
-        name: table.whole(name, option.default, option.allowed)
-        for name, option in kind.options.items()
-    }
+    options = {}
+    for name, option in kind.options.items():
+        options[name] = table.whole(name, option.default, option.allowed)
     taxels = _taxels(table, layout)
+    _check_taxels(table, kind, taxels)
+    if sign is None:
+        sign = kind.traits(len(taxels), options).defaults.sign
+    sign = table.whole("sign", sign, (1, -1))
+    table.done()
+    return ChipSpec(kind, address, taxels, mux, channel, sign, options)
+
+
+def _address(table: ConfigTable, kind: type[Chip], serial: bool) -> int:
+    """The address of a chip, 0 on a serial port."""
+    if not serial:
+        return table.whole("address", allowed=kind.addresses, form="#04x")
+    if not kind.serial:
+        raise InputError(
+            f"{table.called('kind')} is {kind.name}; a serial port carries block only"
+        )
+    if table.has("address"):
+        raise InputError(
+            f"{table.called('address')} has no meaning on a serial port; leave it out"
+        )
+    return 0
+
+
+def _check_taxels(
+    table: ConfigTable, kind: type[Chip], taxels: tuple[int, ...]
+) -> None:
     if kind.stages is not None and len(taxels) != kind.stages:
         raise InputError(
-            f"{table.called('taxels')} names {len(taxels)} taxels, but an {kind.name.upper()} has "
-            f"{kind.stages} stages; write [] for a stage without a taxel"
+            f"{table.called('taxels')} names {len(taxels)} taxels, but an "
+            f"{kind.name.upper()} has {kind.stages} stages; write [] for a stage "
+            "without a taxel"
         )
     if not 1 <= len(taxels) <= MOST_TAXELS:
-        limits = f"names {len(taxels)} taxels; a chip serves 1 to {MOST_TAXELS}"
-        raise InputError(f"{table.called('taxels')} {limits}")
-    default = kind.defaults(options).sign if sign is None else sign
-    own_sign = table.whole("sign", default, (1, -1))
-    table.done()
-    return ChipSpec(kind, address, taxels, mux, channel, own_sign, options)
+        raise InputError(
+            f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
+            f"{MOST_TAXELS}"
+        )
 
 
 def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
     """Flat indices from `taxels`, or from `first` and `block`, row by row."""
-    listed, *block = [table.has(key) for key in ("taxels", "first", "block")]
-    key = "taxels" if listed else "first"
+    # Each key is asked for, so that none of them counts as unknown.
+    listed = table.has("taxels")
+    first = table.has("first")
+    block = table.has("block")
     if listed:
+        key = "taxels"
         taxels = table.get("taxels")
         if not isinstance(taxels, list):
             raise table.fail("taxels", "a list of [row, col]")
-    elif all(block):
-        row, col = table.pair("first")
-        high, wide = table.pair("block")
-        if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
-            raise table.fail(
-                "block", f"[rows, cols] within {layout.rows} x {layout.cols}"
-            )
-        taxels = [[row + i, col + j] for i in range(high) for j in range(wide)]
+    elif first and block:
+        key = "first"
+        taxels = _rectangle(table, layout)
     else:
         raise InputError(
             f"{table.called('taxels')} is missing; give it, or first and block"
         )
-    pairs = [
-        None if taxel == [] else taxel_at(table, key, taxel, layout) for taxel in taxels
-    ]
-    return tuple(
-        UNUSED if pair is None else pair[0] * layout.cols + pair[1] for pair in pairs
-    )
+    indices = []
+    for taxel in taxels:
+        if taxel == []:
+            indices.append(UNUSED)
+        else:
+            row, col = taxel_at(table, key, taxel, layout)
+            indices.append(row * layout.cols + col)
+    return tuple(indices)
+
+
+def _rectangle(table: ConfigTable, layout: SkinLayout) -> list[list[int]]:
+    """[row, col] of the taxels of `first` and `block`, row by row."""
+    row, col = table.pair("first")
+    high, wide = table.pair("block")
+    if not (1 <= high <= layout.rows and 1 <= wide <= layout.cols):
+        raise table.fail("block", f"[rows, cols] within {layout.rows} x {layout.cols}")
+    return [[row + i, col + j] for i in range(high) for j in range(wide)]
 
 
 def taxel_at(
@@ -204,40 +226,51 @@ def taxel_at(
 
 def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
     """Raise InputError where two chips claim one address or one taxel."""
-    owner: dict[int, str] = {}
-    devices = [bus.device for bus in buses]
-    for b, bus in enumerate(buses):
-        place = f"{where}: bus {b}"
-        if bus.device in devices[:b]:
+    owners: dict[int, str] = {}
+    devices: list[str] = []
+    for number, bus in enumerate(buses):
+        place = f"{where}: bus {number}"
+        if bus.device in devices:
+            former = devices.index(bus.device)
+            raise InputError(f"{place} has the same device as bus {former}")
+        devices.append(bus.device)
+        _check_addresses(bus, place)
+        for index, chip in enumerate(bus.chips):
+            _claim_taxels(chip, f"bus {number} chip {index}", owners, layout, where)
+
+
+def _check_addresses(bus: BusSpec, place: str) -> None:
+    claimed: dict[tuple[int | None, ...], str] = {}
+    for chip in bus.chips:
+        if chip.mux is not None:
+            claimed[None, None, chip.mux] = "a mux"
+    if claimed and bus.clock_hz > FASTEST_MUX_HZ:
+        raise InputError(
+            f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most "
+            f"{FASTEST_MUX_HZ}"
+        )
+    # While its channel is connected, a chip behind a mux also hears messages to the
+    # chips on the bus itself, so these claim their addresses first.
+    order = sorted(range(len(bus.chips)), key=lambda i: bus.chips[i].mux is not None)
+    for index in order:
+        chip = bus.chips[index]
+        route = (chip.mux, chip.channel, chip.address)
+        other = claimed.get(route) or claimed.get((None, None, chip.address))
+        if other is not None:
             raise InputError(
-                f"{place} has the same device as bus {devices.index(bus.device)}"
+                f"{place} chip {index} has the same address as {other}, {chip.route}"
             )
-        claimed: dict[tuple[int | None, ...], str] = {
-            (None, None, chip.mux): "a mux"
-            for chip in bus.chips
-            if chip.mux is not None
-        }
-        if claimed and bus.clock_hz > FASTEST_MUX_HZ:
+        claimed[route] = f"chip {index}"
+
+
+def _claim_taxels(
+    chip: ChipSpec, place: str, owners: dict[int, str], layout: SkinLayout, where: str
+) -> None:
+    for taxel in chip.served:
+        if taxel in owners:
+            row, col = divmod(taxel, layout.cols)
             raise InputError(
-                f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most {FASTEST_MUX_HZ}"
+                f"{where}: {place}: taxel [{row}, {col}] belongs to {owners[taxel]} "
+                "already"
             )
-        # While its channel is connected, a chip behind a mux also hears messages to the
-        # chips on the bus itself, so these claim their addresses first.
-        for c, chip in sorted(
-            enumerate(bus.chips), key=lambda entry: entry[1].mux is not None
-        ):
-            place = f"bus {b} chip {c}"
-            route = (chip.mux, chip.channel, chip.address)
-            other = claimed.get(route) or claimed.get((None, None, chip.address))
-            if other is not None:
-                raise InputError(
-                    f"{where}: {place} has the same address as {other}, {chip.route}"
-                )
-            claimed[route] = f"chip {c}"
-            for taxel in chip.taxels:
-                if taxel in owner and taxel != UNUSED:
-                    row, col = divmod(taxel, layout.cols)
-                    raise InputError(
-                        f"{where}: {place}: taxel [{row}, {col}] belongs to {owner[taxel]} already"
-                    )
-                owner[taxel] = place
+        owners[taxel] = place

@@ -31,7 +31,7 @@ def measure() -> float:
 
         def frame():
             for reader in skin.readers:
-                reader.read(reader.slots)
+                reader.read()
             skin._assemble(skin.clock.now())
 
         return (

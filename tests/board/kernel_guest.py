@@ -22,7 +22,8 @@ import numpy as np
 import pytest
 from smbus2 import SMBus
 
-from edge.bus.i2c import BusBusy, BusDenied, BusFault, BusNack, LinuxBus, fetch
+from edge.bus.linux import LinuxBus
+from edge.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
 from edge.cli import main
 from edge.fake.clock import VirtualClock
 from edge.fake.player import Playback, calibrated

@@ -12,7 +12,7 @@ import pytest
 
 from edge import __version__, cli
 from edge.__main__ import main as start
-from edge.bus.i2c import BusMissing
+from edge.bus.protocol import BusMissing
 from edge.errors import InputError
 from edge.skin import file as skinfile
 from export.__main__ import main as export

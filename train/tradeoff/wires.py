@@ -4,7 +4,8 @@ transactions."""
 import math
 from dataclasses import dataclass, replace
 
-from edge.chips import ad7147, block
+from edge.chips.ad7147 import AD7147
+from edge.chips.block import Block
 from edge.chips.chip import UNUSED, ChipSpec
 from edge.fake.player import frame_bits
 from edge.skin import file as skinfile
@@ -64,8 +65,8 @@ def spread(layout: SkinLayout, buses: int) -> SkinFile:
             channel, chip = divmod(i, CHIPS)
             chips.append(
                 ChipSpec(
-                    ad7147.KIND,
-                    ad7147.KIND.addresses[chip],
+                    AD7147,
+                    AD7147.addresses[chip],
                     group,
                     mux=MUX,
                     channel=channel,
@@ -91,7 +92,7 @@ def wires(layout: SkinLayout) -> list[Wire]:
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     if shipped.layout.shape == layout.shape:
         choices.append(wire("MPR121", replace(shipped, layout=layout)))
-    chip = ChipSpec(block.KIND, 0x08, tuple(range(taxels)))
+    chip = ChipSpec(Block, 0x08, tuple(range(taxels)))
     served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
     choices.append(wire("microcontroller", served))
     return choices

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from edge.bus.i2c import (
+from edge.bus.protocol import (
     BusError,
     BusFault,
     BusGone,
@@ -27,6 +27,7 @@ from edge.bus.i2c import (
 from edge.bus.serial_bus import SerialBus, decode, encode, serial_bits
 from edge.chips import block
 from edge.chips.block import Block
+from edge.chips.chip import ChipSpec
 from edge.errors import InputError
 from edge.skin.skin import Skin
 from tests.edge.skin.small import one_chip
@@ -129,9 +130,12 @@ def bus(board):
     bus.close()
 
 
+SPEC = ChipSpec(Block, 0, tuple(range(TAXELS)))
+
+
 def frame(chip):
     chip.read()
-    taxels, intact = block.parse(chip.frame.buffer[None], TAXELS, 16)
+    taxels, intact = Block.parse(chip.frame.buffer[None], SPEC)
     return taxels[0].tolist(), bool(intact.all())
 
 

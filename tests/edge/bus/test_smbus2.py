@@ -57,7 +57,8 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
         library,
         """
         import os
-        from edge.bus.i2c import BusFault, LinuxBus, fetch
+        from edge.bus.linux import LinuxBus
+        from edge.bus.protocol import BusFault, fetch
         bus = LinuxBus("/dev/i2c-1")
         try:
             fetch(bus, 0x70, b"\\0", 1)
@@ -72,10 +73,10 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
-    opening = "from edge.bus.i2c import LinuxBus; LinuxBus('/dev/i2c-1')"
+    opening = "from edge.bus.linux import LinuxBus; LinuxBus('/dev/i2c-1')"
     done = run(library, opening, I2CDEV_LOCKED="1")
     assert done.stderr.splitlines()[-1] == (
-        "edge.bus.i2c.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
+        "edge.bus.protocol.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
     )
 
 
@@ -93,7 +94,8 @@ def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
     done = run(
         library,
         """
-        from edge.bus.i2c import BusGone, LinuxBus, fetch
+        from edge.bus.linux import LinuxBus
+        from edge.bus.protocol import BusGone, fetch
         bus = LinuxBus("/dev/i2c-1")
         bus.close(); bus.close()
         try:

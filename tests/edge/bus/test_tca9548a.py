@@ -6,9 +6,10 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from edge.bus.i2c import BusFault
+from edge.bus.protocol import BusFault
 from edge.bus.tca9548a import LEAVE_ATTEMPTS, TCA9548A
-from edge.chips.ad7147 import AD7147, FakeAD7147
+from edge.chips.ad7147 import AD7147
+from edge.fake.ad7147 import FakeAD7147
 from edge.fake.tca9548a import FakeTCA9548A
 from tests.edge.chips.chips import parsed
 from tests.faulty import Fault, FaultyBus

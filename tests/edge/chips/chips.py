@@ -2,11 +2,13 @@
 
 import numpy as np
 
-from edge.chips import ad7147, block, mpr121
-from edge.chips.ad7147 import AD7147, FakeAD7147
-from edge.chips.block import Block, FakeBlock
+from edge.chips.ad7147 import AD7147
+from edge.chips.block import Block
 from edge.chips.chip import ChipSpec
-from edge.chips.mpr121 import MPR121, FakeMPR121
+from edge.chips.mpr121 import MPR121
+from edge.fake.ad7147 import FakeAD7147
+from edge.fake.block import FakeBlock
+from edge.fake.mpr121 import FakeMPR121
 
 VALUES = np.arange(12, dtype=np.uint16) * 37 + 300
 
@@ -18,9 +20,9 @@ def sense(t):
 def parsed(chip, bits=16):
     """Read a chip of 12 taxels: its values, and which of them are intact."""
     chip.read()
-    kind = {AD7147: ad7147.KIND, MPR121: mpr121.KIND, Block: block.KIND}[type(chip)]
-    spec = ChipSpec(kind, chip.address, tuple(range(12)), options={"bits": bits})
-    values, intact = kind.parse(chip.frame.buffer[None], spec)
+    options = {"bits": bits} if isinstance(chip, Block) else {}
+    spec = ChipSpec(type(chip), chip.address, tuple(range(12)), options=options)
+    values, intact = chip.parse(chip.frame.buffer[None], spec)
     return values[0], intact[0]
 
 

@@ -3,9 +3,13 @@
 import numpy as np
 
 from edge.chips import ad7147
-from edge.chips.ad7147 import AD7147, FakeAD7147
+from edge.chips.ad7147 import AD7147
+from edge.chips.chip import ChipSpec
+from edge.fake.ad7147 import FakeAD7147
 from edge.fake.bus import FakeBus
 from tests.edge.chips.chips import parsed, sense
+
+SPEC = ChipSpec(AD7147, 0x2C, tuple(range(12)))
 
 
 def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
@@ -41,7 +45,7 @@ def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
 def test_parses_big_endian_words_of_which_zeros_are_not_intact():
     data = np.zeros((2, 24), dtype=np.uint8)
     data[0, :4] = 0x12, 0x34, 0x56, 0x78
-    values, intact = ad7147.parse(data)
+    values, intact = AD7147.parse(data, SPEC)
     assert values[0, :3].tolist() == [0x1234, 0x5678, 0]
     assert intact.tolist() == [[True, True] + [False] * 10, [False] * 12]
 
@@ -53,10 +57,12 @@ def test_ones_up_to_the_end_are_a_bus_that_nobody_drives_and_ones_before_it_a_va
         # A last byte alone may be a value that ends in 0xFF: its chip is read a second
         # time.
         intact = 12 if driven == 23 else driven // 2
-        assert ad7147.parse(data)[1][0].tolist() == [i < intact for i in range(12)]
+        assert AD7147.parse(data, SPEC)[1][0].tolist() == [
+            i < intact for i in range(12)
+        ]
     data[:] = 0x51
     data[0, 4:6] = 0xFF
-    assert ad7147.parse(data)[1].all()
+    assert AD7147.parse(data, SPEC)[1].all()
 
 
 def test_model_converts_in_its_own_time():

@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from edge.chips import block
-from edge.chips.block import Block, FakeBlock
+from edge.chips.block import Block
+from edge.chips.chip import ChipSpec
+from edge.fake.block import FakeBlock
 from edge.fake.bus import FakeBus
 from tests.edge.chips.chips import sense
+
+SPEC = ChipSpec(Block, 0x28, tuple(range(12)))
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
@@ -32,5 +36,5 @@ def test_tells_every_single_flipped_bit():
     flipped = np.repeat(good[None], good.size * 8, axis=0)
     for i in range(good.size * 8):
         flipped[i, i // 8] ^= 1 << i % 8
-    assert block.parse(good[None], 12, 16)[1].all()
-    assert not block.parse(flipped, 12, 16)[1].any()
+    assert Block.parse(good[None], SPEC)[1].all()
+    assert not Block.parse(flipped, SPEC)[1].any()

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
-from edge.bus.i2c import BusNack
+from edge.bus.protocol import BusNack
 from edge.chips import ad7147, mpr121
-from edge.chips.ad7147 import AD7147, FakeAD7147
-from edge.chips.block import Block, FakeBlock
+from edge.chips.ad7147 import AD7147
+from edge.chips.block import Block
 from edge.chips.chip import WrongChip
-from edge.chips.mpr121 import MPR121, FakeMPR121
+from edge.chips.mpr121 import MPR121
+from edge.fake.ad7147 import FakeAD7147
+from edge.fake.block import FakeBlock
 from edge.fake.bus import FakeBus
+from edge.fake.mpr121 import FakeMPR121
 from tests.edge.chips.chips import CHIPS, VALUES, parsed, sense
 
 

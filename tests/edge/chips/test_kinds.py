@@ -1,13 +1,18 @@
 """The list of chips: a further chip is one entry. The defaults that a skin file need
 not give."""
 
+import sys
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
-from edge.bus.i2c import fetch
-from edge.chips.chip import Chip, ChipKind, Defaults, FakeChip, Option
-from edge.chips.kinds import KINDS
+from edge.bus.protocol import fetch
+from edge.chips import kinds
+from edge.chips.chip import Chip, Defaults, Option, Traits
+from edge.chips.kinds import KINDS, Kind
 from edge.errors import InputError
+from edge.fake.chip import FakeChip
 from edge.fake.player import fake_skin
 from edge.recording import Recording, save
 from edge.skin import file as skinfile
@@ -47,10 +52,27 @@ class Toy(Chip):
     """A chip of four taxels of 8 bits behind the pointer 0x10, with an identity at
     0x00."""
 
+    name = "toy"
+    stages = 4
+    options: ClassVar = {"speed": Option(1, (1, 2))}
+
     def __init__(self, bus, address, into):
         super().__init__(bus, address, b"\x10", into)
         if fetch(bus, address, b"\x00", 1) != b"\x70":
             raise self.wrong("not a toy")
+
+    @classmethod
+    def of(cls, bus, spec, into):
+        return cls(bus, spec.address, into)
+
+    @staticmethod
+    def traits(taxels, options):
+        defaults = Defaults(threshold_counts=10 * options["speed"], onset_counts=30)
+        return Traits(4, highest=200, rest=20, defaults=defaults)
+
+    @staticmethod
+    def parse(data, spec):
+        return data.astype(np.uint16), data > 0
 
     def healthy(self):
         return fetch(self.bus, self.address, b"\x00", 1) == b"\x70"
@@ -68,26 +90,11 @@ class FakeToy(FakeChip):
         self.pointer = data[0]
 
     def read(self, n, t):
-        return (
-            b"\x70" if self.pointer == 0 else self.sense(t).astype(np.uint8).tobytes()
-        )
+        if self.pointer == 0:
+            return b"\x70"
+        return self.sense(t).astype(np.uint8).tobytes()
 
 
-TOY = ChipKind(
-    name="toy",
-    description="a toy",
-    driver=lambda bus, spec, into: Toy(bus, spec.address, into),
-    parse=lambda data, spec: (data.astype(np.uint16), data > 0),
-    fake=lambda spec, sense, timed, power_up: FakeToy(sense),
-    frame_bytes=lambda spec: 4,
-    highest=lambda spec: 200,
-    rest=lambda spec: 20,
-    stages=4,
-    options={"speed": Option(1, (1, 2))},
-    defaults=lambda options: Defaults(
-        threshold_counts=options["speed"] * 10, onset_counts=30
-    ),
-)
 TOY_SKIN = """[skin]
 rows = 2
 cols = 4
@@ -100,10 +107,17 @@ chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
 """
 
 
-def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
+@pytest.fixture
+def toy(monkeypatch):
+    """The toy among the kinds of chips."""
+    kind = Kind("a toy", f"{__name__}.Toy", f"{__name__}.FakeToy")
+    monkeypatch.setitem(KINDS, "toy", kind)
+    monkeypatch.setitem(sys.modules, __name__, sys.modules[Toy.__module__])
+
+
+def test_a_further_chip_is_one_entry_of_the_list(toy, tmp_path, edge):
     """The file, the skin, the fake, `scan` and `calibrate` know it from its
     descriptor."""
-    monkeypatch.setitem(KINDS, "toy", TOY)
     file = parse(TOY_SKIN)
     assert (file.layout.threshold_counts, file.layout.onset) == (20, 30)
     picture = np.arange(8, dtype=np.uint16).reshape(2, 4) * 10
@@ -123,9 +137,16 @@ def test_a_further_chip_is_one_entry_of_the_list(monkeypatch, tmp_path, edge):
     assert (skinfile.load(path).calibration.baseline == 20).all()
 
 
-def test_an_option_belongs_to_its_kind(monkeypatch):
-    monkeypatch.setitem(KINDS, "toy", TOY)
+def test_an_option_belongs_to_its_kind(toy):
     with pytest.raises(InputError, match="speed must be one of 1, 2, not 3"):
         parse(TOY_SKIN.replace("speed = 2", "speed = 3"))
     with pytest.raises(InputError, match="bus 0 chip 0: unknown key speed"):
         parse(mpr121().replace("first", "speed = 1, first"))
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_each_kind_names_a_driver_and_its_model(name):
+    driver = kinds.driver(name)
+    assert driver.name == name
+    assert issubclass(driver, Chip)
+    assert issubclass(kinds.load(KINDS[name].model), FakeChip)

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from edge.bus.i2c import fetch, send
+from edge.bus.protocol import fetch, send
 from edge.chips import mpr121
-from edge.chips.chip import WrongChip
-from edge.chips.mpr121 import MPR121, FakeMPR121
+from edge.chips.chip import ChipSpec, WrongChip
+from edge.chips.mpr121 import MPR121
 from edge.fake.bus import FakeBus
+from edge.fake.mpr121 import FakeMPR121
 from tests.edge.chips.chips import sense
+
+SPEC = ChipSpec(MPR121, 0x5A, tuple(range(12)))
 
 
 def test_is_stopped_written_and_started_once():
@@ -34,7 +37,7 @@ def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
     data = np.zeros((1, 24), dtype=np.uint8)
     data[0, :6] = 0x34, 0x02, 0x34, 0x06, 0xFF, 0x03
     data[0, 6:8] = 0xFE, 0x03
-    values, intact = mpr121.parse(data)
+    values, intact = MPR121.parse(data, SPEC)
     assert values[0, :4].tolist() == [0x234, 0x634, 1023, 1022]
     assert intact[0].tolist() == [True, False, False, True] + [False] * 8
 

@@ -9,24 +9,24 @@ import pytest
 from edge import recording
 from edge.commands import calibrate
 from edge.commands.calibrate import (
-    RESTLESS,
-    RESTLESS_COUNTS,
+    NOISY,
+    NOISY_COUNTS,
     mean_and_deviation,
     measure,
-    restless,
+    noisiest_taxels,
     unusable,
 )
 from edge.fake.player import NOISE_COUNTS
 from edge.skin import file as skinfile
-from edge.skin.calibration import dead_band
+from edge.skin.baseline import dead_band
 
 
-def test_a_taxel_is_restless_beyond_the_limit_and_not_at_it():
+def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
     noise = np.full((3, 4), 2.0)
-    noise[0, 1] = RESTLESS * 2.0 + RESTLESS_COUNTS
-    assert restless(noise) == []
+    noise[0, 1] = NOISY * 2.0 + NOISY_COUNTS
+    assert noisiest_taxels(noise) == []
     noise[2, 3], noise[1, 0] = noise[0, 1] + 1.0, noise[0, 1] + 9.0
-    assert restless(noise) == [(1, 0), (2, 3)]
+    assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
 
 
 def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin, quiet):
@@ -100,10 +100,10 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_or_keep_their_former_
     edge, skin, quiet, monkeypatch, value, share, said
 ):
     def measured(*arguments):
-        calibration, valid, seen = measure(*arguments)
-        calibration.baseline[0, 2] = value
-        valid[0, 2] = share * seen
-        return calibration, valid, seen
+        result = measure(*arguments)
+        result.calibration.baseline[0, 2] = value
+        result.valid[0, 2] = share * result.frames
+        return result
 
     monkeypatch.setattr(calibrate, "measure", measured)
     arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)

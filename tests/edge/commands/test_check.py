@@ -66,19 +66,13 @@ def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin)
 
 
 @pytest.mark.parametrize(
-    ("more", "status", "rate", "said"),
+    ("more", "rate", "said"),
     [
-        ("", 1, 46.8, "asks for 100 Hz, but the wires carry 46.8 Hz"),
-        ("verify_mux = false\n", 1, 47.7, "but the wires carry 47.7 Hz"),
-        (
-            "region_of_interest = true\n",
-            0,
-            46.8,
-            "the chips near a contact are read at 100 Hz",
-        ),
+        ("", 46.8, "asks for 100 Hz, but the wires carry 46.8 Hz"),
+        ("verify_mux = false\n", 47.7, "but the wires carry 47.7 Hz"),
     ],
 )
-def test_check_says_where_the_wires_are_too_slow(edge, skin, more, status, rate, said):
+def test_check_says_where_the_wires_are_too_slow(edge, skin, more, rate, said):
     text = (
         skin.read_text()
         .replace("verify_mux = true", "")
@@ -86,7 +80,9 @@ def test_check_says_where_the_wires_are_too_slow(edge, skin, more, status, rate,
     )
     skin.write_text(text.replace("clock_hz = 400_000", "clock_hz = 150_000"))
     got, (event,), err = edge("check", skin)
-    assert (got, event["frame_rate_hz"], err) == (status, rate, "")
+    assert got == 1
+    assert event["frame_rate_hz"] == rate
+    assert err == ""
     assert said in " ".join(event["remarks"])
 
 

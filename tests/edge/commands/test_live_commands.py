@@ -23,7 +23,7 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     edge, tmp_path, monkeypatch, capsys
 ):
     """Its sequence number stands still."""
-    monkeypatch.setattr("edge.chips.block.FAKE_RATE_HZ", 0.0)
+    monkeypatch.setattr("edge.fake.block.RATE_HZ", 0.0)
     skin, rest = skinfile.shipped("matrix"), tmp_path / "rest.npz"
     recording.save(rest, still(skinfile.load(skin), 2.0))
     fake = ("--skin", skin, "--fake", rest, "--noise", 0)

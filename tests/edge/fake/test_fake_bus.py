@@ -5,8 +5,8 @@ import errno
 
 import pytest
 
-from edge.bus.i2c import BusError, BusGone, BusRefused, fetch, read, send, write
-from edge.chips.chip import FakeChip
+from edge.bus.protocol import BusError, BusGone, BusRefused, fetch, read, send, write
+from edge.fake.chip import FakeChip
 from edge.fake.tca9548a import FakeTCA9548A
 from tests.faulty import Fault, FaultyBus
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from edge.bus.i2c import BusRefused, bus_error
+from edge.bus.protocol import BusRefused, bus_error
 from edge.fake.clock import VirtualClock
 from edge.skin.bus_reader import (
     LONG_PAUSE_S,

@@ -21,7 +21,7 @@ PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 def served(taxels, **options):
     """A microcontroller that serves these taxels."""
     return replace(
-        CODY.chips[0], kind=block.KIND, address=0x28, mux=None, channel=None, options=options,
+        CODY.chips[0], kind=block.Block, address=0x28, mux=None, channel=None, options=options,
         taxels=tuple(taxels),
     )  # fmt: skip
 
@@ -40,7 +40,7 @@ def test_chips_of_different_kinds_make_one_skin():
         CODY,
         buses=(
             BusSpec(
-                "a", (ad, replace(mpr, kind=mpr121.KIND, options={}, address=0x5B))
+                "a", (ad, replace(mpr, kind=mpr121.MPR121, options={}, address=0x5B))
             ),
             BusSpec("b", (served(t for chip in mcu for t in chip.taxels),)),
         ),

@@ -9,9 +9,9 @@ import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
+from edge.skin.baseline import dead_band
 from edge.skin.calibration import (
     calibration_text,
-    dead_band,
     save_calibration,
     with_calibration,
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.bus.i2c import BusMissing
+from edge.bus.protocol import BusMissing
 from edge.chips import ad7147, mpr121
 from edge.chips.block import UNCHANGED_FRAMES
 from edge.errors import EdgeError, InputError
@@ -25,7 +25,7 @@ PAD = skinfile.load(skinfile.shipped("mpr121"))
 PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 
-def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
+def on_buses(n, *, kind=ad7147.AD7147, verify=False, recheck=100_000):
     """The 32 chips of Cody's skin shared out over n buses."""
     shares = [[] for _ in range(n)]
     for i, chip in enumerate(CODY.chips):
@@ -39,8 +39,8 @@ def on_buses(n, *, kind=ad7147.KIND, verify=False, recheck=100_000):
 
 @pytest.mark.parametrize(
     ("kind", "buses", "hz"),
-    [(ad7147.KIND, n, hz) for n, hz in ((1, 48.1), (2, 96.2), (3, 128.2))]
-    + [(mpr121.KIND, n, hz) for n, hz in ((1, 49.8), (4, 199.2))],
+    [(ad7147.AD7147, n, hz) for n, hz in ((1, 48.1), (2, 96.2), (3, 128.2))]
+    + [(mpr121.MPR121, n, hz) for n, hz in ((1, 49.8), (4, 199.2))],
 )
 def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
     """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32

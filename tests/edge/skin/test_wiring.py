@@ -154,4 +154,4 @@ def test_a_mistake_about_a_serial_port_is_one_sentence(old, new, said):
 
 def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
     chip = skinfile.load(skinfile.shipped("matrix")).chips[0]
-    assert replace(chip, options={"bits": 12}).highest == 4095
+    assert replace(chip, options={"bits": 12}).traits.highest == 4095

@@ -8,8 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from edge.bus import i2c
-from edge.bus.i2c import LinuxBus, bus_error, read, wire_bits, write
+from edge.bus import linux, protocol
+from edge.bus.linux import LinuxBus
+from edge.bus.protocol import bus_error, read, wire_bits, write
 from edge.errors import EdgeError
 
 
@@ -31,22 +32,22 @@ def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):
 @pytest.mark.parametrize(
     ("code", "error", "builtin"),
     [
-        (errno.EREMOTEIO, i2c.BusNack, ConnectionError),
-        (errno.ENXIO, i2c.BusNack, ConnectionError),
-        (errno.EIO, i2c.BusFault, OSError),
+        (errno.EREMOTEIO, protocol.BusNack, ConnectionError),
+        (errno.ENXIO, protocol.BusNack, ConnectionError),
+        (errno.EIO, protocol.BusFault, OSError),
         (
             errno.EPROTO,
-            i2c.BusFault,
+            protocol.BusFault,
             OSError,
         ),  # as any errno that has no name of its own
-        (errno.ETIMEDOUT, i2c.BusTimeout, TimeoutError),
-        (errno.EAGAIN, i2c.BusArbitration, BlockingIOError),
-        (errno.EBUSY, i2c.BusBusy, OSError),
-        (errno.EOPNOTSUPP, i2c.BusRefused, ValueError),
-        (errno.EINVAL, i2c.BusRefused, ValueError),
-        (errno.ENOENT, i2c.BusMissing, FileNotFoundError),
-        (errno.EACCES, i2c.BusDenied, PermissionError),
-        (errno.ENODEV, i2c.BusGone, ConnectionAbortedError),
+        (errno.ETIMEDOUT, protocol.BusTimeout, TimeoutError),
+        (errno.EAGAIN, protocol.BusArbitration, BlockingIOError),
+        (errno.EBUSY, protocol.BusBusy, OSError),
+        (errno.EOPNOTSUPP, protocol.BusRefused, ValueError),
+        (errno.EINVAL, protocol.BusRefused, ValueError),
+        (errno.ENOENT, protocol.BusMissing, FileNotFoundError),
+        (errno.EACCES, protocol.BusDenied, PermissionError),
+        (errno.ENODEV, protocol.BusGone, ConnectionAbortedError),
     ],
 )
 def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
@@ -62,19 +63,25 @@ def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
 
 def test_a_hung_transfer_is_not_sent_again_and_a_broken_one_is():
     retries = [
-        e.retries for e in (i2c.BusTimeout, i2c.BusGone, i2c.BusFault, i2c.BusNack)
+        e.retries
+        for e in (
+            protocol.BusTimeout,
+            protocol.BusGone,
+            protocol.BusFault,
+            protocol.BusNack,
+        )
     ]
     assert retries == [0, 0, 2, 3]
 
 
 def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
     with pytest.raises(
-        i2c.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"
+        protocol.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"
     ):
         LinuxBus("/dev/i2c-no-such")
     path = tmp_path / "i2c"
     path.touch()
-    with pytest.raises(i2c.BusError, match=str(path)):
+    with pytest.raises(protocol.BusError, match=str(path)):
         LinuxBus(str(path))
 
 
@@ -90,9 +97,9 @@ def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
 def test_the_process_that_holds_a_lock_is_named(tmp_path):
     path = tmp_path / "i2c"
     with path.open("w") as held, path.open("w") as wanted:
-        assert i2c.lock_holder(wanted.fileno()) == "another program"
+        assert linux.lock_holder(wanted.fileno()) == "another program"
         fcntl.flock(held, fcntl.LOCK_EX)
-        assert i2c.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")
+        assert linux.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")
 
 
 @pytest.fixture
@@ -107,8 +114,8 @@ def adapters(tmp_path):
 
 
 def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(adapters):
-    assert i2c.find_device("CP2112", adapters) == "/dev/i2c-2"
-    assert i2c.find_device("/dev/i2c-3", adapters) == "/dev/i2c-3"
+    assert linux.find_device("CP2112", adapters) == "/dev/i2c-2"
+    assert linux.find_device("/dev/i2c-3", adapters) == "/dev/i2c-3"
 
 
 @pytest.mark.parametrize(
@@ -117,5 +124,5 @@ def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(ad
 def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(
     name, said, adapters
 ):
-    with pytest.raises(i2c.BusMissing, match=f"^{name}: {said}"):
-        i2c.find_device(name, adapters)
+    with pytest.raises(protocol.BusMissing, match=f"^{name}: {said}"):
+        linux.find_device(name, adapters)

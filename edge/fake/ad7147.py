@@ -1,0 +1,89 @@
+"""A model of the AD7147-1 for the fake bus."""
+
+import random
+from typing import Self
+
+import numpy as np
+
+from edge.chips.ad7147 import (
+    BANKS,
+    CONNECTIONS,
+    DEVICE_ID,
+    REFRESH_S,
+    RESULTS,
+    STAGE_BANK,
+    STAGE_REGISTERS,
+    STAGES,
+    STATUS,
+    SYSTEM,
+)
+from edge.chips.chip import ChipSpec
+from edge.fake.chip import FakeChip, Sense
+
+
+class FakeAD7147(FakeChip):
+    """A model of the AD7147-1: the registers that the driver uses, and the results.
+
+    A running stage serves its taxel where its own input is connected, else something
+    else. A stage that does not run serves 0.
+    """
+
+    def __init__(
+        self,
+        sense: Sense,
+        *,
+        refresh_s: float = 0.0,
+        power_up: random.Random | None = None,
+    ) -> None:
+        """Model a chip.
+
+        Args:
+            sense: raw values of the 12 taxels at a time.
+            refresh_s: time of a conversion (see `REFRESH_S`): results are as old as the
+                last one; 0 for results that are always fresh.
+            power_up: draws the stage registers, which power-up leaves undefined.
+        """
+        self._sense, self._refresh = sense, refresh_s
+        self._power_up = power_up or random.Random("power-up")
+        self.reset()
+
+    @classmethod
+    def of(
+        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+    ) -> Self:
+        """The model of a skin's chip."""
+        refresh_s = REFRESH_S if timed else 0.0
+        return cls(sense, refresh_s=refresh_s, power_up=power_up)
+
+    def reset(self) -> None:
+        """Registers as after power-on."""
+        self.registers = np.zeros(0x400, dtype=np.uint16)
+        undefined = [self._power_up.randrange(1 << 16) for _ in BANKS]
+        self.registers[STAGE_BANK : STAGE_BANK + len(undefined)] = undefined
+        self.registers[DEVICE_ID] = 0x1472
+        self._pointer = 0
+
+    def write(self, data: bytes, t: float) -> None:
+        """Pointer, then words; writes to the read-only registers are lost."""
+        for i, word in enumerate(
+            np.frombuffer(data[: len(data) & ~1], dtype=">u2").tolist()
+        ):
+            if i and not STATUS <= self._pointer <= DEVICE_ID:
+                self.registers[self._pointer] = word
+            self._pointer = (self._pointer + 1 if i else word) & 0x3FF
+
+    def read(self, n: int, t: float) -> bytes:
+        """Words from the pointer on."""
+        if self._refresh > 0.0:
+            t = t // self._refresh * self._refresh
+        banks = self.registers[STAGE_BANK : STAGE_BANK + len(BANKS)]
+        connections = banks.reshape(STAGES, STAGE_REGISTERS)[:, :3]
+        power = int(self.registers[SYSTEM])
+        last = power >> 4 & 15 if power & 3 == 0 else -1
+        as_set = (connections == CONNECTIONS).all(axis=1)
+        results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
+        results[last + 1 :] = 0
+        self.registers[RESULTS : RESULTS + STAGES] = results
+        first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
+        served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
+        return served.ljust(n, b"\0")[:n]

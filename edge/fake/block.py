@@ -1,0 +1,58 @@
+"""A model of a microcontroller that serves frames, for the fake bus."""
+
+import random
+from typing import Self
+
+import numpy as np
+
+from edge.bus.crc import sealed
+from edge.chips.block import FRAME, IDENTITY, identity, pack
+from edge.chips.chip import ChipSpec
+from edge.clock import TIME_ROUNDING_S
+from edge.fake.chip import FakeChip, Sense
+
+RATE_HZ = 100.0
+"""Samples a second of the model; its sequence number counts them."""
+
+
+class FakeBlock(FakeChip):
+    """A model of a microcontroller that serves frames."""
+
+    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
+        """Model one.
+
+        Args:
+            sense: raw values at a time.
+            taxels: number of taxels that it serves.
+            bits: of one taxel.
+        """
+        self._sense, self._taxels, self._bits = sense, taxels, bits
+        self._pointer = 0
+
+    @classmethod
+    def of(
+        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+    ) -> Self:
+        """The model of a skin's chip."""
+        return cls(sense, taxels=len(spec.taxels), bits=spec.option("bits"))
+
+    def reset(self) -> None:
+        """No-op: a microcontroller has no settings to lose."""
+
+    def write(self, data: bytes, t: float) -> None:
+        """The pointer; nothing can be written."""
+        if data:
+            self._pointer = data[0]
+
+    def read(self, n: int, t: float) -> bytes:
+        """The identity or the frame, then zeros."""
+        out = b""
+        if self._pointer == IDENTITY[0]:
+            out = identity(self._taxels, self._bits)
+        elif self._pointer == FRAME[0]:
+            sample = int((t + TIME_ROUNDING_S) * RATE_HZ)
+            values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
+            out = sealed(
+                (sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits)
+            )
+        return out[:n].ljust(n, b"\0")

@@ -1,0 +1,44 @@
+"""A model of a chip on a fake bus."""
+
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.chips.chip import ChipSpec
+
+Sense = Callable[[float], NDArray[np.uint16]]
+"""Raw values (taxels,) that a fake chip senses at a time in seconds."""
+
+
+class FakeChip(ABC):
+    """A model of a chip on a fake bus."""
+
+    @classmethod
+    def of(
+        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+    ) -> Self:
+        """The model of a skin's chip.
+
+        Args:
+            spec: the chip.
+            sense: raw values of its taxels at a time.
+            timed: whether conversions take their real time.
+            power_up: draws the registers that power-up leaves undefined.
+        """
+        return cls(sense)  # type: ignore[call-arg] # most models take nothing else
+
+    @abstractmethod
+    def write(self, data: bytes, t: float) -> None:
+        """Take the bytes of one write message at time `t`."""
+
+    @abstractmethod
+    def read(self, n: int, t: float) -> bytes:
+        """Serve the `n` bytes of one read message at time `t`."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Lose all settings, as in a brown-out."""
