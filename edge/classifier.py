@@ -1,5 +1,4 @@
-"""The classifier: frames in, events out; shared by live reading, replay, the demo and
-the tests."""
+"""The classifier: frames in, events out; shared by live reading, replay and the demo."""
 
 from __future__ import annotations
 
@@ -11,44 +10,43 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from edge.errors import InputError, OutOfRange
+from edge.errors import OutOfRange
 from edge.events import Decided, Event, Onset, Release
-from edge.model.agreement import product_label
-from edge.model.model import Decision, Model, require_joints
-from edge.model.stopping import NOVELTY_RATE, UNKNOWN, StoppingRule, check_rate, margin
-from edge.recording import Recording
+from edge.model.model import Decision, Model
+from edge.model.novelty import NOVELTY_RATE, check_rate
+from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
+    from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
 
-AS_TRAINED = "as_trained"
-"""Flag of a decision at distance 0 from a training trial: the two have the same
-coordinates, which are all that the model compares. Nearly always the touch is that
-trial, replayed. Features that were constant in training, or have no weight in the
-projection, may differ."""
-OUT_OF_RANGE = "out_of_range"
-"""Flag of a decision on features that lie far outside those of the training trials. The
-model cuts them off before it compares them; features that it cannot scale at all get no
-label."""
-GAP_SHARE, GAP_S = 0.25, 0.1
-"""Between two frames, a step of more than this share of the window and of more than
-this time is a gap: the samples in it are interpolated from its ends."""
+GAP_SHARE = 0.25
+"""A step between two frames of more than this share of the window is a gap: the samples
+in it are interpolated from its ends."""
+GAP_S = 0.1
+"""A step of at most this time is no gap, however short the window."""
 
 
 @dataclass
-class _Waiting:
-    """A contact for which some tasks are not decided yet."""
+class Pending:
+    """A contact for which some tasks are not decided yet.
+
+    Attributes:
+        contact: that is followed.
+        number: of the contact, from 1.
+        decision_point: index of the next of the model's decision points.
+        tasks: that wait; a product stands behind its factors.
+        decided: the answers so far, by task.
+    """
 
     contact: Contact
     number: int
     decision_point: int
-    """Index of the next of the model's decision points."""
     tasks: list[str]
-    """The tasks that wait; a product stands behind its factors."""
     decided: dict[str, Decided] = field(default_factory=dict)
 
 
@@ -126,22 +124,32 @@ class Classifier:
                 outside (0, 1), or the model certifies the error rate for no task.
         """
         check_rate(novelty_rate, "the novelty rate")
-        self._rules = {} if error is None else stopping_rules(model, error)
-        self.model, self.error, self.novelty_rate = model, error, novelty_rate
-        self._max_contacts, self._motion_on_skin = max_contacts, motion_on_skin
+        self.model = model
+        self.error = error
+        self.novelty_rate = novelty_rate
+        self._max_contacts = max_contacts
+        self._motion_on_skin = motion_on_skin
+        self._policies = self._policy_of_each_task()
         self.tracker = model.info.tracker(
             layout or model.info.layout,
             max_contacts=max_contacts,
             motion_on_skin=motion_on_skin,
         )
         self.layout = self.tracker.layout
-        self._waiting: list[_Waiting] = []
+        self._pending: list[Pending] = []
         self._numbers: dict[Contact, int] = {}
         """The numbers of the contacts under way."""
         self._begun = 0
         self._end_s: float | None = None
         self._missing_taxels = False
         self._strongest = 0
+
+    def _policy_of_each_task(self) -> Mapping[str, Policy]:
+        if self.error is None:
+            return dict.fromkeys(self.model.info.tasks, FullWindow(self.model.info))
+        from edge.early import policies  # few programs decide early
+
+        return policies(self.model, self.error)
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -153,65 +161,76 @@ class Classifier:
         events: list[Event] = []
         self._end_s = frame.t
         if self._begun == 0:
-            readable = np.True_ if frame.valid is None else frame.valid
-            strongest = int(frame.counts.max(initial=0, where=readable))
-            self._strongest = max(self._strongest, strongest)
-            self._missing_taxels |= bool((self.layout.alive & ~readable).any())
+            self._note_untouched(frame)
         for contact in self.tracker.push(frame):
             if contact not in self._numbers:
-                self._begun += 1
-                self._numbers[contact] = number = self._begun
-                first = (
-                    0
-                    if self.error is not None
-                    else len(self.model.decision_points_s) - 1
-                )
-                info = self.model.info
-                tasks = sorted(info.tasks, key=info.products.__contains__)
-                self._waiting.append(_Waiting(contact, number, first, tasks))
-                events.append(Onset(contact.onset_s, self._named(number)))
+                events.append(self._begin(contact))
             if contact.ended:
                 number = self._numbers.pop(contact)
                 events.append(Release(contact.onset_s, frame.t, self._named(number)))
-        for waiting in list(self._waiting):
-            age = frame.t - waiting.contact.onset_s
-            while (
-                waiting.tasks
-                and age >= self.model.decision_points_s[waiting.decision_point]
-            ):
-                events += self._decide(waiting, began)
-            if not waiting.tasks:
-                self._waiting.remove(waiting)
+        points_s = self.model.decision_points_s
+        for pending in list(self._pending):
+            age_s = frame.t - pending.contact.onset_s
+            while pending.tasks and age_s >= points_s[pending.decision_point]:
+                events += self._decide(pending, began)
+            if not pending.tasks:
+                self._pending.remove(pending)
         return events
 
+    def _note_untouched(self, frame: Frame) -> None:
+        """Note how near a frame came to a contact, while there has been none."""
+        readable = np.True_ if frame.valid is None else frame.valid
+        strongest = int(frame.counts.max(initial=0, where=readable))
+        self._strongest = max(self._strongest, strongest)
+        self._missing_taxels |= bool((self.layout.alive & ~readable).any())
+
+    def _begin(self, contact: Contact) -> Onset:
+        """Number a contact, and let its tasks wait."""
+        self._begun += 1
+        self._numbers[contact] = self._begun
+        info = self.model.info
+        last = len(self.model.decision_points_s) - 1
+        first = last if self.error is None else 0
+        tasks = sorted(info.tasks, key=info.products.__contains__)
+        self._pending.append(Pending(contact, self._begun, first, tasks))
+        return Onset(contact.onset_s, self._named(self._begun))
+
     def finish(self) -> list[Event]:
-        """End the stream: decide the tasks that wait, flagged `short`, or that no
-        contact came."""
+        """End the stream, and decide what waits.
+
+        Tasks that wait are flagged `short`. If no contact came, the tasks that have a
+        label for it are decided.
+        """
         began = time.perf_counter()
-        unfinished, self._waiting = self._waiting, []
         if self._begun == 0 and self._end_s is not None:
             return list(self._untouched(self._end_s, began))
-        return [
-            event for w in unfinished for event in self._decide(w, began, short=True)
-        ]
+        events: list[Event] = []
+        for pending in self._pending:
+            pending.decision_point = len(self.model.decision_points_s) - 1
+            events += self._decide(pending, began, short=True)
+        self._pending = []
+        return events
 
     def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
-        """Decisions on a stream without contact, for the tasks that have a label for
-        it."""
-        near = self._strongest > self.layout.threshold_counts
+        """Decisions on a stream without contact, of tasks that have a label for it."""
         doubts = {
             "no_contact": True,
             "missing_taxels": self._missing_taxels,
-            "near_contact": near,
+            "near_contact": self._strongest > self.layout.threshold_counts,
         }
-        strongest = round(self._strongest / max(self.layout.onset, 1), 3)
         for name, task in self.model.info.tasks.items():
             if task.no_contact is not None:
-                latency_ms = round((time.perf_counter() - began) * 1e3, 3)
                 yield Decided(
-                    name, task.no_contact, 1.0, 0.0, end_s, latency_ms, _flags(doubts),
-                    strongest=strongest, model=self.model.named,
-                )  # fmt: skip
+                    name,
+                    task.no_contact,
+                    confidence=1.0,
+                    window_s=0.0,
+                    onset_s=end_s,
+                    latency_ms=_milliseconds_since(began),
+                    flags=flags_of(doubts),
+                    strongest=round(self._strongest / max(self.layout.onset, 1), 3),
+                    model=self.model.named,
+                )
 
     def classify(self, recording: Recording) -> Iterator[Event]:
         """Decide on a recording as the board would have; this classifier's own state
@@ -250,7 +269,7 @@ class Classifier:
         from edge.skin.loop import Loop  # a replay needs no bus
 
         if joints is None and not self._motion_on_skin:
-            require_joints(self.model, None, "the skin")
+            self.model.require_joints(None, "the skin")
         yield from self._afresh(
             skin.layout, Loop(skin, joints=joints, lasts_s=lasts_s).frames()
         )
@@ -258,9 +277,13 @@ class Classifier:
     def _afresh(self, layout: SkinLayout, frames: Iterable[Frame]) -> Iterator[Event]:
         """The events of a stream of its own, with this classifier's settings."""
         fresh = Classifier(
-            self.model, layout, error=self.error, novelty_rate=self.novelty_rate,
-            max_contacts=self._max_contacts, motion_on_skin=self._motion_on_skin,
-        )  # fmt: skip
+            self.model,
+            layout,
+            error=self.error,
+            novelty_rate=self.novelty_rate,
+            max_contacts=self._max_contacts,
+            motion_on_skin=self._motion_on_skin,
+        )
         for frame in frames:
             yield from fresh.push(frame)
         yield from fresh.finish()
@@ -270,129 +293,92 @@ class Classifier:
         return number if self._max_contacts > 1 else None
 
     def _decide(
-        self, waiting: _Waiting, began: float, *, short: bool = False
+        self, pending: Pending, began: float, *, short: bool = False
     ) -> list[Decided]:
-        """Ask the model about a contact; returns the answers of the tasks that are now
-        decided."""
-        info = self.model.info
-        if short:
-            waiting.decision_point = len(self.model.decision_points_s) - 1
-        decision_point = waiting.decision_point
-        window_s = self.model.decision_points_s[decision_point]
-        contact, series = waiting.contact, waiting.contact.series()
+        """Ask the model about a contact; the answers of the tasks now decided."""
+        point = pending.decision_point
+        window_s = self.model.decision_points_s[point]
+        series = pending.contact.series()
         longest_s = np.diff(np.minimum(series.t, window_s)).max(initial=0.0)
-        doubts = {
-            "short": short,
-            "gap": longest_s > max(GAP_SHARE * window_s, GAP_S),
-            "missing_taxels": contact.missing_taxels,
-            "missing_pose": contact.missing_pose,
-            "skin_motion": contact.chain is None and info.chain is not None,
-        }
-        flags, position = _flags(doubts), None
-        if self._max_contacts > 1 and (at := contact.position()) is not None:
-            x, y, z = (round(value, 6) for value in at)
-            position = x, y, z
-        number = self._named(waiting.number)
-        answers = [
-            Decided(task, None, 0.0, window_s, contact.onset_s, 0.0, flags, contact=number,
-                    position=position, model=self.model.named)
-            for task in waiting.tasks
-        ]  # fmt: skip
+        gap = longest_s > max(GAP_SHARE * window_s, GAP_S)
+        blank = self._blank(pending, window_s, {"short": short, "gap": gap})
         try:
-            vector = info.vector(series, window_s)
-            decisions = self.model.decide(
-                vector, None if self.error is None else decision_point
-            )
+            vector = self.model.info.vector(series, window_s)
+            decisions = self.model.decide(vector, None if self.error is None else point)
         except OutOfRange:
-            answers = [
-                replace(answer, flags=(*flags, OUT_OF_RANGE)) for answer in answers
-            ]
+            blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
+            answers = [replace(blank, task=task) for task in pending.tasks]
         else:
-            novel, novelty = 1.0, info.novelty
-            if novelty is not None:
-                distance = float(decisions[novelty.task].distances[0])
-                novel = novelty.rate(decision_point, distance)
-            for blank in answers:
-                answer = self._answer(waiting, blank, decisions[blank.task], novel)
-                if answer is not None:
-                    waiting.decided[answer.task] = answer
-            answers = [
-                waiting.decided[t] for t in waiting.tasks if t in waiting.decided
-            ]
-        waiting.decision_point += 1
+            answers = self._answers(pending, blank, decisions)
+        pending.decision_point += 1
         for answer in answers:
-            waiting.tasks.remove(answer.task)
-        latency_ms = round((time.perf_counter() - began) * 1e3, 3)
+            pending.tasks.remove(answer.task)
+        latency_ms = _milliseconds_since(began)
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
-    def _answer(
-        self, waiting: _Waiting, blank: Decided, decision: Decision, novel: float
-    ) -> Decided | None:
-        """A task's answer at a decision point; None if the task goes on waiting.
-
-        Args:
-            waiting: the contact.
-            blank: the task's answer, without a label yet.
-            decision: of the model.
-            novel: the smallest novelty rate at which the contact counts as unknown.
-        """
-        info, at, error = self.model.info, waiting.decision_point, self.error
-        task, rule = info.tasks[blank.task], self._rules.get(blank.task)
-        label, confidence = decision.label, decision.confidence
-        unknown = novel <= self.novelty_rate
-        nameless = sure = False
-        if error is not None and task.factors:
-            if not waiting.decided.keys() >= task.factors.keys():
-                return None
-            factors = {factor: waiting.decided[factor] for factor in task.factors}
-            indices = {
-                f: info.tasks[f].labels.index(str(d.label)) for f, d in factors.items()
-            }
-            label = task.labels[product_label(task.factors, indices)]
-            confidence = math.prod(decided.confidence for decided in factors.values())
-            sure = all(
-                decided.stopped_by == "confidence" for decided in factors.values()
-            )
-            decision = decision._replace(label=label)
-        elif error is not None:
-            assert decision.label_distances is not None
-            stopping = info.stopping[blank.task]
-            evidence = margin(
-                decision.label_distances.tolist(), task.labels.index(label)
-            )
-            confidence = stopping.confidence(at, evidence)
-            sure = rule is not None and stopping.sure(rule, evidence)
-            full = len(self.model.decision_points_s) - 1
-            last = full if rule is None or unknown else rule.last
-            if at < last and (unknown or not sure):
-                return None
-        if error is not None and unknown and info.novelty is not None:
-            nameless = blank.task == info.novelty.task
-        if nameless:
-            label, confidence = UNKNOWN, 1.0 - novel
+    def _blank(
+        self, pending: Pending, window_s: float, doubts: Mapping[str, bool]
+    ) -> Decided:
+        """An answer about a contact without task and label."""
+        contact = pending.contact
         doubts = {
-            AS_TRAINED: decision.distances[0] == 0.0,
-            OUT_OF_RANGE: decision.out_of_range,
-            "unknown": unknown,
-            "tie": error is None and decision.tie,
-            "unsure": not (rule is None or rule.fixed or sure or nameless),
-            "uncertified": error is not None and rule is None,
+            **doubts,
+            "missing_taxels": contact.missing_taxels,
+            "missing_pose": contact.missing_pose,
+            "skin_motion": contact.chain is None and self.model.info.chain is not None,
         }
-        return replace(
-            blank,
-            label=label,
-            confidence=confidence if error is None else round(confidence, 6),
-            flags=(*blank.flags, *_flags(doubts)),
-            error=None if rule is None else error,
-            stopped_by=None if rule is None else "confidence" if sure else "window",
-            nearest=tuple(map(info.trial, decision.neighbours.tolist())),
-            decision=decision,
+        return Decided(
+            task="",
+            label=None,
+            confidence=0.0,
+            window_s=window_s,
+            onset_s=contact.onset_s,
+            latency_ms=0.0,
+            flags=flags_of(doubts),
+            contact=self._named(pending.number),
+            position=self._position(contact),
+            model=self.model.named,
         )
 
+    def _position(self, contact: Contact) -> tuple[float, float, float] | None:
+        """Where a contact is, if several are followed and it is known."""
+        position = contact.position() if self._max_contacts > 1 else None
+        if position is None:
+            return None
+        x, y, z = (round(value, 6) for value in position)
+        return x, y, z
 
-def _flags(doubts: Mapping[str, bool]) -> tuple[str, ...]:
-    """The names of the doubts that hold."""
-    return tuple(flag for flag, holds in doubts.items() if holds)
+    def _answers(
+        self, pending: Pending, blank: Decided, decisions: Mapping[str, Decision]
+    ) -> list[Decided]:
+        """The answers of the tasks that need not wait any longer."""
+        unknown = self._novelty(pending, decisions) <= self.novelty_rate
+        answers = []
+        for task in pending.tasks:
+            question = Question(
+                replace(blank, task=task),
+                decisions[task],
+                unknown,
+                pending.decision_point,
+                pending.decided,
+            )
+            answer = self._policies[task].answer(question)
+            if answer is not None:
+                pending.decided[task] = answer
+                answers.append(answer)
+        return answers
+
+    def _novelty(self, pending: Pending, decisions: Mapping[str, Decision]) -> float:
+        """The smallest novelty rate at which the contact counts as unknown."""
+        novelty = self.model.info.novelty
+        if novelty is None:
+            return 1.0
+        distance = float(decisions[novelty.task].distances[0])
+        return novelty.rate(pending.decision_point, distance)
+
+
+def _milliseconds_since(began: float) -> float:
+    return round((time.perf_counter() - began) * 1e3, 3)
 
 
 def suited(model: Model, recording: Recording, name: str) -> Recording:
@@ -403,36 +389,5 @@ def suited(model: Model, recording: Recording, name: str) -> Recording:
     """
     if model.info.chain is not None:
         recording = recording.for_joints(model.info.chain.names, name)
-    require_joints(model, recording.dof, name)
+    model.require_joints(recording.dof, name)
     return recording
-
-
-def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:
-    """{task: the fastest stopping rule that is certified for an error rate, or None}.
-
-    Raises:
-        InputError: the rate is outside (0, 1), or is certified for no task; the message
-            names the errors that are.
-    """
-    check_rate(error, "the error rate")
-    if not model.info.decision_points_s:
-        raise InputError(
-            f"{model.path}: the model has no calibration, so no error rate can be held; "
-            "export it with --decision-points"
-        )
-    if model.info.taught:
-        raise InputError(
-            f"{model.path}: was taught {model.info.taught} trials after its error rates were "
-            "certified; leave --error out, or export a model with these trials"
-        )
-    rules = {
-        task: stopping.rule(error) for task, stopping in model.info.stopping.items()
-    }
-    if not any(rules.values()):
-        reasons = (
-            f"{task}: {s.refusal(error)}" for task, s in model.info.stopping.items()
-        )
-        raise InputError(
-            f"{model.path}: an error of {error:g} cannot be certified; {'; '.join(reasons)}"
-        )
-    return rules

@@ -35,7 +35,8 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from edge.errors import InputError
-from edge.model.stopping import NOVELTY_RATE, Novelty, Stopping, margin
+from edge.model.novelty import NOVELTY_RATE, Novelty
+from edge.model.stopping import Stopping, margin
 from edge.touch.features import FEATURES
 from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following

@@ -1,16 +1,24 @@
-"""Command-line options that several commands share, and the checks that go with
-them."""
+"""Command-line options that several commands share, and their checks."""
+
+from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
-from edge.classifier import stopping_rules
 from edge.commands.output import LOG
 from edge.errors import InputError
-from edge.model.model import Model
-from edge.touch.arm import Chain
+
+if TYPE_CHECKING:
+    from edge.model.model import Model
+    from edge.touch.arm import Chain
+
+NOISE_COUNTS = 0.7
+"""Noise of the fake skins that commands open, below that from which a chip that always
+serves the same bytes is stuck: a fake may be calibrated with noise, and then played
+without."""
 
 
 def within(kind: type, low: float, high: float) -> Callable[[str], float]:
@@ -52,8 +60,8 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fake",
         metavar="REC.npz",
-        help="need no hardware: play this recording onto fake chips, as fast as possible; without "
-        "--skin, the chips are chosen to suit the recording",
+        help="need no hardware: play this recording onto fake chips, as fast as "
+        "possible; without --skin, the chips are chosen to suit the recording",
     )
     add_noise(parser, "the fake chips of a --skin")
     parser.add_argument(
@@ -74,8 +82,6 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
 
 def add_noise(parser: argparse.ArgumentParser, chips: str) -> None:
     """Add the option for the noise of fake chips; its help names them by `chips`."""
-    from edge.fake.player import NOISE_COUNTS  # a replay needs no chips
-
     parser.add_argument(
         "--noise",
         type=within(float, 0.0, 1000.0),
@@ -96,17 +102,17 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
     parser.add_argument(
         "--joints",
         metavar="stdin|udp:[HOST:]PORT",
-        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add "names": '
-        "[joints] if they are not in the arm's order; without HOST, the port listens on the "
-        "loopback interface",
+        help='read joint angles as JSON lines {"t": seconds, "q": [radians]}; add '
+        '"names": [joints] if they are not in the arm\'s order; without HOST, the port '
+        "listens on the loopback interface",
     )
     parser.add_argument(
         "--web",
         metavar="HOST:PORT",
         nargs="?",
         const="127.0.0.1:8000",
-        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; open the "
-        f"link that is printed, with its token{web}",
+        help="show the skin live on a page for a browser, by default at 127.0.0.1:8000; "
+        f"open the link that is printed, with its token{web}",
     )
 
 
@@ -138,6 +144,8 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
             not suit it.
     """
     if arguments.arm is not None:
+        from edge.touch.arm import Chain
+
         return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
     if arguments.base is not None or arguments.tip is not None:
         raise InputError("--base and --tip need --arm arm.urdf")
@@ -151,8 +159,8 @@ def add_error(parser: argparse.ArgumentParser) -> None:
         "--error",
         type=float,
         metavar="RATE",
-        help="decide as early as possible with at most this share of wrong labels (0.1: one in "
-        "ten); without it, decide at the end of the window",
+        help="decide as early as possible with at most this share of wrong labels (0.1: "
+        "one in ten); without it, decide at the end of the window",
     )
 
 
@@ -164,14 +172,17 @@ def check_error(model: Model, error: float | None) -> None:
     """
     if error is None:
         return
+    from edge.early import stopping_rules
+
     for task, rule in stopping_rules(model, error).items():
         if rule is None:
             LOG.warning(
-                f"{task}: decided at the end of the window, as an error of {error:g} cannot be "
-                f"certified: {model.info.stopping[task].refusal(error)}"
+                f"{task}: decided at the end of the window, as an error of {error:g} "
+                f"cannot be certified: {model.info.stopping[task].refusal(error)}"
             )
+            continue
+        if rule.fixed:
+            time = f"always after {model.decision_points_s[rule.last]:g} s"
         else:
-            fixed = f"always after {model.decision_points_s[rule.last]:g} s"
-            sure = f"when sure, in training after {rule.mean_s:.2f} s on average"
-            how = fixed if rule.fixed else sure
-            LOG.info(f"{task}: decided {how}; at most {rule.error:.1%} wrong")
+            time = f"when sure, in training after {rule.mean_s:.2f} s on average"
+        LOG.info(f"{task}: decided {time}; at most {rule.error:.1%} wrong")

@@ -1,12 +1,11 @@
-"""Output of a command: text for a person, JSON lines for a program, and messages on
-stderr."""
+"""Output of a command: text for a person, JSON lines for a program, messages."""
 
 import argparse
 import logging
 import shutil
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 from edge.errors import printable
@@ -40,8 +39,7 @@ class Output:
         print(self.line(line, text), flush=True)
 
     def line(self, line: Mapping[str, Any], text: str | None = None) -> str:
-        """The text that `event` prints; it has no control characters but line
-        breaks."""
+        """The text that `event` prints, without control characters but line breaks."""
         if self.as_json:
             return json_line(line)
         lines = (event_text(line) if text is None else text).split("\n")
@@ -64,7 +62,7 @@ def bar(share: float) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """A number of things.
+    """A count with its noun: "1 chip", "2 chips".
 
     >>> counted(1, "chip"), counted(2, "chip")
     ('1 chip', '2 chips')
@@ -84,56 +82,101 @@ def event_text(line: Mapping[str, Any]) -> str:
     >>> event_text({"event": "onset", "onset_s": 0.25})
     '   0.250 s  contact'
     """
-    kind = line["event"]
-    contact = f" {line['contact']}" if "contact" in line else ""
-    if kind == "onset":
-        return f"{line['onset_s']:8.3f} s  contact{contact}"
-    if kind == "decision":
-        return decision_text(line, contact and f"{contact}:")
-    if kind == "release":
-        duration = line["release_s"] - line["onset_s"]
-        return f"{line['release_s']:8.3f} s  released{contact} after {duration:.2f} s"
-    if kind == "chip":
-        error = f": {line['error']}" if line.get("error") else ""
-        return f"{line['t']:8.3f} s  {line['bus']}, {line['place']} is {line['state']}{error}"
-    if kind == "bus":
-        again = (
-            "; it is opened again until it answers" if line["state"] == "lost" else ""
-        )
-        return f"{line['t']:8.3f} s  {line['bus']} is {line['state']}{again}"
-    if kind == "taxels":
-        silent = f"taxels without a valid value for {line['frames']} frames: {line['invalid']}"
-        return f"{line['t']:8.3f} s  {silent if line['invalid'] else 'all taxels are valid again'}"
-    if kind == "end":
-        period = line["period_ms"]
-        median = f", one every {period['p50']:g} ms (99 % within {period['p99']:g})"
-        return f"{line['frames']} frames{median if period else ''}, {line['missed_ticks']} missed"
-    if kind == "saved":
-        labels = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
-        cut = (
-            ""
-            if line["complete"]
-            else "; incomplete: reading stopped before the contact's end"
-        )
-        return f"{line['file']}: {line['seconds']:g} s, {line['frames']} frames, {labels}{cut}"
-    if kind == "unknown_touches":
-        return f"{line['unknown']} of the last {line['touches']} touches are unknown to the model"
-    if kind == "deleted":
-        return f"{line['file']} is deleted"
-    return "no contact" if kind == "no_contact" else json_line(line)
+    text = TEXTS.get(line["event"], json_line)
+    return text(line)
 
 
-def decision_text(line: Mapping[str, Any], contact: str = "") -> str:
+def _contact(line: Mapping[str, Any]) -> str:
+    """The number of a contact, where several are followed."""
+    return f" {line['contact']}" if "contact" in line else ""
+
+
+def _onset(line: Mapping[str, Any]) -> str:
+    return f"{line['onset_s']:8.3f} s  contact{_contact(line)}"
+
+
+def decision_text(line: Mapping[str, Any]) -> str:
     """A decision as text: its time, task, label, confidence and flags."""
     label = "out of range" if line["label"] is None else line["label"]
     notes = [", ".join(line["flags"])] if line["flags"] else []
     if "strongest" in line:
-        notes.append(
-            f"the strongest taxel came to {line['strongest']:.0%} of the onset"
-        )
+        share = f"{line['strongest']:.0%}"
+        notes.append(f"the strongest taxel came to {share} of the onset")
     if "expected" in line and line["expected"] != line["label"]:
         notes.append(f"labelled {line['expected']}")
     time = line["onset_s"] + line["window_s"]
+    number = _contact(line)
+    contact = number and f"{number}:"
     confidence = f"{bar(line['confidence'])} {line['confidence']:4.0%}"
     text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16} {confidence}"
-    return text + (f"  ({'; '.join(notes)})" if notes else "")
+    return f"{text}  ({'; '.join(notes)})" if notes else text
+
+
+def _release(line: Mapping[str, Any]) -> str:
+    duration = line["release_s"] - line["onset_s"]
+    contact = _contact(line)
+    return f"{line['release_s']:8.3f} s  released{contact} after {duration:.2f} s"
+
+
+def _chip(line: Mapping[str, Any]) -> str:
+    error = f": {line['error']}" if line.get("error") else ""
+    place = f"{line['bus']}, {line['place']}"
+    return f"{line['t']:8.3f} s  {place} is {line['state']}{error}"
+
+
+def _bus(line: Mapping[str, Any]) -> str:
+    lost = line["state"] == "lost"
+    retried = "; it is opened again until it answers" if lost else ""
+    return f"{line['t']:8.3f} s  {line['bus']} is {line['state']}{retried}"
+
+
+def _taxels(line: Mapping[str, Any]) -> str:
+    if not line["invalid"]:
+        return f"{line['t']:8.3f} s  all taxels are valid again"
+    silent = f"taxels without a valid value for {line['frames']} frames"
+    return f"{line['t']:8.3f} s  {silent}: {line['invalid']}"
+
+
+def _end(line: Mapping[str, Any]) -> str:
+    text = f"{line['frames']} frames"
+    period = line["period_ms"]
+    if period:
+        text += f", one every {period['p50']:g} ms (99 % within {period['p99']:g})"
+    return f"{text}, {line['missed_ticks']} missed"
+
+
+def _saved(line: Mapping[str, Any]) -> str:
+    labels = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
+    text = f"{line['seconds']:g} s, {line['frames']} frames, {labels}"
+    if not line["complete"]:
+        text += "; incomplete: reading stopped before the contact's end"
+    return f"{line['file']}: {text}"
+
+
+def _unknown_touches(line: Mapping[str, Any]) -> str:
+    touches = f"{line['unknown']} of the last {line['touches']} touches"
+    return f"{touches} are unknown to the model"
+
+
+def _deleted(line: Mapping[str, Any]) -> str:
+    return f"{line['file']} is deleted"
+
+
+def _no_contact(_: Mapping[str, Any]) -> str:
+    return "no contact"
+
+
+TEXTS: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "onset": _onset,
+    "decision": decision_text,
+    "release": _release,
+    "chip": _chip,
+    "bus": _bus,
+    "taxels": _taxels,
+    "end": _end,
+    "saved": _saved,
+    "unknown_touches": _unknown_touches,
+    "deleted": _deleted,
+    "no_contact": _no_contact,
+}
+"""The text of each event; that of any other is its JSON."""

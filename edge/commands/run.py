@@ -17,8 +17,9 @@ from edge.commands.output import LOG
 from edge.commands.source import reading
 from edge.events import Decided, Event
 from edge.model.model import Model
+from edge.model.novelty import UNKNOWN
+from edge.output.event_writer import LineWriter
 from edge.output.systemd import Notifier
-from edge.output.touch_map import map_writer
 from edge.skin.loop import Schedule
 from edge.touch.track import MAX_CONTACTS
 
@@ -65,47 +66,46 @@ class UnknownTouches:
         self._noticed = False
 
     def push(self, events: Sequence[Event]) -> dict[str, Any] | None:
-        """Take in events; returns the event of the notice, which is also logged, when
-        it is due."""
+        """Take in events; the event of the notice, once, which is also logged."""
         for event in events:
             if isinstance(event, Decided):
                 touch = event.onset_s, event.contact
-                self._touches[touch] = (
-                    self._touches.get(touch, False) or "unknown" in event.flags
-                )
-        for old in list(self._touches)[:-LAST_TOUCHES]:
-            del self._touches[old]
-        unknown, touches = sum(self._touches.values()), len(self._touches)
-        if self._noticed or touches < FEWEST_TOUCHES or 2 * unknown <= touches:
+                unknown = UNKNOWN in event.flags
+                self._touches[touch] = unknown or self._touches.get(touch, False)
+        for touch in list(self._touches)[:-LAST_TOUCHES]:
+            del self._touches[touch]
+        count = sum(self._touches.values())
+        touches = len(self._touches)
+        if self._noticed or touches < FEWEST_TOUCHES or 2 * count <= touches:
             return None
         self._noticed = True
         LOG.warning(
-            f"{unknown} of the last {touches} touches are unlike all training trials: the model "
-            "does not know these things. Record some touches of them, and add them with "
-            f"`edge-classify teach --new-labels --model {self._model} REC...`"
+            f"{count} of the last {touches} touches are unlike all training trials: "
+            "the model does not know these things. Record some touches of them, and "
+            "add them with `edge-classify teach --new-labels --model "
+            f"{self._model} REC...`"
         )
-        return {"event": "unknown_touches", "unknown": unknown, "touches": touches}
+        return {"event": "unknown_touches", "unknown": count, "touches": touches}
 
 
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
-    """The last event: how well the loop kept its period, and how many lines were
-    lost."""
-    periods = schedule.periods
-    percentiles = (50, 99, 99.9) if periods.n else ()
-    return {
+    """The last event: the loop's periods and the number of lines that were lost."""
+    periods = {}
+    if schedule.periods.n:
+        for percentage in (50, 99, 99.9):
+            period_ms = schedule.periods.percentile(percentage) * 1e3
+            periods[f"p{percentage:g}"] = round(period_ms, 2)
+    event = {
         "event": "end",
         "frames": frames,
         "missed_ticks": schedule.missed_ticks,
-        "period_ms": {
-            f"p{p:g}": round(periods.percentile(p) * 1e3, 2) for p in percentiles
-        },
-        **({"lost": lost} if lost else {}),
+        "period_ms": periods,
     }
+    return {**event, "lost": lost} if lost else event
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, decide and print until the recording ends, or the user or systemd stops
-    it."""
+    """Read, decide and print until the recording ends, or someone stops it."""
     model = Model(arguments.model)
     check_error(model, arguments.error)
     on_skin = arguments.without_joints == "skin"
@@ -120,16 +120,18 @@ def run(arguments: argparse.Namespace) -> int:
             max_contacts=1 if arguments.map is None else MAX_CONTACTS,
             motion_on_skin=on_skin,
         )
-        maps = [] if arguments.map is None else [map_writer(arguments.map, model.info)]
-        with closing(live.lines(arguments.udp, maps)) as lines:
-            notifier.ready(f"reading {live.source}")
-            frames, unknown_touches = 0, UnknownTouches(arguments.model)
+        writers = _map_writers(arguments.map, model)
+        with closing(live.lines(arguments.udp, writers)) as lines:
+            notifier.ready(f"reading {live.opened.source}")
+            unknown_touches = UnknownTouches(arguments.model)
+            frames = 0
             for frame, faults in live.frames():
                 frames += 1
                 notifier.alive()
                 decided = classifier.push(frame)
                 notice = unknown_touches.push(decided)
-                faults += [] if notice is None else [notice]
+                if notice is not None:
+                    faults.append(notice)
                 lines.write([*faults, *(event.to_dict() for event in decided)])
                 live.show(frame, faults, decided)
                 if lines.unheard:
@@ -138,3 +140,12 @@ def run(arguments: argparse.Namespace) -> int:
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])
     return 0
+
+
+def _map_writers(path: str | None, model: Model) -> list[LineWriter]:
+    """The writer of the map, where one is asked for."""
+    if path is None:
+        return []
+    from edge.output.touch_map import map_writer  # few runs keep a map
+
+    return [map_writer(path, model.info)]

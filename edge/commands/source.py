@@ -1,33 +1,29 @@
-"""Opens the skin that a command's options name, and reads it with all that they put
-beside it."""
+"""Opens the skin that a command's options name, and reads it."""
 
 from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from edge.commands.output import LOG, Output, event_text
 from edge.errors import InputError
 from edge.events import Event
-from edge.fake.clock import PacedClock, VirtualClock
-from edge.fake.player import Playback, play, skin_file
-from edge.model.model import Model, require_joints
 from edge.output.event_writer import Lines, LineWriter
-from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
-from edge.touch.arm import Chain
 from edge.touch.frame import Frame
-from edge.touch.joint_stream import Joints, joint_source
 from edge.touch.layout import for_device
 
 if TYPE_CHECKING:
+    from edge.fake.player import Playback
+    from edge.model.model import Model
     from edge.tools.page import Page
+    from edge.touch.arm import Chain
 
 
 def ending_signals() -> list[int]:
@@ -56,14 +52,18 @@ class Opened:
     Attributes:
         skin: set up and ready to be read.
         lasts_s: how many seconds to read for.
-        playback: the recording that a fake skin plays; None for a real skin.
         source: names the skin or the recording in messages and recordings.
+        playback: the recording that a fake skin plays; None for a real skin.
+        now: the time on the skin's clock at which another program's line arrives.
+        virtual: time is virtual, so that the loop may wait for a slow reader.
     """
 
     skin: Skin
     lasts_s: float
-    playback: Playback | None
     source: str
+    playback: Playback | None
+    now: Callable[[], float]
+    virtual: bool = False
 
     @property
     def dof(self) -> int | None:
@@ -92,78 +92,108 @@ def open_skin(
         InputError: the options or the skin's file cannot be used.
         EdgeError: the skin cannot be read.
     """
-    recording = playback = None
     if arguments.fake is not None:
-        recording = load(arguments.fake)
-        if arm is not None:
-            recording = recording.for_joints(arm.names, arguments.fake)
+        opened = _played(arguments, model, arm)
     elif arguments.loop or arguments.real_time:
-        raise InputError("--loop and --real-time need --fake, a recording to play")
-    if arguments.skin is not None:
-        file = skinfile.load(arguments.skin)
-    elif recording is not None:
-        file = skin_file(recording.layout)
-    else:
+        raise InputError("--loop and --real-time work only with --fake REC.npz")
+    elif arguments.skin is None:
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
-    touch = (
-        None
-        if model is None
-        else for_device(model.info.layout, file.layout).threshold_counts
-    )
-    lasts_s, source = arguments.seconds, arguments.skin
-    if recording is None:
-        skin = Skin.open(file, calibrated=calibrated, touch_counts=touch)
     else:
-        clock = PacedClock() if arguments.real_time else VirtualClock()
-        # Without a skin file nobody calibrates, and the chips serve the recording as it
-        # is.
-        noise = 0.0 if arguments.skin is None else arguments.noise
-        skin, playback = play(
-            file, recording, loop=arguments.loop, clock=clock, noise_counts=noise,
-            touch_counts=touch,
-        )  # fmt: skip
-        lasts_s, source = min(playback.ends, lasts_s), f"fake {arguments.fake}"
-    with skin:
-        for status in skin.status():
+        file = skinfile.load(arguments.skin)
+        touch_counts = _touch_counts(model, file)
+        skin = Skin.open(file, calibrated=calibrated, touch_counts=touch_counts)
+        lasts_s = arguments.seconds
+        opened = Opened(skin, lasts_s, arguments.skin, None, skin.clock.now)
+    with opened.skin:
+        for status in opened.skin.status():
             if status.error:
                 LOG.warning(f"{status.error}; left out for now")
-        yield Opened(skin, lasts_s, playback, source)
+        yield opened
+
+
+def _touch_counts(model: Model | None, file: skinfile.SkinFile) -> int | None:
+    """The counts above which a taxel is touched, by the model."""
+    if model is None:
+        return None
+    return for_device(model.info.layout, file.layout).threshold_counts
+
+
+def _played(
+    arguments: argparse.Namespace, model: Model | None, arm: Chain | None
+) -> Opened:
+    """The recording of --fake, played onto fake chips."""
+    from edge.fake.clock import PacedClock, VirtualClock
+    from edge.fake.player import play, skin_file
+    from edge.recording import load
+
+    recording = load(arguments.fake)
+    if arm is not None:
+        recording = recording.for_joints(arm.names, arguments.fake)
+    noise_counts = 0.0
+    if arguments.skin is None:
+        # Nobody calibrates, and the chips serve the recording as it is.
+        file = skin_file(recording.layout)
+    else:
+        file = skinfile.load(arguments.skin)
+        noise_counts = arguments.noise
+    clock = PacedClock() if arguments.real_time else VirtualClock()
+    skin, playback = play(
+        file,
+        recording,
+        loop=arguments.loop,
+        clock=clock,
+        noise_counts=noise_counts,
+        touch_counts=_touch_counts(model, file),
+    )
+    return Opened(
+        skin,
+        min(playback.ends, arguments.seconds),
+        f"fake {arguments.fake}",
+        playback,
+        now=clock.real,
+        virtual=not arguments.real_time,
+    )
 
 
 @dataclass(frozen=True)
-class Reading(Opened):
+class Reading:
     """A skin that is being read, with its loop, page and output.
 
     Attributes:
+        opened: the skin.
         loop: gives the frames with their joint angles.
         stop: ends the loop.
         page: the live page, or None.
         output: text or JSON.
     """
 
+    opened: Opened
     loop: Loop
     stop: Stop
     page: Page | None
     output: Output
 
+    @property
+    def skin(self) -> Skin:
+        """The skin."""
+        return self.opened.skin
+
     def frames(self) -> Iterator[tuple[Frame, list[dict[str, Any]]]]:
-        """Each frame, with the events of buses, taxels and chips that fail or
-        recover."""
+        """Each frame, with the events of buses, taxels and chips that fail or return."""
         skin = self.skin
         for frame in self.loop.frames():
-            events: list[dict[str, Any]] = [
-                {
-                    "event": "bus",
-                    "t": frame.t,
-                    "bus": name,
-                    "state": "lost" if lost else "back",
-                }
-                for name, lost in skin.bus_changes()
-            ]
-            if (silent := skin.silent_changes()) is not None:
+            events: list[dict[str, Any]] = []
+            for name, lost in skin.bus_changes():
+                state = "lost" if lost else "back"
+                events.append(
+                    {"event": "bus", "t": frame.t, "bus": name, "state": state}
+                )
+            silent = skin.silent_changes()
+            if silent is not None:
                 taxels = {"event": "taxels", "t": frame.t, "invalid": silent}
                 events.append({**taxels, "frames": SILENT_FRAMES})
-            events += [chip_event(status, t=frame.t) for status in skin.changes()]
+            for status in skin.changes():
+                events.append(chip_event(status, t=frame.t))
             yield frame, events
 
     def show(
@@ -178,17 +208,13 @@ class Reading(Opened):
                 self.page.notice(event_text(fault).strip())
             self.page.push(frame, events, self.loop.schedule)
 
+    def may_wait(self) -> bool:
+        """Whether to wait for a slow reader: only in virtual time, until the end."""
+        return self.opened.virtual and not self.stop.asked
+
     def lines(self, udp: str | None = None, more: Sequence[LineWriter] = ()) -> Lines:
         """The events' way out; in virtual time it waits for a slow reader of stdout."""
-        virtual = self.playback is not None and not isinstance(
-            self.skin.clock, PacedClock
-        )
-        return Lines(
-            udp=udp,
-            form=self.output.line,
-            patient=lambda: virtual and not self.stop.asked,
-            more=more,
-        )
+        return Lines(udp=udp, form=self.output.line, patient=self.may_wait, more=more)
 
 
 @contextmanager
@@ -219,35 +245,53 @@ def reading(
         EdgeError: the skin cannot be read.
     """
     if model is not None:
-        arm, dof = model.info.chain, model.info.dof
+        arm = model.info.chain
+        dof = model.info.dof
     if arguments.fake is not None and (real_time or arguments.web is not None):
         arguments.real_time = True
-    played = arm if arguments.joints is None else None
+    played_arm = arm if arguments.joints is None else None
     with ExitStack() as stack:
-        opened = stack.enter_context(open_skin(arguments, model=model, arm=played))
+        opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
         joints: JointSource | None = opened.playback if opened.dof else None
         if arguments.joints is not None:
-            if dof is None:
-                raise InputError("the model uses no joint angles; leave --joints out")
-            clock = opened.skin.clock
-            now = clock.real if isinstance(clock, PacedClock) else clock.now
-            source = stack.enter_context(joint_source(arguments.joints))
-            names = None if arm is None else arm.names
-            joints = stack.enter_context(
-                closing(Joints(source, dof=dof, names=names, now=now))
-            )
+            joints = stack.enter_context(_joints(arguments.joints, arm, dof, opened))
         elif model is not None and needs_joints:
-            require_joints(model, opened.dof, opened.source)
+            model.require_joints(opened.dof, opened.source)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
-            from edge.tools.page import Page  # few runs show one
+            live = stack.enter_context(_page(arguments.web, opened, page))
+        yield Reading(opened, loop, stop, live, Output.of(arguments))
 
-            live = Page(arguments.web, opened.skin.layout, title=opened.source, **page)
-            stack.callback(live.server.close)
-            LOG.info(f"open {live.server.link} in a browser")
-        yield Reading(
-            **vars(opened), loop=loop, stop=stop, page=live, output=Output.of(arguments)
-        )
+
+@contextmanager
+def _joints(
+    address: str, arm: Chain | None, dof: int | None, opened: Opened
+) -> Iterator[JointSource]:
+    """The joint angles that another program sends."""
+    from edge.touch.joint_stream import Joints, joint_source
+
+    if dof is None:
+        raise InputError("the model uses no joint angles; leave --joints out")
+    names = None if arm is None else arm.names
+    with joint_source(address) as source:
+        joints = Joints(source, dof=dof, names=names, now=opened.now)
+        try:
+            yield joints
+        finally:
+            joints.close()
+
+
+@contextmanager
+def _page(address: str, opened: Opened, options: dict[str, Any]) -> Iterator[Page]:
+    """The live page of a skin."""
+    from edge.tools.page import Page
+
+    page = Page(address, opened.skin.layout, title=opened.source, **options)
+    try:
+        LOG.info(f"open {page.server.link} in a browser")
+        yield page
+    finally:
+        page.server.close()

@@ -46,6 +46,10 @@ class VirtualClock:
         """The latest of all hands."""
         return max((hand.now() for hand in self.hands), default=self.start)
 
+    def real(self) -> float:
+        """Real time on this clock's scale: virtual time, as none passes."""
+        return self.now()
+
     def sleep_until(self, t: float) -> None:
         """Let all hands meet at `t`, or now if it has passed."""
         self.start = max(self.now(), t)

@@ -3,15 +3,14 @@ chips."""
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.protocol import wire_bits
-from edge.bus.serial_bus import serial_bits
+from edge.bus.protocol import Message, wire_bits
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.clock import TIME_ROUNDING_S
@@ -28,10 +27,6 @@ from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 
-NOISE_COUNTS = 0.7
-"""Noise of the fake skins that commands open, below that from which a chip that always
-serves the same bytes is stuck: a fake may be calibrated with noise, and then played
-without."""
 NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
 """The noise is this many frames, repeated, each of which lasts for this many
 seconds."""
@@ -127,7 +122,7 @@ def fake_buses(
             timed=timed,
             timeout_s=file.reading.timeout_s,
             overhead_s=overhead_s,
-            count=serial_bits if spec.serial else wire_bits,
+            count=_bits_counter(spec),
         )
         shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size
         with delayed():  # numpy imports its generators at their first use
@@ -146,6 +141,15 @@ def fake_buses(
             mux.channels[chip.channel][chip.address] = model
         buses.append(bus)
     return buses
+
+
+def _bits_counter(spec: BusSpec) -> Callable[[Sequence[Message]], int]:
+    """The function that counts the bits of a call on a bus."""
+    if not spec.serial:
+        return wire_bits
+    from edge.bus.serial_bus import serial_bits  # few skins have a serial port
+
+    return serial_bits
 
 
 def _sense(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
-from edge.model.stopping import Novelty, Stopping
+from edge.model.novelty import Novelty
+from edge.model.stopping import Stopping
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries

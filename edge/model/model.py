@@ -150,6 +150,23 @@ class Model:
         """Its name and version, as events carry them; None without a name."""
         return f"{self.info.name} {self.version}" if self.info.name else None
 
+    def require_joints(self, dof: int | None, where: str) -> None:
+        """Refuse a source without the joint angles that the model needs.
+
+        Args:
+            dof: the number of joint angles of the source, or None.
+            where: names the source in the error.
+
+        Raises:
+            InputError: the source has no joint angles, or another number of them.
+        """
+        needed = self.info.dof
+        if needed is not None and dof != needed:
+            raise InputError(
+                f"{where}: has {dof or 'no'} joint angles, but the model needs "
+                f"{needed} of each frame; record them, or export a model without joints"
+            )
+
     @property
     def decision_points_s(self) -> tuple[float, ...]:
         """Windows for which the model can decide; without calibration, only the full
@@ -260,25 +277,6 @@ class Model:
         feature = np.repeat(self.info.features, self.info.widths)[finite.argmin()]
         return OutOfRange(
             f"value {finite.argmin()} of the features, of {feature}, is not finite"
-        )
-
-
-def require_joints(model: Model, dof: int | None, where: str) -> None:
-    """Refuse a source without the joint angles that the model needs.
-
-    Args:
-        model: the model.
-        dof: the number of joint angles of the source, or None.
-        where: names the source in the error.
-
-    Raises:
-        InputError: the source has no joint angles, or another number of them.
-    """
-    needed = model.info.dof
-    if needed is not None and dof != needed:
-        raise InputError(
-            f"{where}: has {dof or 'no'} joint angles, but the model needs {needed} of each frame; "
-            "record them, or export a model without joints"
         )
 
 

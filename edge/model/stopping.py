@@ -8,27 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from edge.config import ConfigTable
-from edge.errors import InputError
-
-UNKNOWN = "unknown"
-"""The label of a contact that is unlike everything in training."""
-NOVELTY_RATE = 0.02
-"""Rate at which contacts with trained objects may be called unknown. Such answers are
-counted among the certified errors."""
 
 TEST_SHARE = 0.5
 """Part of the risk that the tests on calibration trials take. The rest covers the
 exported model, which errs more or less often than the folds' models do on average."""
-
-
-def check_rate(value: float, name: str) -> None:
-    """Refuse a rate outside (0, 1).
-
-    Raises:
-        InputError: the sentence begins with `name`.
-    """
-    if not 0.0 < value < 1.0:
-        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
 
 
 def margin(distances: Sequence[float], label: int) -> float:
@@ -174,47 +157,3 @@ class Stopping:
             wrong=table.whole("wrong", allowed=range(trials + 1)),
             risk=table.number("risk", low=0.0, high=1.0, open_low=True),
         )
-
-
-@dataclass(frozen=True)
-class Novelty:
-    """When a contact is unlike everything in training.
-
-    The distance to the nearest training trial is taken in the space of the task with
-    most labels: of all spaces, it distinguishes objects best.
-
-    Attributes:
-        task: whose space it is. It names no label for an unknown contact: a new object
-            can still be called soft or movable.
-        rates: shares of trained contacts that lie farther than the limits, falling.
-        limits: (decision points, rates) distances.
-    """
-
-    task: str
-    rates: tuple[float, ...]
-    limits: tuple[tuple[float, ...], ...]
-
-    def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest novelty rate at which the distance counts as unknown; 1 if it
-        never does."""
-        limits = zip(self.rates, self.limits[decision_point], strict=True)
-        return min((rate for rate, limit in limits if distance > limit), default=1.0)
-
-    @classmethod
-    def from_table(cls, table: ConfigTable, points: int) -> Novelty:
-        """Read the table from the metadata of a model with this number of decision
-        points.
-
-        Raises:
-            InputError: the table is damaged.
-        """
-        rates, rows = table.numbers("rates"), table.get("limits")
-        if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
-            raise table.fail(
-                "limits", f"{points} rows of a number for each of the rates"
-            )
-        lines = (
-            ConfigTable({"limits": row}, table.where, table.prefix) for row in rows
-        )
-        limits = tuple(line.numbers("limits", len(rates)) for line in lines)
-        return cls(table.text("task"), rates, limits)

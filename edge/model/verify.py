@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import parsing
-from edge.model.model import Model, require_joints
+from edge.model.model import Model
 from edge.recording import Recording, load_arrays, load_meta, save_arrays
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
@@ -122,7 +122,7 @@ def _path(
     windows = (info.window_s, *info.decision_points_s)
     onsets, integers, vectors = [], [], []
     for i, trial in enumerate(_trials(arrays, meta)):
-        require_joints(model, trial.dof, f"trial {i}")
+        model.require_joints(trial.dof, f"trial {i}")
         contact = first_series(trial, model)
         if contact is None:
             continue

@@ -190,19 +190,19 @@ def run(arguments: argparse.Namespace) -> int:
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
     ):  # fmt: skip
-        if arm is not None and arguments.joints is None and live.dof != dof:
+        if arm is not None and arguments.joints is None and live.opened.dof != dof:
             raise InputError(
-                f"{live.source} gives {live.dof or 'no'} joint angles, but {arguments.arm} has "
+                f"{live.opened.source} gives {live.opened.dof or 'no'} joint angles, but {arguments.arm} has "
                 f"{dof} joints; name another source with --joints"
             )
         names = None if arm is None else arm.names
-        if arguments.joints is None and live.playback is not None:
-            names = live.playback.recording.joint_names
+        if arguments.joints is None and live.opened.playback is not None:
+            names = live.opened.playback.recording.joint_names
         skin = live.skin
         meta = {
             "skin": skin.layout.to_dict(),
             "skin_name": skin.file.name,
-            "source": live.source,
+            "source": live.opened.source,
             "rate_hz": skin.file.reading.rate_hz,
         }
         if arm is not None:

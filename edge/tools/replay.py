@@ -9,13 +9,14 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from edge.classifier import AS_TRAINED, Classifier, suited
+from edge.classifier import Classifier, suited
 from edge.commands.options import add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
+from edge.policy import AS_TRAINED
 from edge.recording import Recording, find, load
 from edge.statistics import wilson
 from edge.touch.contact import FeatureSeries

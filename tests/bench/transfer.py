@@ -24,7 +24,7 @@ from joblib import Parallel, cpu_count, delayed
 
 from edge.cli import dispatch
 from edge.model.model import Model
-from edge.model.stopping import UNKNOWN
+from edge.model.novelty import UNKNOWN
 from edge.recording import Recording, save
 from edge.tools.replay import Summary, decide
 from tests.bench import tables

@@ -11,7 +11,7 @@ from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.events import Decided, Onset, Release
 from edge.fake.player import play, skin_file
-from edge.model.model import Model, require_joints
+from edge.model.model import Model
 from tests.conftest import in_a_row
 
 
@@ -216,9 +216,9 @@ def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm)
     with pytest.raises(InputError, match="16 x 23"):
         Classifier(model, replace(forearm, cols=23))
     with pytest.raises(InputError, match="here: has no joint angles"):
-        require_joints(model, None, "here")
+        model.require_joints(None, "here")
     with pytest.raises(
         InputError, match="here: has 3 joint angles, but the model needs 5"
     ):
-        require_joints(model, 3, "here")
-    require_joints(model, 5, "here")
+        model.require_joints(3, "here")
+    model.require_joints(5, "here")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.classifier import Classifier, stopping_rules
+from edge.classifier import Classifier
+from edge.early import stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model

@@ -16,7 +16,7 @@ from edge.commands.calibrate import (
     noisiest_taxels,
     unusable,
 )
-from edge.fake.player import NOISE_COUNTS
+from edge.commands.options import NOISE_COUNTS
 from edge.skin import file as skinfile
 from edge.skin.baseline import dead_band
 

@@ -122,8 +122,11 @@ def test_run_takes_joints_from_stdin(exported, recordings):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--loop"], "--loop and --real-time need --fake"),
-        (["--real-time", "--skin", "PAD"], "--loop and --real-time need --fake"),
+        (["--loop"], "--loop and --real-time work only with --fake"),
+        (
+            ["--real-time", "--skin", "PAD"],
+            "--loop and --real-time work only with --fake",
+        ),
         ([], "give --skin skin.toml, or --fake REC.npz to use no hardware"),
         (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),

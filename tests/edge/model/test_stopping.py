@@ -8,14 +8,8 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.stopping import (
-    TEST_SHARE,
-    Novelty,
-    Stopping,
-    StoppingRule,
-    check_rate,
-    margin,
-)
+from edge.model.novelty import Novelty, check_rate
+from edge.model.stopping import TEST_SHARE, Stopping, StoppingRule, margin
 
 
 class TestMargin:

@@ -233,7 +233,7 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
             page.labels, page.recording = {"object": "from the page"}, True
 
     monkeypatch.setattr("edge.tools.page.Page.push", push)
-    monkeypatch.setattr("edge.commands.source.PacedClock", VirtualClock)
+    monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
 
     status, events, _ = edge(
         "record", "--fake", parted, "--web", "127.0.0.1:0", "--out", tmp_path
@@ -247,7 +247,7 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
 def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_record(
     edge, parted, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("edge.commands.source.PacedClock", VirtualClock)
+    monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
     given = ("--web", "127.0.0.1:0", "--out", tmp_path / "trials", "--seconds", 1.0)
     assert edge("record", "--fake", parted, *given)[:2] == (1, [])
     assert list((tmp_path / "trials").iterdir()) == []

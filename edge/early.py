@@ -1,0 +1,153 @@
+"""Early decisions: policies that follow the stopping rules certified for an error rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from edge.errors import InputError
+from edge.events import Decided
+from edge.model.agreement import product_label
+from edge.model.info import ModelInfo
+from edge.model.model import Model
+from edge.model.novelty import UNKNOWN, check_rate
+from edge.model.stopping import StoppingRule, margin
+from edge.policy import Policy, Question
+
+
+def policies(model: Model, error: float) -> Mapping[str, Policy]:
+    """{task: its policy} for an error rate.
+
+    Raises:
+        InputError: the rate is outside (0, 1), or is certified for no task.
+    """
+    chosen: dict[str, Policy] = {}
+    for task, rule in stopping_rules(model, error).items():
+        kind = Product if task in model.info.products else Early
+        chosen[task] = kind(model.info, task, rule, error)
+    return chosen
+
+
+class Early:
+    """Decide at the first decision point that is sure enough, or at the rule's last."""
+
+    def __init__(
+        self, info: ModelInfo, task: str, rule: StoppingRule | None, error: float
+    ) -> None:
+        """Follow a rule.
+
+        Args:
+            info: the model's metadata.
+            task: that is decided.
+            rule: certified for the error rate; None where none is, and the full window
+                decides.
+            error: the error rate.
+        """
+        self._info = info
+        self._task = task
+        self._rule = rule
+        self._error = error
+        self._stopping = info.stopping[task]
+        self._full = len(info.decision_points_s) - 1
+
+    def answer(self, question: Question) -> Decided | None:
+        """The answer at a decision point; None if the task goes on waiting.
+
+        An unknown contact waits for the full window.
+        """
+        evidence = self._evidence(question)
+        rule = self._rule
+        sure = rule is not None and self._stopping.sure(rule, evidence)
+        last = self._full if rule is None or question.unknown else rule.last
+        if question.decision_point < last and (question.unknown or not sure):
+            return None
+        confidence = self._stopping.confidence(question.decision_point, evidence)
+        return self._answered(question, confidence, sure)
+
+    def _evidence(self, question: Question) -> float:
+        distances = question.decision.label_distances
+        if distances is None:
+            raise InputError(f"the model gives no distances of {self._task}'s labels")
+        label = self._info.tasks[self._task].labels.index(question.decision.label)
+        return margin(distances.tolist(), label)
+
+    def _answered(self, question: Question, confidence: float, sure: bool) -> Decided:
+        """The answer of a rule, or of the full window without one."""
+        nameless = question.unknown and self._names_unknown()
+        rule = self._rule
+        forced = rule is not None and not rule.fixed and not sure
+        doubts = {"unsure": forced and not nameless, "uncertified": rule is None}
+        answer = question.answer(self._info, doubts)
+        if nameless:
+            answer = replace(answer, label=UNKNOWN)
+            confidence = 1.0 - self._novelty(question)
+        answer = replace(answer, confidence=round(confidence, 6))
+        if rule is None:
+            return answer
+        stopped_by = "confidence" if sure else "window"
+        return replace(answer, error=self._error, stopped_by=stopped_by)
+
+    def _names_unknown(self) -> bool:
+        novelty = self._info.novelty
+        return novelty is not None and novelty.task == self._task
+
+    def _novelty(self, question: Question) -> float:
+        """The smallest novelty rate at which the contact counts as unknown."""
+        novelty = self._info.novelty
+        if novelty is None:
+            return 1.0
+        distance = float(question.decision.distances[0])
+        return novelty.rate(question.decision_point, distance)
+
+
+class Product(Early):
+    """Decide when both factors are, by their labels."""
+
+    def answer(self, question: Question) -> Decided | None:
+        """The answer once both factors have theirs."""
+        task = self._info.tasks[self._task]
+        if not question.decided.keys() >= task.factors.keys():
+            return None
+        indices = {}
+        confidence = 1.0
+        sure = True
+        for factor in task.factors:
+            decided = question.decided[factor]
+            labels = self._info.tasks[factor].labels
+            indices[factor] = labels.index(str(decided.label))
+            confidence *= decided.confidence
+            sure = sure and decided.stopped_by == "confidence"
+        label = task.labels[product_label(task.factors, indices)]
+        decision = question.decision._replace(label=label)
+        return self._answered(replace(question, decision=decision), confidence, sure)
+
+
+def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:
+    """{task: the fastest stopping rule that is certified for an error rate, or None}.
+
+    Raises:
+        InputError: the rate is outside (0, 1), or is certified for no task; the message
+            names the errors that are.
+    """
+    check_rate(error, "the error rate")
+    if not model.info.decision_points_s:
+        raise InputError(
+            f"{model.path}: the model has no calibration, so no error rate can be held; "
+            "export it with --decision-points"
+        )
+    if model.info.taught:
+        raise InputError(
+            f"{model.path}: was taught {model.info.taught} trials after its error rates were "
+            "certified; leave --error out, or export a model with these trials"
+        )
+    rules = {
+        task: stopping.rule(error) for task, stopping in model.info.stopping.items()
+    }
+    if not any(rules.values()):
+        reasons = (
+            f"{task}: {s.refusal(error)}" for task, s in model.info.stopping.items()
+        )
+        raise InputError(
+            f"{model.path}: an error of {error:g} cannot be certified; {'; '.join(reasons)}"
+        )
+    return rules
