@@ -282,7 +282,8 @@ class ConfigTable:
                     ("", self.prefix) if self.prefix[-1:] == "." else (self.prefix, "")
                 )
                 raise InputError(
-                    f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; allowed: {allowed}"
+                    f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; "
+                    f"allowed: {allowed}"
                 )
 
 

@@ -132,12 +132,14 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
     check_rate(error, "the error rate")
     if not model.info.decision_points_s:
         raise InputError(
-            f"{model.path}: the model has no calibration, so no error rate can be held; "
+            f"{model.path}: the model has no calibration, so no error rate can be "
+            "held; "
             "export it with --decision-points"
         )
     if model.info.taught:
         raise InputError(
-            f"{model.path}: was taught {model.info.taught} trials after its error rates were "
+            f"{model.path}: was taught {model.info.taught} trials after its error "
+            "rates were "
             "certified; leave --error out, or export a model with these trials"
         )
     rules = {
@@ -148,6 +150,7 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{task}: {s.refusal(error)}" for task, s in model.info.stopping.items()
         )
         raise InputError(
-            f"{model.path}: an error of {error:g} cannot be certified; {'; '.join(reasons)}"
+            f"{model.path}: an error of {error:g} cannot be certified; "
+            f"{'; '.join(reasons)}"
         )
     return rules

@@ -82,7 +82,8 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
             raise InputError(f"{name}: cannot be read: it is not a regular file")
         if status.st_size > at_most:
             raise InputError(
-                f"{name}: has {status.st_size} bytes; a file of this kind has at most {at_most}"
+                f"{name}: has {status.st_size} bytes; a file of this kind has at most "
+                f"{at_most}"
             )
         yield file
 

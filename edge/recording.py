@@ -157,7 +157,8 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         frames = frames.reshape(len(frames), rows, cols)
     if frames.dtype != np.uint16 or frames.ndim != 3:
         fail(
-            f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} {frames.shape}"
+            f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} "
+            f"{frames.shape}"
         )
     n, rows, cols = frames.shape
     if 0 in frames.shape:
@@ -165,18 +166,21 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     layout = SkinLayout.from_dict({"rows": rows, "cols": cols, **skin}, where=path)
     if layout.shape != (rows, cols):
         fail(
-            f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x {cols}"
+            f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x "
+            f"{cols}"
         )
 
     t = expect("t", recording.t, np.float64, (n,))
     if not np.isfinite(t).all():
         fail(
-            f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the clock"
+            f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the "
+            "clock"
         )
     backwards = np.flatnonzero(t[1:] < t[:-1])
     if backwards.size:
         fail(
-            f"time goes back at frame {backwards[0] + 1}; sort the frames or split the recording"
+            f"time goes back at frame {backwards[0] + 1}; sort the frames or split the "
+            "recording"
         )
     joints, dof = recording.joints, 0
     if joints is not None:
@@ -187,7 +191,8 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         odd = (np.isinf(joints) | (unknown != unknown[:, :1])).any(axis=1)
         if odd.any():
             fail(
-                f"a joint angle of frame {int(np.argmax(odd))} is not finite; in a frame without "
+                f"a joint angle of frame {int(np.argmax(odd))} is not finite; in a "
+                "frame without "
                 "a known pose, all angles must be NaN"
             )
     if recording.valid is not None:
@@ -229,13 +234,15 @@ def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.
         frames = np.rint(frames.astype(np.float64) * scale)
     if not np.isfinite(frames).all():
         raise InputError(
-            f"{path}: frames hold values that are not finite; set them to 0 and mark the taxels "
+            f"{path}: frames hold values that are not finite; set them to 0 and mark "
+            "the taxels "
             "in `valid`"
         )
     low, high = frames.min(initial=0), frames.max(initial=0)
     if low < 0:
         raise InputError(
-            f"{path}: frames go down to {low:g}, but counts are above baseline: subtract the "
+            f"{path}: frames go down to {low:g}, but counts are above baseline: "
+            "subtract the "
             "frame before touch, then use np.clip(frames, 0, None)"
         )
     fractions = (frames != np.rint(frames)).any()
@@ -244,8 +251,10 @@ def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.
         factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MAX_COUNTS / high))
         raise InputError(
             f"{path}: frames are {frames.dtype} up to {high:g}"
-            f"{', with fractions' if fractions else ''}; counts are whole numbers up to "
-            f"{MAX_COUNTS}: use edge.save(path, recording, scale={factor:g}), with the same scale "
+            f"{', with fractions' if fractions else ''}; counts are whole numbers up "
+            "to "
+            f"{MAX_COUNTS}: use edge.save(path, recording, scale={factor:g}), with the "
+            "same scale "
             "for all recordings"
         )
     return frames.astype(np.uint16)
@@ -359,7 +368,8 @@ def _warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
         ]
         guess = f", and these may be in {likely[0]}" if likely else ""
         LOG.warning(
-            f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds{guess}"
+            f"{name}: has a median of {rate_hz:g} frames a second; t is in "
+            f"seconds{guess}"
         )
 
 

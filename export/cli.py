@@ -45,7 +45,8 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(
         prog="export",
         description="Fits a model for every task that the recordings' labels share, and writes "
-        "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The others are chosen "
+        "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The "
+        "others are chosen "
         "for each task: the smallest model within one standard error of the best in "
         "cross-validation.",
     )
@@ -84,7 +85,8 @@ def parser() -> argparse.ArgumentParser:
         default=LEAVE_OUT,
         metavar="KEY",
         help="choose and score a task with entire groups of this label left out, if each of its "
-        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out single trials",
+        f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out "
+        "single trials",
     )
     option(
         "--quick",
@@ -101,8 +103,10 @@ def parser() -> argparse.ArgumentParser:
         "--decision-points",
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
-        f"seconds from onset, or at a list a,b,c, or `none` (default: {DECISION_POINTS} with "
-        f"{FEWEST} to {MOST_TRIALS} trials, and fewer points if the model would exceed 1 MB)",
+        "seconds from onset, or at a list a,b,c, or `none` (default: "
+        f"{DECISION_POINTS} with "
+        f"{FEWEST} to {MOST_TRIALS} trials, and fewer points if the model would exceed "
+        "1 MB)",
     )
     counts = within(int, 0, 65534)
     option("--threshold", type=counts, help="counts above which a taxel is in contact")
@@ -173,8 +177,10 @@ def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
     front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
     point = front.pick(arguments.front)
     print(
-        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} {point.accuracy:.1%} "
-        f"({100 * point.low:.0f} to {100 * point.high:.0f}) in {point.milliseconds:.0f} ms",
+        f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
+        f"{point.accuracy:.1%} "
+        f"({100 * point.low:.0f} to {100 * point.high:.0f}) in "
+        f"{point.milliseconds:.0f} ms",
         file=sys.stderr,
     )
     return point
@@ -190,7 +196,8 @@ def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
     if text == "none":
         return ()
     wrong = InputError(
-        f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds above 0) "
+        f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds "
+        "above 0) "
         f"or none, not {text!r}"
     )
     try:

@@ -74,7 +74,8 @@ def faults(report: Path) -> list[str]:
     for width in WIDTHS:
         with chromium(width, report.resolve().as_uri()) as browser:
             browser.execute_script(
-                "document.querySelectorAll('details').forEach(section => section.open = true)"
+                "document.querySelectorAll('details').forEach(section => section.open "
+                "= true)"
             )
             wide = browser.execute_script(WIDER_THAN_THE_PAGE)
             lines += [f"{width} px: wider than the page: {element}" for element in wide]

@@ -384,9 +384,13 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--every", type=int, default=1, help="every so many positions")
     parser.add_argument(
-        "--overhead", type=float, nargs="+", default=OVERHEADS_US, metavar="US",
+        "--overhead",
+        type=float,
+        nargs="+",
+        default=OVERHEADS_US,
+        metavar="US",
         help="microseconds of software for each transaction (default: 0 50 100)",
-    )  # fmt: skip
+    )
     arguments = parser.parse_args()
     broken = []
     for overhead_us in arguments.overhead:

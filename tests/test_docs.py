@@ -61,8 +61,12 @@ def test_the_notebook_runs(tmp_path):
     nbclient.NotebookClient(
         notebook, timeout=120, resources={"metadata": {"path": ROOT}}
     ).execute()
-    (printed,) = (o.text for cell in notebook.cells for o in cell.get("outputs", ())
-                  if o.output_type == "stream")  # fmt: skip
+    (printed,) = (
+        o.text
+        for cell in notebook.cells
+        for o in cell.get("outputs", ())
+        if o.output_type == "stream"
+    )
     assert "label='soft-fixed'" in printed
 
 
@@ -77,8 +81,11 @@ def test_every_page_is_on_the_site_and_its_links_and_paths_lead_somewhere(page):
 
 
 def test_the_table_of_formats_ends_with_the_one_that_is_written():
-    rows = re.findall(r"^\| ([\d, ]+) \| .*versions? ?|^\| ([\d, ]+) \|", (DOCS / "formats.md")
-                      .read_text(), re.M)  # fmt: skip
+    rows = re.findall(
+        r"^\| ([\d, ]+) \| .*versions? ?|^\| ([\d, ]+) \|",
+        (DOCS / "formats.md").read_text(),
+        re.M,
+    )
     numbers = [int(n) for row in rows for part in row if part for n in part.split(",")]
     assert numbers == list(range(1, FORMAT + 1))
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from edge.bus.serial_bus import SerialBus
-from edge.chips.block import Block, parse
-from edge.chips.chip import WrongChip
+from edge.chips.block import Block
+from edge.chips.chip import ChipSpec, WrongChip
 from edge.fake.bus import FakeBus
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
@@ -24,6 +24,11 @@ TAXELS = 100
 pytestmark = pytest.mark.skipif(
     shutil.which("g++") is None, reason="there is no C++ compiler"
 )
+
+
+def spec(bits):
+    """The matrix of a skin file."""
+    return ChipSpec(Block, 0x28, tuple(range(TAXELS)), options={"bits": bits})
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +92,7 @@ def test_the_driver_reads_its_registers_over_i2c(host, bits):
         assert chip.healthy()
         bus.transfer(chip.frame)
         assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
-        taxels, intact = parse(chip.frame.buffer[None], TAXELS, bits)
+        taxels, intact = Block.parse(chip.frame.buffer[None], spec(bits))
         assert intact.all()
         assert taxels[0].tolist() == (
             [0] * TAXELS if n == 0 else values(bits, n - 1).tolist()
@@ -121,7 +126,7 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     ):
         bus._port.write(noise + b"\0")
         bus.transfer(chip.frame)
-        assert parse(chip.frame.buffer[None], TAXELS, 12)[1].all()
+        assert Block.parse(chip.frame.buffer[None], spec(12))[1].all()
     bus.close()
 
 

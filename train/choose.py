@@ -258,7 +258,8 @@ class Choosing:
             for task, each in right.items()
         )
         return best, [
-            f"the window is {best:g} s, as the touches last longer than {windows[0]:g} s; in "
+            f"the window is {best:g} s, as the touches last longer than {windows[0]:g} "
+            "s; in "
             f"cross-validation {shares} (--window sets it)"
         ]
 

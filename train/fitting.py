@@ -173,7 +173,8 @@ def fit(
         if not fixed and "threshold_counts" not in raw.own[0].meta.get("skin", {}):
             threshold, onset = thresholds.proposed(raw.own)
             notes.append(
-                f"warning: the skin was saved without thresholds; a threshold of {threshold} and "
+                "warning: the skin was saved without thresholds; a threshold of "
+                f"{threshold} and "
                 f"an onset of {onset} counts come from the noise before contact"
             )
         dataset = load(threshold=threshold, onset=onset)
@@ -259,7 +260,8 @@ def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
     missing = [task for task in wanted if task not in dataset.tasks]
     if missing:
         raise InputError(
-            f"not every recording has a label {missing[0]!r}; all have {', '.join(dataset.tasks)}"
+            f"not every recording has a label {missing[0]!r}; all have "
+            f"{', '.join(dataset.tasks)}"
         )
     return tuple(wanted)
 
@@ -288,7 +290,8 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
                 f", or take --threshold {low} --onset {high}, by which it begins later"
             )
         return [
-            f"warning: {(~untouched).mean():.0%} of the touches begin with their recording, so "
+            f"warning: {(~untouched).mean():.0%} of the touches begin with their "
+            "recording, so "
             f"their onset is not known; {mend}"
         ]
     X = np.stack([t.recording.frames[0].reshape(-1) for t in dataset.trials])[untouched]
@@ -301,8 +304,10 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
         usual = float(np.unique(labels, return_counts=True)[1].max() / len(labels))
         if share > usual + LEAK * (1.0 - usual):
             notes.append(
-                f"warning: the first frame alone tells {task} in {share:.0%} of the trials, before "
-                "anything is touched. The accuracy holds only where this is so in use too; "
+                f"warning: the first frame alone tells {task} in {share:.0%} of the "
+                "trials, before "
+                "anything is touched. The accuracy holds only where this is so in use "
+                "too; "
                 "`python -m train import --zero` subtracts the first frames"
             )
     return notes
@@ -323,7 +328,8 @@ def _decision_points(
         return tuple(wanted)
     if not FEWEST <= tested <= MOST_TRIALS:
         notes.append(
-            f"no decision points before the full window: {tested} trials are not the {FEWEST} "
+            f"no decision points before the full window: {tested} trials are not the "
+            f"{FEWEST} "
             f"to {MOST_TRIALS} that are calibrated by default"
         )
         return ()
@@ -342,7 +348,8 @@ def _decision_points(
         if len(points) * each <= LARGEST_BYTES:
             if every > STEPS_S[0]:
                 notes.append(
-                    f"{len(points)} decision points, one every {step:g} s, so that the model stays "
+                    f"{len(points)} decision points, one every {step:g} s, so that the "
+                    "model stays "
                     "below 1 MB; --decision-points asks for more"
                 )
             return tuple(points)

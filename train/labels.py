@@ -31,7 +31,8 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
         )
     if len(each) != count:
         raise InputError(
-            f"meta.contacts labels {len(each)} contacts, {count} are found; correct the labels or "
+            f"meta.contacts labels {len(each)} contacts, {count} are found; correct "
+            "the labels or "
             "the threshold"
         )
     return [
@@ -79,6 +80,7 @@ def shared_tasks(
     )
     if not tasks:
         raise InputError(
-            "the recordings share no label; give every one the same keys under meta.labels"
+            "the recordings share no label; give every one the same keys under "
+            "meta.labels"
         )
     return tuple(tasks)

@@ -75,7 +75,8 @@ def mix(
     y = {task: labels for task, labels in y.items() if task not in few}
     if not y:
         raise InputError(
-            f"{int(own.sum())} of the trials are no simulated ones; record at least {FEWEST_OWN} "
+            f"{int(own.sum())} of the trials are no simulated ones; record at least "
+            f"{FEWEST_OWN} "
             "with a label, or export the simulated ones alone"
         )
     shared = [t for t in y if set(y[t][own].tolist()) & set(y[t][~own].tolist()) - {""}]
@@ -120,12 +121,15 @@ def mix(
         for left_out, table in ((leave_out, by_group), (TRIAL, by_trial))
     }
     notes = [
-        f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated ones, on which "
-        "the settings are chosen (the table); the other accuracies are those on your own"
+        f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated "
+        "ones, on which "
+        "the settings are chosen (the table); the other accuracies are those on your "
+        "own"
     ]
     if few:
         notes.append(
-            f"not fitted, as fewer than {FEWEST_OWN} of your own have it: {', '.join(few)}"
+            f"not fitted, as fewer than {FEWEST_OWN} of your own have it: "
+            f"{', '.join(few)}"
         )
     for task, settled in chosen.items():
         table = by_trial if task == leave_out else by_group
@@ -166,7 +170,8 @@ def mix(
         notes.append(f"{task}: {by_weights}; taken: {names[best.weights]}")
         if task in shared and shares[ALONE] == max(shares.values()):
             notes.append(
-                f"simulated trials no longer help {task}: export your own alone, which also "
+                f"simulated trials no longer help {task}: export your own alone, which "
+                "also "
                 "chooses the features by them"
             )
     form = dataset.names, dataset.widths(samples)

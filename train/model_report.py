@@ -108,9 +108,15 @@ def _left_out(
     key, c = model.spaces_[task], model.components_[task]
     p = model.projections_[key]
     space = Space(
-        model.columns_[key], p.mean_, p.gain_, p.weights_[:, :c], model.rows_[key][:, :c],
-        index[train], MOST_STEPS * p.grid_.step, p.grid_.limit * p.grid_.unit,
-    )  # fmt: skip
+        model.columns_[key],
+        p.mean_,
+        p.gain_,
+        p.weights_[:, :c],
+        model.rows_[key][:, :c],
+        index[train],
+        MOST_STEPS * p.grid_.step,
+        p.grid_.limit * p.grid_.unit,
+    )
 
     def numbered(near: Any) -> Any:
         """The training trial under its number among all trials; None stays None."""
@@ -182,7 +188,8 @@ def write(
     sections = [*accuracies, *(section(exported) for section in SECTIONS)]
     lead = [
         f"The model was fitted on {counted(model.info.rows, 'trial')}, and decides "
-        f"{model.info.window_s:g} s after the onset of a contact. Its version is {model.version}; "
+        f"{model.info.window_s:g} s after the onset of a contact. Its version is "
+        f"{model.version}; "
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
         *(
             line[0].upper() + line[1:] + "."
@@ -206,8 +213,10 @@ def _accuracy(exported: Exported, task: str) -> Section:
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     text += (
-        " The intervals are for the exported model on other trials: Wilson's for two fifths of "
-        "the trials, because that model differs from those of the folds. Where entire groups are "
+        " The intervals are for the exported model on other trials: Wilson's for two "
+        "fifths of "
+        "the trials, because that model differs from those of the folds. Where entire "
+        "groups are "
         "left out they count groups, whose trials are right or wrong together."
     )
     labels = sorted(set(truth))
@@ -270,10 +279,14 @@ def _wrong(exported: Exported) -> Section:
         if answer.wrong and not figures:
             figures.append(_picture(fitted, trials, task, answer))
     text = [
-        "A model that had not seen these trials classified them wrongly. The last column names the "
-        "feature that pulls a trial most strongly towards the wrong answer, compared with the "
-        "nearest trial of the right label. Wrong labels and failed touches often stand out here. "
-        "The picture shows the first of the trials; `edge-classify explain` and `python -m train "
+        "A model that had not seen these trials classified them wrongly. The last "
+        "column names the "
+        "feature that pulls a trial most strongly towards the wrong answer, compared "
+        "with the "
+        "nearest trial of the right label. Wrong labels and failed touches often stand "
+        "out here. "
+        "The picture shows the first of the trials; `edge-classify explain` and "
+        "`python -m train "
         "show` explain any other recording in the same way."
     ]
     table = Table("wrong", "Wrong answers", rows)
@@ -322,8 +335,10 @@ def _features(exported: Exported) -> Section:
             {**row, "unit": "" if unit == "1" else unit, "values": widths[name]}
         )
     text = [
-        "A feature's pull says how much nearer the feature brings a touch to the nearest trial "
-        "with the model's answer than to the nearest trial with another label. The table gives "
+        "A feature's pull says how much nearer the feature brings a touch to the "
+        "nearest trial "
+        "with the model's answer than to the nearest trial with another label. The "
+        "table gives "
         "each feature's share of all pulls, as a mean over the wrong answers and about "
         f"{EXPLAINED} other left-out trials."
     ]
@@ -353,14 +368,19 @@ def _learning(exported: Exported) -> Section:
     ]
     half = QUARTERS // 2 - 1
     text = [
-        f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} changed the "
-        f"accuracy by {100 * (row[-1].accuracy - row[half].accuracy):+.1f} percentage points."
+        f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} "
+        "changed the "
+        f"accuracy by {100 * (row[-1].accuracy - row[half].accuracy):+.1f} percentage "
+        "points."
         for task, row in results.items()
     ]
     text.append(
-        "Doubling them again usually changes less. All fits use the settings that were chosen on "
-        "the full training set, and the smaller sets contain the same objects. To recognise "
-        "objects that the model has never met, record more objects rather than more touches of "
+        "Doubling them again usually changes less. All fits use the settings that were "
+        "chosen on "
+        "the full training set, and the smaller sets contain the same objects. To "
+        "recognise "
+        "objects that the model has never met, record more objects rather than more "
+        "touches of "
         "the same ones."
     )
     title = "Accuracy by the number of training trials"
@@ -374,10 +394,14 @@ def _sizes(exported: Exported) -> Section:
     """The candidates with their accuracies, sizes and times."""
     size = Path(exported.model.path).stat().st_size / 1024
     text = [
-        f"The model file takes {size:.0f} kB. The candidates' accuracies come from nested "
-        "cross-validation, and stand with their 95 % intervals. The times are for features and "
-        "decision together on this machine; `edge-classify bench` measures those of a board. A "
-        "star marks the candidate chosen for a task, which is the smallest one within a standard "
+        f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
+        "nested "
+        "cross-validation, and stand with their 95 % intervals. The times are for "
+        "features and "
+        "decision together on this machine; `edge-classify bench` measures those of a "
+        "board. A "
+        "star marks the candidate chosen for a task, which is the smallest one within "
+        "a standard "
         "error of the best."
     ]
     return Section(

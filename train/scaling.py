@@ -50,7 +50,8 @@ def widths_of(
     if widths is None:
         if columns % len(features):
             raise InputError(
-                f"{columns} columns are no whole number of samples of {len(features)} features"
+                f"{columns} columns are no whole number of samples of {len(features)} "
+                "features"
             )
         return (columns // len(features),) * len(features)
     if len(widths) != len(features) or sum(widths) != columns:

@@ -247,7 +247,8 @@ class SequentialClassifier:
         n = int((folds >= 0).sum())
         if n < FEWEST:
             raise InputError(
-                f"calibration needs at least {FEWEST} trials, not {n}; record more, or export "
+                f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
+                "export "
                 "without decision points"
             )
         kept = _taken(self.choices.values(), self.features)

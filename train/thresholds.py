@@ -87,7 +87,9 @@ def chosen(
         return dataset, []
     layout = tried[best].layout
     return tried[best], [
-        f"the threshold is {layout.threshold_counts} and the onset {layout.onset} counts: at "
-        f"{own[0]} and {own[1]} counts, {unfelt} recordings show no contact; in cross-validation "
+        f"the threshold is {layout.threshold_counts} and the onset {layout.onset} "
+        "counts: at "
+        f"{own[0]} and {own[1]} counts, {unfelt} recordings show no contact; in "
+        "cross-validation "
         f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
     ]

@@ -103,8 +103,10 @@ class TouchMap:
                 head, waiting = line, {}
                 if head[:2] != self.head[:2]:
                     raise InputError(
-                        f"{self.path}: line {number} begins a run in the frame {head.frame} "
-                        f"({head.unit}), another is in {self.head.frame} ({self.head.unit}); keep "
+                        f"{self.path}: line {number} begins a run in the frame "
+                        f"{head.frame} "
+                        f"({head.unit}), another is in {self.head.frame} "
+                        f"({self.head.unit}); keep "
                         "a map for each"
                     )
                 continue

@@ -1,10 +1,10 @@
 """Find mistakes in a skin file, or in this machine.
 
 Reads a skin file and runs its drivers over a fake bus that counts the bits on the
-wires, which gives the frame rate that the wires carry. The exit status is 1 if the skin cannot work as the file describes it, or the
-wires cannot carry the frame rate that the file asks for. Without a skin file, prints
-the state of this machine: buses and rights, versions, clock, load and disk, with a
-remedy for each shortcoming.
+wires, which gives the frame rate that they carry. The exit status is 1 if the skin
+cannot work as the file describes it, or the wires cannot carry the frame rate that the
+file asks for. Without a skin file, prints the state of this machine: buses and rights,
+versions, clock, load and disk, with a remedy for each shortcoming.
 """
 
 import argparse

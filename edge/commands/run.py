@@ -37,7 +37,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=("flag", "skin"),
         default="flag",
         help="if joint angles are missing at a contact's onset: `flag` (the default) decides "
-        "without them, flagged missing_pose; `skin` measures the contact's motion on the skin, "
+        "without them, flagged missing_pose; `skin` measures the contact's motion on "
+        "the skin, "
         "flagged skin_motion",
     )
     parser.add_argument(

@@ -52,7 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     failed = [check.name for check in checks if not check.passed]
     if any(name.endswith("distances") for name in failed):
         LOG.error(
-            "every engine that computes in float64 gives the same distances; this machine may run "
+            "every engine that computes in float64 gives the same distances; this "
+            "machine may run "
             "the model in float32, which ONNX Runtime does not"
         )
     if failed:

@@ -192,7 +192,8 @@ class ModelInfo:
             meta = ConfigTable(parse_json(text, where), where)
             if meta.whole("format") != FORMAT:
                 raise InputError(
-                    f"{where} is of format {shown(meta.raw['format'])}, but this edge-classify "
+                    f"{where} is of format {shown(meta.raw['format'])}, but this "
+                    "edge-classify "
                     f"reads {FORMAT}"
                 )
             tasks, tracking = meta.table("tasks"), meta.table("tracking")
@@ -251,7 +252,8 @@ class ModelInfo:
             types = measures.features(self.features)
         except InputError as error:
             raise InputError(
-                f"{name}: was made for the features {', '.join(self.features)}; {error}; "
+                f"{name}: was made for the features {', '.join(self.features)}; "
+                f"{error}; "
                 "export it with this version of edge-classify"
             ) from None
         of_joints = any(feature.of_joints for feature in types)

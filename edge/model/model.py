@@ -113,7 +113,8 @@ class Model:
             Exception
         ) as error:  # onnxruntime's own exceptions share no base but this
             raise InputError(
-                f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it again"
+                f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it "
+                "again"
             ) from None
         self._outputs = _outputs(self.info)
         self._check()
@@ -135,13 +136,15 @@ class Model:
             sizes = [size if isinstance(size, int) else None for size in seen]
             if seen_kind != kind or sizes not in (shape, [None] * len(shape)):
                 raise InputError(
-                    f"{self.path}: its graph has no {kind} {name} of shape {shape}, which its "
+                    f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
+                    "which its "
                     "metadata describes; export it again"
                 )
         for value in inputs:
             if value.name not in expected:
                 raise InputError(
-                    f"{self.path}: has an input {value.name}, which no exported model has; export "
+                    f"{self.path}: has an input {value.name}, which no exported model "
+                    "has; export "
                     "it again"
                 )
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 
 OPERATORS = frozenset(
-    "Add ArgMax Cast Clip Div Gather GatherElements GatherND Gemm LessOrEqual MatMul Max Mul Pad "
+    "Add ArgMax Cast Clip Div Gather GatherElements GatherND Gemm LessOrEqual MatMul "
+    "Max Mul Pad "
     "ReduceL1 ReduceMean ReduceSum ReduceSumSquare Round Sqrt Squeeze Sub TopK Where".split()
 )
 """The operators of an exported model, all of the standard domain."""

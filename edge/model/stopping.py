@@ -119,7 +119,8 @@ class Stopping:
         )
         if share >= error:
             return (
-                f"{known}, and {share:.1%} of them are decided wrongly even at the full window: "
+                f"{known}, and {share:.1%} of them are decided wrongly even at the "
+                "full window: "
                 "more trials alone will not do"
             )
         # Chernoff: this many trials with the same share of errors are enough.

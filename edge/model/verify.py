@@ -147,7 +147,8 @@ def _graph(
     for key in ("vectors", "decision_point_vectors"):
         if key in arrays and arrays[key].shape[-1:] != (model.info.width,):
             raise InputError(
-                f"{name}: {key} has the shape {arrays[key].shape}, but {model.path} takes "
+                f"{name}: {key} has the shape {arrays[key].shape}, but {model.path} "
+                "takes "
                 f"{model.info.width} features; export both together"
             )
     for key, seen in answers(model, arrays).items():

@@ -97,7 +97,8 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
         raise table.fail("device", form)
     if isinstance(device, str) and SERIAL_PORT.fullmatch(device):
         raise InputError(
-            f"{table.called('device')} {device} is a serial port, not an I2C bus; write serial = "
+            f"{table.called('device')} {device} is a serial port, not an I2C bus; "
+            "write serial = "
             f'"{device}" instead, with kind = "block"'
         )
     path = f"/dev/i2c-{device}" if number else str(device)
@@ -218,7 +219,8 @@ def taxel_at(
     row, col = table.pair(key, value)
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
         raise InputError(
-            f"{table.called(key)} names taxel [{shown(row)}, {shown(col)}], which lies outside of "
+            f"{table.called(key)} names taxel [{shown(row)}, {shown(col)}], which lies "
+            "outside of "
             f"{layout.rows} x {layout.cols}"
         )
     return row, col

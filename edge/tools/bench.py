@@ -88,8 +88,10 @@ def measure(model: Model) -> dict[str, Any]:
     )
     if waited > BUSY_SHARE:
         LOG.warning(
-            f"this machine is busy: bench waited {waited:.0%} of the time, at a load of {load:g} "
-            f"on {os.cpu_count()} cores. Its figures are the fastest of {REPEATS} rounds, and may "
+            f"this machine is busy: bench waited {waited:.0%} of the time, at a load "
+            f"of {load:g} "
+            f"on {os.cpu_count()} cores. Its figures are the fastest of {REPEATS} "
+            "rounds, and may "
             "still be too high; end other programs and run it again"
         )
     import resource  # only Linux and macOS have it

@@ -84,7 +84,8 @@ def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
             device = adapters.enter_context(plugged(UsbAdapter(bus)))
             output.event(
                 {"event": "plugged", "bus": bus.name, "device": device},
-                f"{bus.name} of the skin file is plugged in as {device}; Ctrl-C unplugs it",
+                f"{bus.name} of the skin file is plugged in as {device}; Ctrl-C "
+                "unplugs it",
             )
         while not stop.asked:
             clock.sleep_until(clock.now() + 1.0 / file.reading.rate_hz)
@@ -117,7 +118,8 @@ def run(arguments: argparse.Namespace) -> int:
         "Rehearse with them:\n"
         f"  edge-classify calibrate --skin {skin} --fake {rest} --frames {frames}\n"
         f"  edge-classify view --skin {skin} --fake {first}\n"
-        f"  edge-classify record --skin {skin} --fake {first} --label object=box --out recordings\n"
+        f"  edge-classify record --skin {skin} --fake {first} --label object=box --out "
+        "recordings\n"
         f"  make export DATA={folder}          (in a checkout, on the workstation)\n"
         f"  edge-classify run --model build/model.onnx --skin {skin} --fake {first}",
     )

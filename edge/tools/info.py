@@ -117,13 +117,16 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     wraps = ", closed around" if skin.wraps else ""
     versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
     for sentence in (
-        f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above {skin.threshold_counts} "
+        f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above "
+        f"{skin.threshold_counts} "
         f"counts, onset above {skin.onset}; force in {skin.force_unit}s.",
         "Arm: none; contact motion is measured on the skin."
         if chain is None
         else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}.",
-        f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with {versions}.",
-        f"Taught {info.taught} of them on a board: accuracies are those from before, and no error "
+        f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with "
+        f"{versions}.",
+        f"Taught {info.taught} of them on a board: accuracies are those from before, "
+        "and no error "
         "rate is certified."
         if info.taught
         else "",

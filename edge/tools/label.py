@@ -87,7 +87,8 @@ def changed(
             )
     if meta.get("contacts") and (names or labels):
         raise InputError(
-            f"{name}: its contacts have labels of their own; `python -m train split` makes a "
+            f"{name}: its contacts have labels of their own; `python -m train split` "
+            "makes a "
             "recording of each"
         )
     renamed = {names.get(task, task): label for task, label in current.items()}

@@ -54,7 +54,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=task_label,
         metavar="TASK=LABEL",
         help="what the skin touches, such as object=box; repeat it for several tasks, or in a "
-        "terminal for several labels, which are then chosen by key; not needed with --web",
+        "terminal for several labels, which are then chosen by key; not needed with "
+        "--web",
     )
     parser.add_argument(
         "--out",
@@ -185,14 +186,21 @@ def run(arguments: argparse.Namespace) -> int:
         )
     with (
         # Angles go by the real clock.
-        reading(arguments, arm=arm, dof=dof, real_time=arguments.joints is not None,
-                folder=folder, labels=labels) as live,
+        reading(
+            arguments,
+            arm=arm,
+            dof=dof,
+            real_time=arguments.joints is not None,
+            folder=folder,
+            labels=labels,
+        ) as live,
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
-    ):  # fmt: skip
+    ):
         if arm is not None and arguments.joints is None and live.opened.dof != dof:
             raise InputError(
-                f"{live.opened.source} gives {live.opened.dof or 'no'} joint angles, but {arguments.arm} has "
+                f"{live.opened.source} gives {live.opened.dof or 'no'} joint angles, "
+                f"but {arguments.arm} has "
                 f"{dof} joints; name another source with --joints"
             )
         names = None if arm is None else arm.names

@@ -145,8 +145,10 @@ class Summary:
         if self.as_trained:
             paragraphs.append(
                 f"{self.as_trained} of {recordings} match a training "
-                "trial to the last bit, so they are most likely training data, and the accuracy "
-                "below does not apply to new touches. The nested accuracy, which `make export` "
+                "trial to the last bit, so they are most likely training data, and the "
+                "accuracy "
+                "below does not apply to new touches. The nested accuracy, which `make "
+                "export` "
                 "and `edge-classify info` print, does."
             )
         for task, pairs in self._pairs.items():

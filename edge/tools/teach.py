@@ -71,9 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
             if not new:
                 of_label = f"left out {of_label}; --new-labels adds it"
             LOG.warning(
-                f"{task}: {of_label}{spelled_like(label, model.info.tasks[task].labels)}"
+                f"{task}: "
+                f"{of_label}{spelled_like(label, model.info.tasks[task].labels)}"
             )
     LOG.info(
-        f"{target}: its accuracy is not measured, and no error rate is certified any more"
+        f"{target}: its accuracy is not measured, and no error rate is certified any "
+        "more"
     )
     return 0

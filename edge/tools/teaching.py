@@ -131,8 +131,10 @@ def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> Mo
         for product, factors in info.products.items():
             if counts and task in (product, *factors):
                 raise InputError(
-                    f"{task} {next(iter(counts))!r} is new, but each {product} is a pair of known "
-                    f"labels of {' and '.join(factors)}; correct it, or export a model with it"
+                    f"{task} {next(iter(counts))!r} is new, but each {product} is a "
+                    "pair of known "
+                    f"labels of {' and '.join(factors)}; correct it, or export a model "
+                    "with it"
                 )
         entry = tasks[task]
         k = min([entry.k, *counts.values()])
@@ -174,7 +176,8 @@ def taught(
             points = [model.decide(vector, point) for point, vector in enumerate(trial)]
         if any(next(iter(decisions.values())).out_of_range for decisions in points):
             raise InputError(
-                f"{name}: lies far outside the trials that the model was fitted on, so its "
+                f"{name}: lies far outside the trials that the model was fitted on, so "
+                "its "
                 "projection cannot place it; export a model with it"
             )
         if not any(
@@ -188,7 +191,8 @@ def taught(
                 for t, e in info.tasks.items()
             ]
             raise InputError(
-                f"{name}: has no label that the model knows ({known}); label it, or teach it with "
+                f"{name}: has no label that the model knows ({known}); label it, or "
+                "teach it with "
                 f"--new-labels{''.join(meant)}"
             )
     contents = model.contents

@@ -225,7 +225,8 @@ class Chain:
         if Path(path).suffix.lower() in (".urdf", ".xml"):
             if base is None or tip is None:
                 raise InputError(
-                    f"{path}: a URDF needs --base and --tip, the arm's first link and the link "
+                    f"{path}: a URDF needs --base and --tip, the arm's first link and "
+                    "the link "
                     "that carries the skin"
                 )
             return cls.from_urdf(path, base, tip)
@@ -274,7 +275,8 @@ def _check_joint(joint: Joint) -> None:
         )
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
         raise InputError(
-            f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its upper limit "
+            f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its "
+            "upper limit "
             f"{joint.limits[1]:g}"
         )
 

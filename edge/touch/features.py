@@ -204,7 +204,8 @@ class _Course:
         for feature, row in zip(group, values, strict=False):
             if np.isinf(row).any():
                 raise OutOfRange(
-                    f"{feature.name} is too large for a number of 64 bits; look at the skin's "
+                    f"{feature.name} is too large for a number of 64 bits; look at the "
+                    "skin's "
                     "counts_per_newton and pitch_m"
                 )
         sampled = np.zeros((len(values), len(times)))

@@ -115,7 +115,8 @@ class Joints:
         """Report the lines that were not used."""
         if self.malformed:
             LOG.warning(
-                f"--joints: unusable lines: {self.malformed}; the last one: {self.problem}"
+                f"--joints: unusable lines: {self.malformed}; the last one: "
+                f"{self.problem}"
             )
 
     def _take(self) -> None:

@@ -193,7 +193,8 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         InputError: the device's skin has another shape or other units than the model's.
     """
     of_device, of_model = (
-        f"{skin.rows} x {skin.cols} taxels, {'closed around' if skin.wraps else 'flat'}, with "
+        f"{skin.rows} x {skin.cols} taxels, "
+        f"{'closed around' if skin.wraps else 'flat'}, with "
         f"forces in {skin.force_unit}s and lengths in {skin.length_unit}s"
         for skin in (device, model)
     )

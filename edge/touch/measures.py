@@ -32,7 +32,8 @@ PAPER = ("max_force", "contact_area", "contact_motion")
 
 ZONES = ("contact", "skin", "left", "right")
 QUANTITIES = tuple(
-    "max_force force area pressure along around spread_along spread_around slant length "
+    "max_force force area pressure along around spread_along spread_around slant "
+    "length "
     "width".split()
 )
 """Of a zone: its taxels' largest force and the sum of their forces; their number; force
@@ -163,7 +164,8 @@ def feature(name: str) -> Feature:
         )
     if "log" in transforms and quantity in SIGNED:
         raise InputError(
-            f"the feature {name!r} may be negative and has no logarithm; take sqrt_{base}"
+            f"the feature {name!r} may be negative and has no logarithm; take "
+            f"sqrt_{base}"
         )
     if quantity in KERNELS and base != name:
         raise InputError(

@@ -234,7 +234,8 @@ class ActiveTaxels:
         """
         if counts.ndim != 2 or counts.dtype.kind not in "ui":
             raise InputError(
-                f"counts must be whole numbers (rows, cols), not {counts.dtype} {counts.shape}"
+                f"counts must be whole numbers (rows, cols), not {counts.dtype} "
+                f"{counts.shape}"
             )
         if valid is not None and (
             valid.shape != counts.shape or valid.dtype != np.bool_
@@ -251,7 +252,8 @@ class ActiveTaxels:
             np.greater(counts, threshold, out=self.mask)
         except ValueError:
             raise InputError(
-                f"threshold must be one number or {counts.shape}, not {np.shape(threshold)}"
+                f"threshold must be one number or {counts.shape}, not "
+                f"{np.shape(threshold)}"
             ) from None
         if valid is not None:
             self.mask &= valid

@@ -158,13 +158,15 @@ class ContactTracker:
     def _check(self, frame: Frame) -> None:
         if frame.counts.shape != self.layout.shape:
             raise InputError(
-                f"a frame of {frame.counts.shape} taxels on a skin of {self.layout.shape}"
+                f"a frame of {frame.counts.shape} taxels on a skin of "
+                f"{self.layout.shape}"
             )
         if not math.isfinite(frame.t):
             raise InputError(f"the time of a frame is not finite: {frame.t}")
         if math.ulp(frame.t) > CLOCK_ROUNDING_S:
             raise InputError(
-                f"the time of a frame is {frame.t:g} s, where a clock in seconds has steps of "
+                f"the time of a frame is {frame.t:g} s, where a clock in seconds has "
+                "steps of "
                 f"{math.ulp(frame.t):.2g} s; give seconds, not milliseconds or less"
             )
         if frame.t < self._t:

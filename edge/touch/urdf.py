@@ -68,7 +68,8 @@ def _joint(
     mimic = element.find("mimic")
     if mimic is not None and kind != "fixed":
         raise InputError(
-            f"{path}: joint {name!r} follows joint {mimic.get('joint')!r} (<mimic>) and "
+            f"{path}: joint {name!r} follows joint {mimic.get('joint')!r} (<mimic>) "
+            "and "
             "has no angle of its own; choose another base or tip, or make it fixed"
         )
     joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}

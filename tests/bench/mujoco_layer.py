@@ -55,9 +55,12 @@ def layer_xml(
         # A body with a face may have no damped joint, so the face hangs on a second
         # body.
         knots += (
-            f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" stiffness="{k * share}" '
-            f'damping="{0.06 * k * share + 0.02}" range="0 {thick_m * 0.9}"/><inertial pos="0 0 0" '
-            f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body name="n{n}"><inertial '
+            f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" '
+            f'stiffness="{k * share}" '
+            f'damping="{0.06 * k * share + 0.02}" range="0 {thick_m * 0.9}"/><inertial '
+            'pos="0 0 0" '
+            f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body '
+            f'name="n{n}"><inertial '
             'pos="0 0 0" mass="1e-5" diaginertia="1e-9 1e-9 1e-9"/></body></body>'
         )
         for beside, stiff in (
@@ -75,7 +78,8 @@ def layer_xml(
     bodies = " ".join(f"n{n}" for n in number.flat)
     face = (
         f'<deformable><flex name="face" dim="2" radius="{FACE_M}" body="{bodies}" '
-        f'vertex="{"0 0 0 " * number.size}" element="{" ".join(map(str, triangles))}"><contact '
+        f'vertex="{"0 0 0 " * number.size}" '
+        f'element="{" ".join(map(str, triangles))}"><contact '
         f'contype="2" conaffinity="1" selfcollide="none" condim="1" solref="{CONTACT}" '
         'solimp="0.95 0.95 0.001"/></flex></deformable>'
     )

@@ -185,7 +185,8 @@ def stems_xml(thing: Thing) -> str:
         half = rng.uniform(0.34, 0.5) / 2
         xml += (
             f'<body pos="{x} {y} 0.02" childclass="stem"><joint stiffness="{hinge}" '
-            f'damping="{0.03 * hinge}"/><geom size="0.006 {half}" pos="0 0 {half}"/></body>'
+            f'damping="{0.03 * hinge}"/><geom size="0.006 {half}" pos="0 0 '
+            f'{half}"/></body>'
         )
     return xml
 

@@ -99,7 +99,8 @@ def draw_odd(rng: np.random.Generator) -> Thing:
     between = partial(log_uniform, rng)
     slide = f'<joint type="slide" axis="1 0 0" frictionloss="{between(0.5, 4.0)}" damping="2"/>'
     hinge = (
-        f'<joint type="hinge" axis="0 0 1" pos="0 {rng.choice([-1, 1]) * between(0.3, 0.7)} 0" '
+        '<joint type="hinge" axis="0 0 1" pos="0 '
+        f'{rng.choice([-1, 1]) * between(0.3, 0.7)} 0" '
         f'frictionloss="{between(0.2, 1.5)}" damping="0.5"/>'
     )
     changes: dict[str, dict[str, Any]] = {

@@ -135,11 +135,13 @@ def without_a_pose(touch):
     ("change", "flags"),
     [
         (lambda touch: touch, ()),
-        (lambda touch: replace(touch, valid=np.arange(384).reshape(16, 24) > 0),
-         ("missing_taxels",)),
+        (
+            lambda touch: replace(touch, valid=np.arange(384).reshape(16, 24) > 0),
+            ("missing_taxels",),
+        ),
         (without_a_pose, ("missing_pose",)),
     ],
-)  # fmt: skip
+)
 def test_a_new_touch_is_flagged_only_where_something_is_missing(
     model, make_touch, change, flags
 ):

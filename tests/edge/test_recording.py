@@ -88,7 +88,8 @@ WRONG = {
     ),
     "negative frames": (
         change(frames=np.full((180, 16, 24), -3)),
-        "go down to -3, but counts are above baseline: subtract the frame before touch, then use",
+        "go down to -3, but counts are above baseline: subtract the frame before "
+        "touch, then use",
     ),
     "frames not finite": (
         change(frames=np.full((180, 16, 24), np.nan)),
@@ -235,15 +236,17 @@ def test_other_units_are_scaled_by_the_factor_that_is_given_and_kept(tmp_path):
         (1.0, ""),
         (
             1e3,
-            "has a median of 0.1 frames a second; t is in seconds, and these may be in millisec",
+            "has a median of 0.1 frames a second; t is in seconds, and these may be in "
+            "millisec",
         ),
         (1e9, "these may be in nanoseconds"),
         (1e-3, "has a median of 100000 frames a second; t is in seconds"),
         (0.0, "t is in seconds"),
     ],
 )
-def test_times_that_do_not_seem_to_be_in_seconds_are_named(make_touch, tmp_path, caplog, factor,
-                                                           said):  # fmt: skip
+def test_times_that_do_not_seem_to_be_in_seconds_are_named(
+    make_touch, tmp_path, caplog, factor, said
+):
     recording = make_touch()
     save(tmp_path / "a.npz", replace(recording, t=recording.t * factor))
     assert (said in caplog.text) if said else not caplog.text

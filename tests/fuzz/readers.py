@@ -236,22 +236,56 @@ TABLES = [
 """A trial of a sensor whose values fall, and two trials with a value a row."""
 
 READERS = (
-    Reader("recording", ".npz", recordings, mutate.of_npz,
-           lambda path: command(edge_main, "replay", "--summary", "--model", MODEL, path)),
-    Reader("model", ".onnx", files("tests/golden/model.onnx", "edge/demo/model.onnx"),
-           mutate.of_onnx, read_model),
-    Reader("golden", ".npz", files("tests/golden/demo.npz"), mutate.of_npz,
-           lambda path: command(edge_main, "verify", "--model", MODEL, "--golden", path)),
-    Reader("skin", ".toml", skins, mutate.of_text, lambda path: command(edge_main, "check", path)),
+    Reader(
+        "recording",
+        ".npz",
+        recordings,
+        mutate.of_npz,
+        lambda path: command(edge_main, "replay", "--summary", "--model", MODEL, path),
+    ),
+    Reader(
+        "model",
+        ".onnx",
+        files("tests/golden/model.onnx", "edge/demo/model.onnx"),
+        mutate.of_onnx,
+        read_model,
+    ),
+    Reader(
+        "golden",
+        ".npz",
+        files("tests/golden/demo.npz"),
+        mutate.of_npz,
+        lambda path: command(edge_main, "verify", "--model", MODEL, "--golden", path),
+    ),
+    Reader(
+        "skin",
+        ".toml",
+        skins,
+        mutate.of_text,
+        lambda path: command(edge_main, "check", path),
+    ),
     Reader("arm", ".toml", files("edge/arms/cody.toml"), mutate.of_text, read_chain),
     Reader("urdf", ".urdf", lambda: [ARM.encode()], mutate.of_text, read_chain),
-    Reader("map", ".jsonl", lambda: [MAP.encode()], mutate.of_text,
-           lambda path: list(TouchMap(path))),
-    Reader("scene", ".toml", files("train/scenes/*.toml"), mutate.of_text, load_scene,
-           lambda path: shutil.copy(ROOT / "train" / "scenes" / "cody18.toml", path.parent)),
+    Reader(
+        "map",
+        ".jsonl",
+        lambda: [MAP.encode()],
+        mutate.of_text,
+        lambda path: list(TouchMap(path)),
+    ),
+    Reader(
+        "scene",
+        ".toml",
+        files("train/scenes/*.toml"),
+        mutate.of_text,
+        load_scene,
+        lambda path: shutil.copy(
+            ROOT / "train" / "scenes" / "cody18.toml", path.parent
+        ),
+    ),
     Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),
-)  # fmt: skip
+)

@@ -78,8 +78,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     machine, shares = ask(arguments.golden, arguments.python, str(ROOT))
     farthest = max(shares, key=lambda key: shares[key])
     print(
-        f"ONNX Runtime {machine['onnxruntime']} on {machine['machine']}: {len(shares)} quantities "
-        f"of {len(sets(arguments.golden))} hard sets, the farthest at {shares[farthest]:.2g} of "
+        f"ONNX Runtime {machine['onnxruntime']} on {machine['machine']}: {len(shares)} "
+        "quantities "
+        f"of {len(sets(arguments.golden))} hard sets, the farthest at "
+        f"{shares[farthest]:.2g} of "
         f"its bound ({': '.join(farthest)})"
     )
     return int(shares[farthest] > 1.0)

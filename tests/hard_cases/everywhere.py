@@ -80,7 +80,8 @@ def engine_usual() -> str:
     X, queries = near_duplicates(160, 1e-7, 0, 200)
     pipe = usual_pipeline(X, 20, 1, np.arange(len(X)))
     shares = ", ".join(
-        f"{name} {np.mean(answer(queries) != [answer(q[None])[0] for q in queries]):.0%}"
+        f"{name} "
+        f"{np.mean(answer(queries) != [answer(q[None])[0] for q in queries]):.0%}"
         for name, answer in (
             ("skl2onnx", converted(pipe, X)),
             ("scikit-learn", pipe.predict),

@@ -110,7 +110,8 @@ def gap_usual() -> str:
         changed += [a.label != b.label for a, b in zip(right, blind, strict=True)]
         sure += [event.confidence for event in blind]
     return (
-        f"interpolation alone, after a pause of 5 s: {sum(changed)} of {len(changed)} labels are "
+        f"interpolation alone, after a pause of 5 s: {sum(changed)} of {len(changed)} "
+        "labels are "
         f"others, with a mean confidence of {np.mean(sure):.2g}"
     )
 

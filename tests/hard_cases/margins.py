@@ -87,7 +87,8 @@ def prices() -> Mapping[str, str]:
         1e6 * min(repeat(call, number=1, repeat=2000)) for call in calls
     )
     decision = (
-        f"{graph:.0f} us a decision in all, against {usual:.0f} by skl2onnx (160 rows); near-"
+        f"{graph:.0f} us a decision in all, against {usual:.0f} by skl2onnx (160 "
+        "rows); near-"
         "duplicates closer than about 1e-6 of a deviation count as equal"
     )
     fit = "0 us and 0 bytes on the board: it is paid when the model is fitted"

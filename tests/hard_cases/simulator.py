@@ -35,7 +35,8 @@ def lugre(h: float, v: float = 0.2, sigma: float = 1e5, hold: float = 1.0) -> fl
 
 CASES = [
     Case(
-        "simulator: stiffness x mass x step x friction, 1e-3 to 1e15 N/m, 1e-9 to 1e9 kg",
+        "simulator: stiffness x mass x step x friction, 1e-3 to 1e15 N/m, 1e-9 to 1e9 "
+        "kg",
         "force, stick, energy ledger",
         "pushes with a complaint",
         push_error,

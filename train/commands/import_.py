@@ -71,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         path = arguments.out / f"{name}.npz"
         if not name or path.parent != arguments.out:
             raise InputError(
-                f"{arguments.file}: the trial {name!r} needs a name that a file can have"
+                f"{arguments.file}: the trial {name!r} needs a name that a file can "
+                "have"
             )
         if path in paths:
             raise InputError(
@@ -98,8 +99,10 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
         save(path, replace(recording, meta=meta))
     touched, _ = count_contacts(recordings, threshold, onset)
     return (
-        f"threshold {threshold} and onset {onset} counts, from the noise before contact: {touched} "
-        f"of {len(trials)} have a contact; `python -m train thresholds` compares other thresholds"
+        f"threshold {threshold} and onset {onset} counts, from the noise before "
+        f"contact: {touched} "
+        f"of {len(trials)} have a contact; `python -m train thresholds` compares other "
+        "thresholds"
     )
 
 

@@ -38,13 +38,16 @@ def run(arguments: argparse.Namespace) -> int:
     for name, low, high in bar(rows, desc="following", leave=False):
         counts[name] = touched, total = count_contacts(recordings, low, high)
         tqdm.write(
-            f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  {total:>8}"
+            f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  "
+            f"{total:>8}"
         )
     print(f"use: --threshold {threshold} --onset {onset}")
     hidden = max(counts.values())[0] - counts["proposed"][0]
     if hidden:
         print(
-            f"other thresholds show a contact in {hidden} more of the recordings; this is noise, "
-            "or touches as weak as noise. `make export` also tries lower ones and keeps the best"
+            f"other thresholds show a contact in {hidden} more of the recordings; this "
+            "is noise, "
+            "or touches as weak as noise. `make export` also tries lower ones and "
+            "keeps the best"
         )
     return 0

@@ -109,10 +109,16 @@ def _draw(
         if decided is not None:
             share = f"{decided.confidence:.0%} after {decided.window_s:g} s"
             column[3].text(
-                0.5, -0.45, f"decided: {decided.label}\n{share}",
-                transform=column[3].transAxes, ha="center", va="top", fontsize=13,
-                color="C1", weight="bold",
-            )  # fmt: skip
+                0.5,
+                -0.45,
+                f"decided: {decided.label}\n{share}",
+                transform=column[3].transAxes,
+                ha="center",
+                va="top",
+                fontsize=13,
+                color="C1",
+                weight="bold",
+            )
     for axis, title, unit in zip(
         axes[1:, 0], TITLES, units(recordings[0][1].layout).values(), strict=True
     ):

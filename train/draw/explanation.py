@@ -119,7 +119,8 @@ def draw(
         cases.append(Case(title, touch, near, line["pulls"], rival["label"]))
     if not any(known.values()):
         raise InputError(
-            f"{folder}: holds none of the nearest trials, such as {next(iter(known))}; name their "
+            f"{folder}: holds none of the nearest trials, such as {next(iter(known))}; "
+            "name their "
             "folder by --data"
         )
     with mpl.rc_context(STYLE):

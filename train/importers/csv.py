@@ -47,19 +47,47 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
     rate, scale = within(float, 1e-3, FASTEST_HZ), within(float, 1e-12, 1e12)
     for name, form, text in (
-        ("--rate", {"type": rate, "metavar": "HZ"}, "frames a second, if no column is the time"),
-        ("--frames", {"action": "store_true"}, "a folder is a trial, and a file in it a frame, "
-         "named by its time in seconds, or by its number if --rate is given"),
-        ("--time", {"metavar": "COL"}, f"the time in seconds (default: {', '.join(TIMES)})"),
+        (
+            "--rate",
+            {"type": rate, "metavar": "HZ"},
+            "frames a second, if no column is the time",
+        ),
+        (
+            "--frames",
+            {"action": "store_true"},
+            "a folder is a trial, and a file in it a frame, "
+            "named by its time in seconds, or by its number if --rate is given",
+        ),
+        (
+            "--time",
+            {"metavar": "COL"},
+            f"the time in seconds (default: {', '.join(TIMES)})",
+        ),
         ("--taxels", {"metavar": "COLS"}, "the taxels (default: all other columns)"),
         ("--joints", {"metavar": "COLS"}, "joint angles in radians"),
         ("--degrees", {"action": "store_true"}, "joint angles are in degrees"),
-        ("--shape", {"metavar": "ROWSxCOLS"}, "of the skin (default: skin.json's, or one row)"),
-        ("--falls", {"action": "store_true"}, "values fall under pressure: subtract them from "
-         "those at rest, which are those of the trial with the quietest start"),
-        ("--scale", {"type": scale, "default": 1.0}, "counts in a unit of values with fractions"),
-        ("--task", {"default": "object"}, "the task of these labels (default: %(default)s)"),
-    ):  # fmt: skip
+        (
+            "--shape",
+            {"metavar": "ROWSxCOLS"},
+            "of the skin (default: skin.json's, or one row)",
+        ),
+        (
+            "--falls",
+            {"action": "store_true"},
+            "values fall under pressure: subtract them from "
+            "those at rest, which are those of the trial with the quietest start",
+        ),
+        (
+            "--scale",
+            {"type": scale, "default": 1.0},
+            "counts in a unit of values with fractions",
+        ),
+        (
+            "--task",
+            {"default": "object"},
+            "the task of these labels (default: %(default)s)",
+        ),
+    ):
         parser.add_argument(name, help=text, **form)
 
 
@@ -152,7 +180,8 @@ def trials(
         frames = np.rint(counts).clip(0.0, 65535.0).astype(np.uint16)
         if np.abs(frames - counts).max() > (0.5 if options.scale != 1.0 else 0.0):
             raise InputError(
-                f"{table.path}: {counts.min():g} to {counts.max():g} are no counts (whole numbers "
+                f"{table.path}: {counts.min():g} to {counts.max():g} are no counts "
+                "(whole numbers "
                 "from 0 to 65535); see --falls, --scale and --taxels"
             )
         meta: dict[str, Any] = {

@@ -136,7 +136,8 @@ class Log:
         if size is None:
             known = ", ".join(kinds)
             raise InputError(
-                f"{self.path}: the images of {topic} are {message.encoding}; they must be {known}"
+                f"{self.path}: the images of {topic} are {message.encoding}; they must "
+                f"be {known}"
             )
         raw = np.asarray(message.data, dtype=np.uint8)
         if (
@@ -157,13 +158,16 @@ class Log:
             skin = self.beside.table("skin", {})
             if not (skin.has("rows") and skin.has("cols")):
                 raise InputError(
-                    f"{self.path}: {topic} does not state its rows and columns; put them as "
-                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into {self.path.stem}.json beside it'
+                    f"{self.path}: {topic} does not state its rows and columns; put "
+                    "them as "
+                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into '
+                    f"{self.path.stem}.json beside it"
                 )
             shape = [skin.whole("rows"), skin.whole("cols")]
         if values.size != math.prod(shape):
             raise InputError(
-                f"{self.path}: a message of {topic} has {values.size} values, not {shape}"
+                f"{self.path}: a message of {topic} has {values.size} values, not "
+                f"{shape}"
             )
         return self._counts(topic, values.reshape(shape))
 
@@ -188,7 +192,8 @@ class Log:
         name, frames = self._topic("frames", self._frames)
         if not frames:
             raise InputError(
-                f"{self.path}: holds no frames; they must be {' or '.join(FRAMES)}, or JSON "
+                f"{self.path}: holds no frames; they must be {' or '.join(FRAMES)}, or "
+                "JSON "
                 '{"counts": [[...]]}'
             )
         frames = sorted(frames, key=lambda entry: entry[0])
@@ -234,7 +239,8 @@ class Log:
                 )
         elif self.arm is not None and len(logged) != self.arm.dof:
             raise InputError(
-                f"{self.path}: {topic} has {len(logged)} angles without names, but the arm has "
+                f"{self.path}: {topic} has {len(logged)} angles without names, but the "
+                "arm has "
                 f"{self.arm.dof} joints"
             )
         first = max(min(series[name])[0] for name in wanted)
@@ -242,7 +248,8 @@ class Log:
         gap_s = max(first - t[0], t[-1] - last)
         if gap_s > OLDEST_S:
             LOG.warning(
-                f"{self.path}: {topic} lacks joint angles for up to {gap_s:.2f} s of the frames; "
+                f"{self.path}: {topic} lacks joint angles for up to {gap_s:.2f} s of "
+                "the frames; "
                 "the nearest ones are used"
             )
         angles = np.stack([_at(t, series[name]) for name in wanted], axis=1)
@@ -254,7 +261,8 @@ class Log:
         name = self.beside.get(f"{kind}_topic", None)
         if name is None and len(topics) > 1:
             raise InputError(
-                f"{self.path}: {kind} are on {', '.join(sorted(topics))}; name one of them as "
+                f"{self.path}: {kind} are on {', '.join(sorted(topics))}; name one of "
+                "them as "
                 f'"{kind}_topic" in {self.path.stem}.json beside it'
             )
         if name is None:

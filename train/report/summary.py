@@ -90,8 +90,10 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
 def accuracy(chosen: Chosen) -> str:
     """The nested accuracy of a task in words."""
     numbers = (
-        f"{chosen.accuracy.accuracy:.1%} of {chosen.accuracy.total} trials are classified "
-        f"correctly (95 % interval {interval(chosen.accuracy)}), each by a model chosen and fitted "
+        f"{chosen.accuracy.accuracy:.1%} of {chosen.accuracy.total} trials are "
+        "classified "
+        f"correctly (95 % interval {interval(chosen.accuracy)}), each by a model "
+        "chosen and fitted "
         "without "
     )
     if chosen.left_out == TRIAL:
@@ -132,12 +134,14 @@ def warnings(fitted: Fitted) -> list[str]:
     for lacking, paths in dataset.left_out.items():
         total = len({trial.path for trial in dataset.trials} | set(paths))
         lines.append(
-            f"warning: {len(paths)} of {total} recordings are left out for lack of {lacking}: "
+            f"warning: {len(paths)} of {total} recordings are left out for lack of "
+            f"{lacking}: "
             f"{_files(paths)}"
         )
     if dataset.unused:
         lines.append(
-            f"warning: only the first of several contacts is used in {_files(dataset.unused)}; "
+            "warning: only the first of several contacts is used in "
+            f"{_files(dataset.unused)}; "
             "`python -m train split` makes a recording of each contact"
         )
     longest = max(
@@ -145,7 +149,8 @@ def warnings(fitted: Fitted) -> list[str]:
     )
     if fitted.window_s > longest + 1e-9:
         lines.append(
-            f"warning: the window of {fitted.window_s:g} s is too long: every recording ends "
+            f"warning: the window of {fitted.window_s:g} s is too long: every "
+            "recording ends "
             f"within {longest:.2f} s of the onset"
         )
     return [
@@ -171,9 +176,12 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     ):
         share = posture_accuracy(dataset, task)
         lines.append(
-            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
-            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may recognise "
-            "places instead of objects; leave posture out of --features to judge touch alone"
+            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset "
+            "alone "
+            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
+            "recognise "
+            "places instead of objects; leave posture out of --features to judge touch "
+            "alone"
         )
     if choice.components > components and choice.projection == "pca":
         lines.append(
@@ -184,16 +192,20 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     equal = tied_across_labels(rows, classifier.labels_[task])
     if equal:
         lines.append(
-            f"warning: {task}: {equal} trials have the same coordinates as a trial with another "
-            "label; the earlier trial counts as nearer, so their order decides the label"
+            f"warning: {task}: {equal} trials have the same coordinates as a trial "
+            "with another "
+            "label; the earlier trial counts as nearer, so their order decides the "
+            "label"
         )
     projection = classifier.projections_[space]
     steps, place = coarseness(rows, projection.grid_.unit)
     if steps < FEWEST_UNITS:
         farthest = dataset.trials[classifier.members_[space][place]].path
         lines.append(
-            f"warning: {task}: half of the trials lie within {steps:.0f} of the model's steps from "
-            f"another trial, because {farthest} lies far outside all others; leave it out if the "
+            f"warning: {task}: half of the trials lie within {steps:.0f} of the "
+            "model's steps from "
+            f"another trial, because {farthest} lies far outside all others; leave it "
+            "out if the "
             "recording is wrong"
         )
     if projection.gap_ < CLOSE_EIGENVALUES:

@@ -317,7 +317,8 @@ def explain(scene: Scene) -> str:
                 for s in first.values()
             }
             lines.append(
-                f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  {', '.join(sorted(why))}"
+                f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  "
+                f"{', '.join(sorted(why))}"
             )
     unused = [
         name
@@ -342,6 +343,7 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
     if not measured.within:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
     return (
-        f"  step {1e3 * step_s:g} ms; {verdict} (error {tried}; order {measured.order:.2g}; "
+        f"  step {1e3 * step_s:g} ms; {verdict} (error {tried}; order "
+        f"{measured.order:.2g}; "
         f"reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
     )

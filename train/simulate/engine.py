@@ -120,9 +120,12 @@ def begin(
         i = int(np.argmax(held))
         trial, yaw = t.specs[i], abs(t.values["yaw_deg"][i])
         raise InputError(
-            f"{scene.name}: object {trial.object.name!r} touches the arm before it moves, in "
-            f"trial {trial.number} of {trial.key}, where the face is turned by {yaw:.0f} degrees; "
-            "give spread.yaw_deg or the object's width_m less, or trials.lead_s more time"
+            f"{scene.name}: object {trial.object.name!r} touches the arm before it "
+            "moves, in "
+            f"trial {trial.number} of {trial.key}, where the face is turned by "
+            f"{yaw:.0f} degrees; "
+            "give spread.yaw_deg or the object's width_m less, or trials.lead_s more "
+            "time"
         )
     return t
 
@@ -207,8 +210,10 @@ def run_physics(
             active = active[t.frame[active] < frames - 1]
     if t.lost.any():
         raise EdgeError(
-            f"{scene.name}: the forearm's tilt was not found in {np.count_nonzero(t.lost)} "
-            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+            f"{scene.name}: the forearm's tilt was not found in "
+            f"{np.count_nonzero(t.lost)} "
+            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less "
+            "extreme values"
         )
     times = np.arange(frames) / scene.trials["rate_hz"]
     check_energy(t, joints, times)
@@ -266,8 +271,10 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
         i = int(np.argmax(made.any(axis=1)))
         frame = int(np.argmax(made[i]))
         raise EdgeError(
-            f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes energy: "
-            f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J of the "
+            f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes "
+            "energy: "
+            f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J "
+            "of the "
             f"{brought[i, frame]:.3g} J put in; give [step_s] a smaller step, or the "
             "object less extreme values"
         )

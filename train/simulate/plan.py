@@ -195,8 +195,10 @@ def check_supported(scene: Scene, where: str) -> None:
             yields = name in FAMILIES[item.family].effects[:1]
             if yields or EFFECTS[name].condition in item.conditions:
                 raise InputError(
-                    f"{where}: effects.leave_out leaves out {name}, without which object "
-                    f"{item.name!r} would not be {'soft' if yields else 'movable'}, as its label "
+                    f"{where}: effects.leave_out leaves out {name}, without which "
+                    "object "
+                    f"{item.name!r} would not be {'soft' if yields else 'movable'}, as "
+                    "its label "
                     "says"
                 )
     required_by_object = [
@@ -206,7 +208,8 @@ def check_supported(scene: Scene, where: str) -> None:
         "inertia" in required for required in required_by_object
     ):
         raise InputError(
-            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one number a joint"
+            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one "
+            "number a joint"
         )
     for name in scene.add:
         if any(name in required for required in required_by_object):

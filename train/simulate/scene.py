@@ -70,7 +70,8 @@ def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
     out = dict(read_toml(Path(path).parent / name).raw)
     if "like" in out:
         raise InputError(
-            f"{os.fspath(path)}: like names {name}, which is itself like another scene; name that "
+            f"{os.fspath(path)}: like names {name}, which is itself like another "
+            "scene; name that "
             "scene instead, and give the differences here"
         )
     for key, value in table.items():
@@ -114,14 +115,18 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     room_m = min(skin.row0_z_m - place_m, place_m - _last_row_m(skin)) / FARTHEST
     if spread["place_m"] > room_m + 1e-12:
         raise InputError(
-            f"{where}: spread.place_m must be at most {math.floor(1e4 * room_m) / 1e4:g}, not "
-            f"{spread['place_m']:g}: some objects would be met beyond the skin's rows, as "
-            f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the spread away"
+            f"{where}: spread.place_m must be at most "
+            f"{math.floor(1e4 * room_m) / 1e4:g}, not "
+            f"{spread['place_m']:g}: some objects would be met beyond the skin's rows, "
+            "as "
+            f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the "
+            "spread away"
         )
     for key, needed in schema.SPREAD_OF_MOVABLE.items():
         if spread[key] > 0.0 and not any(key in item.given for item in scene.objects):
             raise InputError(
-                f"{where}: spread.{key} has nothing to differ in: give a movable object {needed}, "
+                f"{where}: spread.{key} has nothing to differ in: give a movable "
+                f"object {needed}, "
                 f"or leave spread.{key} out"
             )
     check_supported(scene, where)
@@ -152,7 +157,8 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     for joint in chain.joints:
         if joint.kind == "prismatic":
             raise InputError(
-                f"{table.called('chain')}: joint {joint.name!r} slides; the simulator's arms only "
+                f"{table.called('chain')}: joint {joint.name!r} slides; the "
+                "simulator's arms only "
                 "turn: make it fixed"
             )
     out: dict[str, Any] = {"arm": chain}
@@ -208,8 +214,10 @@ def _motion(
     stroke_s = min(travel_s, max(stops_s))
     if lead.high >= stroke_s:
         raise InputError(
-            f"{table.where}: the arm's stroke ends after {stroke_s:g} s (motion.travel_s, or a "
-            f"joint's limit), before it meets an object at {lead.high:g} s (trials.lead_s)"
+            f"{table.where}: the arm's stroke ends after {stroke_s:g} s "
+            "(motion.travel_s, or a "
+            f"joint's limit), before it meets an object at {lead.high:g} s "
+            "(trials.lead_s)"
         )
     return {"start": start, "rate": rate, "travel_s": travel_s, "place_m": place_m}
 

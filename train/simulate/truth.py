@@ -138,8 +138,10 @@ def _next_draws(
     first = last.attempt + 1
     if first >= REDRAWS:
         raise InputError(
-            f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but each of "
-            f"{REDRAWS} draws contradicted that within {scene.labels['window_s']:g} s of the touch "
+            f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but "
+            "each of "
+            f"{REDRAWS} draws contradicted that within {scene.labels['window_s']:g} s "
+            "of the touch "
             f"(the last {wrong.course}); {wrong.remedy}"
         )
     for attempt in range(first, min(first + AHEAD, REDRAWS)):

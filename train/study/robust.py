@@ -92,7 +92,8 @@ def section(context: Context) -> Section | None:
     unchanged, *series = context.workers.map("simulated again", simulated_again, cases)
     if not np.array_equal(vectors(unchanged), X):
         raise InputError(
-            f"the scene {scene.name} gives other trials than these recordings; give the scene that "
+            f"the scene {scene.name} gives other trials than these recordings; give "
+            "the scene that "
             "they were simulated from, simulate it again, or study them without a scene"
         )
     changed = [vectors(contacts) for contacts in series]
@@ -129,13 +130,19 @@ def section(context: Context) -> Section | None:
     return Section(
         "Another speed, arm or sensor",
         [
-            "Each row simulates the scene again with one change and the same random draws. The "
-            "changes are half and twice the speed of the equilibrium point over the same distance, "
-            "half and twice the stiffness of all joints, and each effect of the sensor at its "
+            "Each row simulates the scene again with one change and the same random "
+            "draws. The "
+            "changes are half and twice the speed of the equilibrium point over the "
+            "same distance, "
+            "half and twice the stiffness of all joints, and each effect of the sensor "
+            "at its "
             "default size. An effect that the scene has is left out instead.",
-            "All tests are on changed trials. The first bar is a classifier that was trained on "
-            "changed trials too; the second was trained on the trials as they were recorded. The "
-            "gap between them is the cost for a robot that was not trained for the change. The "
+            "All tests are on changed trials. The first bar is a classifier that was "
+            "trained on "
+            "changed trials too; the second was trained on the trials as they were "
+            "recorded. The "
+            "gap between them is the cost for a robot that was not trained for the "
+            "change. The "
             "unchanged version of a test trial is never in the training set.",
         ],
         [Table("robustness", "Accuracy after each change", rows)],

@@ -73,7 +73,8 @@ def study(
     dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(
-            f"{counted(len(dataset.trials), 'trial')} are too few to study; give {FEWEST} or more"
+            f"{counted(len(dataset.trials), 'trial')} are too few to study; give "
+            f"{FEWEST} or more"
         )
     context = Context(
         dataset, source, Workers(jobs, None if address is None else "dask")
@@ -81,7 +82,8 @@ def study(
     constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
         raise InputError(
-            f"every trial has the same {' and the same '.join(constant)}: there is nothing to "
+            f"every trial has the same {' and the same '.join(constant)}: there is "
+            "nothing to "
             "distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
@@ -117,10 +119,13 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     if scene is not None:
         source = f"The trials were simulated from the scene {scene.name} with seed {scene.seed}."
     lead = [
-        f"{counted(len(dataset.trials), 'trial')} on {layout.rows} x {layout.cols} taxels, with "
+        f"{counted(len(dataset.trials), 'trial')} on {layout.rows} x {layout.cols} "
+        "taxels, with "
         f"the tasks {tasks}. Force is in {layout.force_unit}s; motion is in "
-        f"{layout.length_unit}s, in the frame of the {frame}. {source} Apart from the findings, "
-        "accuracies come from leave-one-out cross-validation, with 95 % binomial (Wilson) "
+        f"{layout.length_unit}s, in the frame of the {frame}. {source} Apart from the "
+        "findings, "
+        "accuracies come from leave-one-out cross-validation, with 95 % binomial "
+        "(Wilson) "
         "intervals."
     ]
     if constant:
@@ -129,7 +134,8 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
         )
     if dataset.untouched:
         lead.append(
-            f"Left out: {counted(len(dataset.untouched), 'recording')} without a contact."
+            f"Left out: {counted(len(dataset.untouched), 'recording')} without a "
+            "contact."
         )
     return lead
 

@@ -74,9 +74,12 @@ def confusion(context: Context) -> Section:
     return Section(
         "Classification (Figs. 6 to 8)",
         [
-            "The classifier uses the paper's three features over 1.2 s, unscaled. A grid search "
-            "with leave-one-out tries 1 to 20 components and k from 1 to 20, and takes the "
-            "smallest of equally accurate models. The accuracy shown is the one that the search "
+            "The classifier uses the paper's three features over 1.2 s, unscaled. A "
+            "grid search "
+            "with leave-one-out tries 1 to 20 components and k from 1 to 20, and takes "
+            "the "
+            "smallest of equally accurate models. The accuracy shown is the one that "
+            "the search "
             "maximised, so it is too high."
         ],
         [
@@ -99,13 +102,16 @@ def window(context: Context) -> Section:
     for task in context.labels:
         at = {seconds: result[task].accuracy for seconds, result in results.items()}
         text.append(
-            f"{task}: {at[0.8]:.1%} of the decisions are right after 0.8 s, {at[1.2]:.1%} after "
+            f"{task}: {at[0.8]:.1%} of the decisions are right after 0.8 s, "
+            f"{at[1.2]:.1%} after "
             f"1.2 s and {at[2.0]:.1%} after 2 s."
         )
     if "category" in context.labels and context.scene is not None:
         text.append(
-            "In the paper, accuracy falls substantially when the window is shortened from 1.2 s to "
-            "0.8 s. Physics sets a limit: a movable object cannot be told from a fixed one before "
+            "In the paper, accuracy falls substantially when the window is shortened "
+            "from 1.2 s to "
+            "0.8 s. Physics sets a limit: a movable object cannot be told from a fixed "
+            "one before "
             "static friction breaks."
         )
     title = "Effect of the time window (Fig. 10)"
@@ -119,12 +125,18 @@ def window(context: Context) -> Section:
 def scaling(context: Context) -> Section:
     """Accuracy with each scaling (Table II)."""
     text = (
-        "Scaling follows the paper's Eqs. 1 to 5. The statistics of a feature are taken over all "
-        "of its samples in the training trials of a fold. Methods I and II differ only by a "
-        "constant for each feature, and so do Method III and no scaling. PCA subtracts the mean, "
-        "and the constant with it, so each pair is the same classifier and has the same accuracy "
-        "here, up to rounding. In the paper, the two methods of a pair differ by up to 9.3 points "
-        "(80 % and 75 %, 72.14 % and 62.86 %). Either its statistics were not taken over all "
+        "Scaling follows the paper's Eqs. 1 to 5. The statistics of a feature are "
+        "taken over all "
+        "of its samples in the training trials of a fold. Methods I and II differ only "
+        "by a "
+        "constant for each feature, and so do Method III and no scaling. PCA subtracts "
+        "the mean, "
+        "and the constant with it, so each pair is the same classifier and has the "
+        "same accuracy "
+        "here, up to rounding. In the paper, the two methods of a pair differ by up to "
+        "9.3 points "
+        "(80 % and 75 %, 72.14 % and 62.86 %). Either its statistics were not taken "
+        "over all "
         "trials, or its PCA did not subtract the mean."
     )
     cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
@@ -206,9 +218,14 @@ def resolution(context: Context) -> Section:
         task: {float(n): p for n, p in papers("I", task).items()} for task in labels
     }
     png = figures.lines(
-        "resolution", title, taxels, by_task(results), label="taxels",
-        paper=theirs if context.scene else None, ticks=list(map(str, taxels)),
-    )  # fmt: skip
+        "resolution",
+        title,
+        taxels,
+        by_task(results),
+        label="taxels",
+        paper=theirs if context.scene else None,
+        ticks=list(map(str, taxels)),
+    )
     cells = [
         row | {"without contact": lost[row["taxels"]]}
         for row in rows("taxels", results, "I")
@@ -216,9 +233,12 @@ def resolution(context: Context) -> Section:
     return Section(
         title,
         [
-            "A larger taxel reads the whole force on its area, which is the sum over the taxels "
-            "that it replaces. The threshold in newtons stays the same. With a single taxel, the "
-            "contact area only tells whether there is contact, and the contact motion is that of "
+            "A larger taxel reads the whole force on its area, which is the sum over "
+            "the taxels "
+            "that it replaces. The threshold in newtons stays the same. With a single "
+            "taxel, the "
+            "contact area only tells whether there is contact, and the contact motion "
+            "is that of "
             "the skin's middle, which follows from the joint angles.",
         ],
         [Table("resolution", "Accuracy with larger taxels", cells)],

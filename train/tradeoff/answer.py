@@ -104,17 +104,25 @@ def early(measured: Measured) -> Section:
     return Section(
         "Early decisions",
         [
-            "With a requested error rate, the model decides as soon as it is sure enough. Each of "
-            f"{FOLDS} folds tests this once, with a model that was chosen, trained and calibrated "
-            "on the other folds. Error rates that no fold certifies have no row; those that only "
+            "With a requested error rate, the model decides as soon as it is sure "
+            "enough. Each of "
+            f"{FOLDS} folds tests this once, with a model that was chosen, trained and "
+            "calibrated "
+            "on the other folds. Error rates that no fold certifies have no row; those "
+            "that only "
             "some folds certify are tested on fewer contacts.",
-            "A contact unlike all trained ones waits for the full window. It gets no label of the "
+            "A contact unlike all trained ones waits for the full window. It gets no "
+            "label of the "
             f"task {finest(measured.y)}, which counts as wrong.",
-            f"The model runs once at each decision point, which takes {decision_us:.0f} us of "
-            f"features and decision on {board.name}. All {count} decision points together take "
-            f"{1e-3 * count * decision_us:.1f} ms for a contact, while the program waits for the "
+            "The model runs once at each decision point, which takes "
+            f"{decision_us:.0f} us of "
+            f"features and decision on {board.name}. All {count} decision points "
+            "together take "
+            f"{1e-3 * count * decision_us:.1f} ms for a contact, while the program "
+            "waits for the "
             "contact to unfold.",
-            "The confidence differs from the share of right decisions by this many percentage "
+            "The confidence differs from the share of right decisions by this many "
+            "percentage "
             f"points on average: {', '.join(gaps)}.",
         ],
         [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
@@ -139,10 +147,14 @@ def prices(measured: Measured) -> Section:
     return Section(
         "The price of a wrong decision",
         [
-            "Waiting makes errors rarer, and costs time. In this table a wrong decision costs "
-            f"{measured.wrong:g}, and waiting for a second costs {measured.second:g}. Give your "
-            'own prices with `make tradeoff TRADEOFF="--cost wrong=10,second=1"`. The best of '
-            "several windows looks a little better than it is, because chance helped to choose it."
+            "Waiting makes errors rarer, and costs time. In this table a wrong "
+            "decision costs "
+            f"{measured.wrong:g}, and waiting for a second costs {measured.second:g}. "
+            "Give your "
+            'own prices with `make tradeoff TRADEOFF="--cost wrong=10,second=1"`. The '
+            "best of "
+            "several windows looks a little better than it is, because chance helped "
+            "to choose it."
         ],
         [Table("price", "The window with the lowest mean price of a decision", rows)],
     )
@@ -151,26 +163,38 @@ def prices(measured: Measured) -> Section:
 def reasons(measured: Measured) -> Section:
     """The physical reason for the time, and the commands that export the models."""
     notes = [
-        "Nearly all of the time is spent waiting for the contact to unfold. The last frame takes "
-        f"{1e3 * measured.wire_s:.1f} ms over the wire, and the arithmetic of a decision takes "
+        "Nearly all of the time is spent waiting for the contact to unfold. The last "
+        "frame takes "
+        f"{1e3 * measured.wire_s:.1f} ms over the wire, and the arithmetic of a "
+        "decision takes "
         f"{1e3 * measured.board.arithmetic_s:.2f} ms on {measured.board.name}."
     ]
     slow = sorted(measured.breakaways.items(), key=lambda item: -item[1])
     if slow:
         notes.append(
-            "Physics sets a lower limit. A movable object stands still, and cannot be told from a "
-            "fixed one, until the arm pushes harder than static friction holds. The table gives "
-            "this time, mu_s m g / (k v), for the middle of each object's friction and mass."
+            "Physics sets a lower limit. A movable object stands still, and cannot be "
+            "told from a "
+            "fixed one, until the arm pushes harder than static friction holds. The "
+            "table gives "
+            "this time, mu_s m g / (k v), for the middle of each object's friction and "
+            "mass."
         )
     notes += [
-        "All accuracies belong to the quick choice, `make export EXPORT=--quick`, made at each "
+        "All accuracies belong to the quick choice, `make export EXPORT=--quick`, made "
+        "at each "
         "window. To export one of the measured models, use `make export FRONT=fast`, "
-        "`FRONT=balanced` (a window of at most 0.9 s) or `FRONT=accurate`. `FRONT=500` exports the "
-        "most accurate one within 500 ms, and `FRONT=0.8` the fastest one that reaches 80 %.",
-        f"For early decisions, export a model with `{EARLY}`. With this model, `edge-classify run "
-        "--error 0.1` decides as soon as it may while at most one decision in ten is wrong. It "
-        "refuses an error rate that the trials cannot certify, and names the smallest rate that "
-        "they can. Leave a margin above that rate. Early decisions were not measured on objects "
+        "`FRONT=balanced` (a window of at most 0.9 s) or `FRONT=accurate`. `FRONT=500` "
+        "exports the "
+        "most accurate one within 500 ms, and `FRONT=0.8` the fastest one that reaches "
+        "80 %.",
+        f"For early decisions, export a model with `{EARLY}`. With this model, "
+        "`edge-classify run "
+        "--error 0.1` decides as soon as it may while at most one decision in ten is "
+        "wrong. It "
+        "refuses an error rate that the trials cannot certify, and names the smallest "
+        "rate that "
+        "they can. Leave a margin above that rate. Early decisions were not measured "
+        "on objects "
         "never met.",
     ]
     rows: list[Row] = [
@@ -182,19 +206,24 @@ def reasons(measured: Measured) -> Section:
 
 GLOSSARY = {
     "accuracy": "The share of held-out contacts that get the right label. A held-out contact takes "
-    "no part in fitting the model, nor in choosing its features, projection and number of "
+    "no part in fitting the model, nor in choosing its features, projection and number "
+    "of "
     "neighbours (nested cross-validation).",
     "from, to": "The 95 % interval for the exported model's accuracy on other contacts. It is "
-    "Wilson's binomial interval for two fifths of the contacts, because the exported model differs "
-    "from those that were tested. `make risk` counts how often it holds. For early decisions, only "
+    "Wilson's binomial interval for two fifths of the contacts, because the exported "
+    "model differs "
+    "from those that were tested. `make risk` counts how often it holds. For early "
+    "decisions, only "
     "the contacts of the folds that certified the error rate count.",
     "points": "The percentage of decisions that become right less the percentage that become "
-    "wrong, on the same held-out contacts. The brackets hold the 95 % interval of this paired "
+    "wrong, on the same held-out contacts. The brackets hold the 95 % interval of this "
+    "paired "
     "difference.",
     "objects never met": "The accuracy if all trials of an object are held out together.",
     "confidence": "The calibrated probability that the label is right.",
     "certified": "An error rate is certified if an exact binomial test on calibration trials "
-    "shows, with 90 % confidence, that decisions on contacts like the trained ones are wrong at "
+    "shows, with 90 % confidence, that decisions on contacts like the trained ones are "
+    "wrong at "
     "most this often (learn-then-test).",
     "onset": "The first frame of a contact.",
     "window": "The time from onset that a decision is based on.",
@@ -254,9 +283,16 @@ def _panel(
     if rules:
         share, arms = spread([rule.result for rule in rules])
         axes.errorbar(
-            [rule.mean_s + after_s for rule in rules], share, arms, color=colour, marker=marker,
-            ls=dashes, ms=4, elinewidth=0.8, label="early decision, mean time",
-        )  # fmt: skip
+            [rule.mean_s + after_s for rule in rules],
+            share,
+            arms,
+            color=colour,
+            marker=marker,
+            ls=dashes,
+            ms=4,
+            elinewidth=0.8,
+            label="early decision, mean time",
+        )
     named = [
         f"{100 * results[w].accuracy:.0f} % after {w:g} s"
         for w in TITLE_S

@@ -120,16 +120,24 @@ def section(board: Board) -> Section:
         "The board",
         [
             "`edge-classify bench` measured these times with the model "
-            f"{board.model[:12]} on {board.name}. The program takes {board.memory_mb:.0f} MB of "
-            f"memory, and the model is ready {board.cold_start_ms:.0f} ms after the start of "
-            "Python. The stage `region` finds the contact in a frame; `track` does this and "
-            "measures the contact; `answer` is features and decision; `frame` and `last` are all "
-            "work for a frame in a contact, and for the frame that decides. The arithmetic of a "
+            f"{board.model[:12]} on {board.name}. The program takes "
+            f"{board.memory_mb:.0f} MB of "
+            f"memory, and the model is ready {board.cold_start_ms:.0f} ms after the "
+            "start of "
+            "Python. The stage `region` finds the contact in a frame; `track` does "
+            "this and "
+            "measures the contact; `answer` is features and decision; `frame` and "
+            "`last` are all "
+            "work for a frame in a contact, and for the frame that decides. The "
+            "arithmetic of a "
             "decision is the sum of the medians of track, features and decision.",
             "No Raspberry Pi was measured. The times for Raspberry Pis are estimates: "
-            "`make board-test` counts the aarch64 instructions under an emulator, for the model of "
-            "`edge-classify demo` with three features, and the estimate assumes one instruction a "
-            f"cycle ({clocks}). Run `edge-classify bench` on your board for its own times.",
+            "`make board-test` counts the aarch64 instructions under an emulator, for "
+            "the model of "
+            "`edge-classify demo` with three features, and the estimate assumes one "
+            "instruction a "
+            f"cycle ({clocks}). Run `edge-classify bench` on your board for its own "
+            "times.",
         ],
         [
             Table("board", "Stages", rows, timed=("median us", "99th percentile us")),
@@ -146,6 +154,8 @@ def check(board: Board, path: str, digest: str) -> None:
     """
     if board.digest != digest:
         raise InputError(
-            f"{path}: was made with a model of other recordings (digest {board.digest[:12]}, "
-            f"these have {digest[:12]}); run `edge-classify bench` with a model of these"
+            f"{path}: was made with a model of other recordings (digest "
+            f"{board.digest[:12]}, "
+            f"these have {digest[:12]}); run `edge-classify bench` with a model of "
+            "these"
         )

@@ -203,7 +203,8 @@ def section(measured: Measured) -> Section:
             {
                 "change": row["format"],
                 "saves or costs": f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the "
-                f"labels differ; {row['other distances alone %']:.0f} % of the distances depend on "
+                f"labels differ; {row['other distances alone %']:.0f} % of the "
+                "distances depend on "
                 "the batch",
                 TIME: f"{row['decision us']:.0f} us to decide",
             }
@@ -219,14 +220,21 @@ def section(measured: Measured) -> Section:
     return Section(
         "Savings, and the accuracy that they cost",
         [
-            f"Each row changes one thing of the quick choice at {WINDOW_S:g} s, and makes the "
-            "choice again with the features that suit the change. A larger taxel reads the sum of "
+            f"Each row changes one thing of the quick choice at {WINDOW_S:g} s, and "
+            "makes the "
+            "choice again with the features that suit the change. A larger taxel reads "
+            "the sum of "
             "the forces on its area. The last section explains points and intervals.",
-            "The rows of number formats are about the exported graph, measured with `python -m "
-            "export.arithmetic` on this machine. Labels are compared on the model's golden "
-            "vectors. A distance depends on the batch if it has other bits when its vector is "
-            "decided alone. Only whole numbers give the same bits in any order of summation, and "
-            "so on every machine. The boards' times are estimates; see the section on the board.",
+            "The rows of number formats are about the exported graph, measured with "
+            "`python -m "
+            "export.arithmetic` on this machine. Labels are compared on the model's "
+            "golden "
+            "vectors. A distance depends on the batch if it has other bits when its "
+            "vector is "
+            "decided alone. Only whole numbers give the same bits in any order of "
+            "summation, and "
+            "so on every machine. The boards' times are estimates; see the section on "
+            "the board.",
         ],
         [
             Table(

@@ -98,7 +98,8 @@ class ParetoFront:
                 raise ValueError("no point, or one of no time")
         if measured != digest:
             raise InputError(
-                f"{path}: was measured on other recordings (digest {measured[:12]}, these have "
+                f"{path}: was measured on other recordings (digest {measured[:12]}, "
+                "these have "
                 f"{digest[:12]}); {mend} DATA=... of these"
             )
         return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))
@@ -130,7 +131,8 @@ class ParetoFront:
             number = math.nan
         if not 0.0 < number < math.inf:
             raise InputError(
-                f"--front must be {', '.join(NAMES)}, milliseconds (above 1) or an accuracy "
+                f"--front must be {', '.join(NAMES)}, milliseconds (above 1) or an "
+                "accuracy "
                 f"(0 to 1), not {wanted!r}"
             )
         if number > 1.0:

@@ -106,8 +106,10 @@ def tradeoff(
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     lead = [
-        "How long must a robot wait before it knows what its arm has touched? This report measures "
-        "the accuracy after each time, and the cost of each way to save. It is based on "
+        "How long must a robot wait before it knows what its arm has touched? This "
+        "report measures "
+        "the accuracy after each time, and the cost of each way to save. It is based "
+        "on "
         f"{counted(len(dataset.trials), 'contact')}{simulated}."
     ]
     sections = [make(measured) for make in SECTIONS]

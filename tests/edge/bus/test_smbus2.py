@@ -76,7 +76,8 @@ def test_a_bus_that_another_program_uses_is_refused(library):
     opening = "from edge.bus.linux import LinuxBus; LinuxBus('/dev/i2c-1')"
     done = run(library, opening, I2CDEV_LOCKED="1")
     assert done.stderr.splitlines()[-1] == (
-        "edge.bus.protocol.BusBusy: /dev/i2c-1: another program is using the bus; end it first (EBUSY)"
+        "edge.bus.protocol.BusBusy: /dev/i2c-1: another program is using the bus; end "
+        "it first (EBUSY)"
     )
 
 
@@ -107,5 +108,6 @@ def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
         """,
     )
     assert done.stdout == (
-        "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again (ENODEV)\nb'\\x00'\n"
+        "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again "
+        "(ENODEV)\nb'\\x00'\n"
     )

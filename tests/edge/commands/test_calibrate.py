@@ -90,7 +90,8 @@ def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
         (
             20946,
             0.4,
-            "the first at [0, 2], which was valid in 20 of 50 frames and rests at 20946",
+            "the first at [0, 2], which was valid in 20 of 50 frames and rests at "
+            "20946",
         ),
         (0, 1.0, "was valid in 50 of 50 frames and rests at 0"),
         (65535, 1.0, "rests at 65535; check the chips"),

@@ -27,7 +27,8 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
         (
             mpr121(skin="threshold_counts = 2000"),
             1,
-            "no contact can begin: onset_counts is 2000, but a taxel gives at most 1022",
+            "no contact can begin: onset_counts is 2000, but a taxel gives at most "
+            "1022",
         ),
         (one_chip(3, 4), 0, "threshold_counts is missing: anything above the noise"),
         (

@@ -40,7 +40,8 @@ def test_json_at_a_terminal_is_what_a_pipe_gets(terminal, capsys):
 def test_a_recording_is_named_with_its_labels_before_what_was_decided(terminal, capsys):
     assert main(["replay", "--model", str(demo.MODEL), TOUCH]) == 0
     assert capsys.readouterr().out.splitlines()[0] == (
-        f"{TOUCH}, category: soft-movable, mobility: movable, object: pillow, softness: soft"
+        f"{TOUCH}, category: soft-movable, mobility: movable, object: pillow, "
+        "softness: soft"
     )
 
 
@@ -66,14 +67,29 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
             "   3.000 s  /dev/i2c-1 is lost; it is opened again until it answers",
         ),
         (
-            {"event": "chip", "t": 3.0, "bus": "/dev/i2c-1", "place": "address 0x2c",
-             "state": "down", "error": "no power"},
+            {
+                "event": "chip",
+                "t": 3.0,
+                "bus": "/dev/i2c-1",
+                "place": "address 0x2c",
+                "state": "down",
+                "error": "no power",
+            },
             "   3.000 s  /dev/i2c-1, address 0x2c is down: no power",
         ),
         (
-            {"event": "decision", "onset_s": 0.2, "window_s": 1.2, "task": "object",
-             "label": "box", "confidence": 0.6, "flags": ["tie"], "expected": "foam"},
-            "   1.400 s  object     box              ██████····  60%  (tie; labelled foam)",
+            {
+                "event": "decision",
+                "onset_s": 0.2,
+                "window_s": 1.2,
+                "task": "object",
+                "label": "box",
+                "confidence": 0.6,
+                "flags": ["tie"],
+                "expected": "foam",
+            },
+            "   1.400 s  object     box              ██████····  60%  (tie; labelled "
+            "foam)",
         ),
         ({"event": "no_contact"}, "no contact"),
         ({"event": "deleted", "file": "a/box-001.npz"}, "a/box-001.npz is deleted"),
@@ -86,12 +102,19 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
             "   1.500 s  all taxels are valid again",
         ),
         (
-            {"event": "saved", "file": "a/box-001.npz", "labels": {"object": "box"}, "frames": 150,
-             "seconds": 1.5, "complete": False},
-            "a/box-001.npz: 1.5 s, 150 frames, object=box; incomplete: reading stopped before the "
+            {
+                "event": "saved",
+                "file": "a/box-001.npz",
+                "labels": {"object": "box"},
+                "frames": 150,
+                "seconds": 1.5,
+                "complete": False,
+            },
+            "a/box-001.npz: 1.5 s, 150 frames, object=box; incomplete: reading stopped "
+            "before the "
             "contact's end",
         ),
     ],
-)  # fmt: skip
+)
 def test_each_event_has_its_words(line, text):
     assert event_text(line) == text

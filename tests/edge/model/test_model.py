@@ -213,7 +213,8 @@ def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path
     with pytest.raises(InputError) as error:
         Model(path)
     assert str(error.value) == (
-        f"{path}: its metadata is of format {number}, but this edge-classify reads {FORMAT}; "
+        f"{path}: its metadata is of format {number}, but this edge-classify reads "
+        f"{FORMAT}; "
         "export it again"
     )
 

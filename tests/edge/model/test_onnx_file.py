@@ -34,8 +34,14 @@ def add(name="Add", **attributes):
 
 
 def a_function():
-    own = helper.make_function("own", "F", ["a"], ["b"], [helper.make_node("Sqrt", ["a"], ["b"])],
-                               [helper.make_opsetid("", 18)])  # fmt: skip
+    own = helper.make_function(
+        "own",
+        "F",
+        ["a"],
+        ["b"],
+        [helper.make_node("Sqrt", ["a"], ["b"])],
+        [helper.make_opsetid("", 18)],
+    )
     return model([add()], functions=[own])
 
 

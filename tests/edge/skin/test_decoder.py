@@ -21,9 +21,14 @@ PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 def served(taxels, **options):
     """A microcontroller that serves these taxels."""
     return replace(
-        CODY.chips[0], kind=block.Block, address=0x28, mux=None, channel=None, options=options,
+        CODY.chips[0],
+        kind=block.Block,
+        address=0x28,
+        mux=None,
+        channel=None,
+        options=options,
         taxels=tuple(taxels),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])

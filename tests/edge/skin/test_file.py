@@ -113,9 +113,15 @@ def test_a_calibration_that_cannot_be_replaced_is_refused():
 
 @pytest.mark.parametrize(
     ("key", "row"),
-    [("baseline", [1, 2]), ("noise", [math.nan, 1, 1, 1, 1, 1]),
-     *(("baseline", [v, 1, 1, 1, 1, 1]) for v in (0.5, -1, 65536, math.inf, math.nan))],
-)  # fmt: skip
+    [
+        ("baseline", [1, 2]),
+        ("noise", [math.nan, 1, 1, 1, 1, 1]),
+        *(
+            ("baseline", [v, 1, 1, 1, 1, 1])
+            for v in (0.5, -1, 65536, math.inf, math.nan)
+        ),
+    ],
+)
 def test_a_damaged_calibration_is_refused(key, row):
     rows = {"baseline": [1] * 6, "noise": [1] * 6, key: row}
     text = (

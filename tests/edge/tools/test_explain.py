@@ -34,8 +34,8 @@ def test_a_person_gets_lines_that_fit(edge, exported, recordings, monkeypatch):
     assert "category: soft-fixed, by " in out
     assert "  soft_1: soft-fixed\n" in out
     assert (
-        ": rigid-fixed\n  Features for (+) and against (-) soft-fixed, compared with rigid-"
-        in out
+        ": rigid-fixed\n  Features for (+) and against (-) soft-fixed, compared with "
+        "rigid-" in out
     )
     assert "  It would be rigid-fixed if " in out
     assert max(map(len, out.splitlines()[1:])) <= 80

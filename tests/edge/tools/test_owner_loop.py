@@ -44,8 +44,18 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
         given = [
             part for task in labels for part in ("--label", f"{task}={labels[task]}")
         ]
-        status, (event,), _ = edge("record", "--skin", skin, "--fake", recordings / f"{name}.npz",
-                               "--out", trials, "--length", 1.3, *given)  # fmt: skip
+        status, (event,), _ = edge(
+            "record",
+            "--skin",
+            skin,
+            "--fake",
+            recordings / f"{name}.npz",
+            "--out",
+            trials,
+            "--length",
+            1.3,
+            *given,
+        )
         assert (status, event["complete"]) == (0, True)
     assert len(list(trials.iterdir())) == len(shown)
 
@@ -57,8 +67,15 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     board.mkdir()
     shutil.copy(tmp_path / "build" / "model.onnx", board)
     for name in ("hard_1", "soft_0"):
-        status, events, _ = edge("run", "--model", board / "model.onnx", "--skin", skin,
-                             "--fake", recordings / f"{name}.npz")  # fmt: skip
+        status, events, _ = edge(
+            "run",
+            "--model",
+            board / "model.onnx",
+            "--skin",
+            skin,
+            "--fake",
+            recordings / f"{name}.npz",
+        )
         said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
         assert status == 0
         assert said["category"] == load(recordings / f"{name}.npz").labels["category"]

@@ -154,10 +154,24 @@ def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record
 def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
     out, (reading, writing) = tmp_path / "trials", full_pipe()
     process = subprocess.Popen(
-        [sys.executable, "-m", "edge", "record", "--fake", str(parted),
-         "--loop", "--label", "object=a", "--out", str(out)],
-        cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "edge",
+            "record",
+            "--fake",
+            str(parted),
+            "--loop",
+            "--label",
+            "object=a",
+            "--out",
+            str(out),
+        ],
+        cwd=ROOT,
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     while len(list(out.glob("a-*.npz"))) < 3:
         assert process.poll() is None
         time.sleep(0.02)

@@ -27,13 +27,20 @@ def test_the_threshold_is_twice_the_noise_and_the_onset_half_as_much_again():
 @pytest.mark.parametrize(
     ("skin", "warning"),
     [
-        ({}, "no threshold_counts, so any count above 0 is a contact; threshold_counts = 40 "
-             "and onset_counts = 60 would do"),
-        ({"threshold_counts": 5}, "first frame is above the onset of 5 counts, so its onset is not "
-                                  "known; threshold_counts = 40"),
+        (
+            {},
+            "no threshold_counts, so any count above 0 is a contact; threshold_counts "
+            "= 40 "
+            "and onset_counts = 60 would do",
+        ),
+        (
+            {"threshold_counts": 5},
+            "first frame is above the onset of 5 counts, so its onset is not "
+            "known; threshold_counts = 40",
+        ),
         ({"threshold_counts": 40}, None),
     ],
-)  # fmt: skip
+)
 def test_saving_warns_of_thresholds_and_names_better_ones(
     skin, warning, make_touch, tmp_path, caplog
 ):

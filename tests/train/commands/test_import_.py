@@ -41,8 +41,8 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0
     assert (
-        "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have a"
-        in (capsys.readouterr().out)
+        "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
+        "a" in (capsys.readouterr().out)
     )
     layout = load(tmp_path / "out" / "trial0.npz").layout
     assert (layout.threshold_counts, layout.onset) == (80, 120)

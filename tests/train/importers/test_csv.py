@@ -93,11 +93,17 @@ def imported(folder, *words):
 @pytest.mark.parametrize(
     "form",
     [
-        wide_with_a_header, numbers_alone, an_array, a_matlab_file, a_long_table_of_values,
-        a_long_table_of_frames, a_file_for_each_frame, a_numbered_file_for_each_frame,
+        wide_with_a_header,
+        numbers_alone,
+        an_array,
+        a_matlab_file,
+        a_long_table_of_values,
+        a_long_table_of_frames,
+        a_file_for_each_frame,
+        a_numbered_file_for_each_frame,
     ],
     ids=lambda form: form.__name__,
-)  # fmt: skip
+)
 def test_the_same_trial_comes_out_of_every_form(form, folder):
     words = form(folder) or []
     status, recordings = imported(folder, "--shape", "2x3", *words)
@@ -178,9 +184,21 @@ RATE = ("--rate", "1")
 @pytest.mark.parametrize(
     ("files", "words", "sentence"),
     [
-        ({"1.txt": "1 2\n3 4\n"}, (), "1.txt: no column is a time; give --rate HZ or --time COL"),
-        ({"1.txt": "1 2\n\n3\n"}, RATE, "1.txt: row 2 has 1 value, and the first row 2"),
-        ({"1.csv": "a,b\n1,2\n1,2,3\n"}, RATE, "1.csv: row 3 has 3 values, and the first row 2"),
+        (
+            {"1.txt": "1 2\n3 4\n"},
+            (),
+            "1.txt: no column is a time; give --rate HZ or --time COL",
+        ),
+        (
+            {"1.txt": "1 2\n\n3\n"},
+            RATE,
+            "1.txt: row 2 has 1 value, and the first row 2",
+        ),
+        (
+            {"1.csv": "a,b\n1,2\n1,2,3\n"},
+            RATE,
+            "1.csv: row 3 has 3 values, and the first row 2",
+        ),
         ({"1.txt": ""}, RATE, f"1.txt: {EMPTY}"),
         ({"1.txt": "\n \n"}, RATE, f"1.txt: {EMPTY}"),
         ({"1.csv": "time,a,b\n"}, RATE, f"1.csv: {EMPTY}"),
@@ -188,29 +206,80 @@ RATE = ("--rate", "1")
         ({"1.npy": stored(np.array(["a"]))}, RATE, f"1.npy: {EMPTY}"),
         ({"1.npy": b"hello"}, RATE, "1.npy: not a table: "),
         ({"1.mat": b"hello" * 40}, RATE, "1.mat: not a table: "),
-        ({"1.txt": b"\xff\xfe1"}, RATE, "1.txt: not a table: it is not UTF-8 text; save it"),
+        (
+            {"1.txt": b"\xff\xfe1"},
+            RATE,
+            "1.txt: not a table: it is not UTF-8 text; save it",
+        ),
         ({"1.csv": "a,b\n1,2\n1,x\n"}, RATE, "1.csv: 'x' in column b is no number"),
-        ({"1.txt": "1 2\n"}, (*RATE, "--taxels", "3"), "has no column 3; it has ['1', '2']"),
+        (
+            {"1.txt": "1 2\n"},
+            (*RATE, "--taxels", "3"),
+            "has no column 3; it has ['1', '2']",
+        ),
         ({"1.txt": "1 -2\n"}, RATE, "-2 to 1 are no counts"),
-        ({"1.txt": "1 2.5\n"}, RATE, "1 to 2.5 are no counts (whole numbers from 0 to 65535)"),
-        ({"1.txt": "1 2\n"}, (*RATE, "--shape", "2x2"), "2 columns are not 2 x 2 taxels"),
-        ({"1.txt": "1 2\n"}, (*RATE, "--shape", "2x-1"), "--shape must be ROWSxCOLS, such as 16x"),
+        (
+            {"1.txt": "1 2.5\n"},
+            RATE,
+            "1 to 2.5 are no counts (whole numbers from 0 to 65535)",
+        ),
+        (
+            {"1.txt": "1 2\n"},
+            (*RATE, "--shape", "2x2"),
+            "2 columns are not 2 x 2 taxels",
+        ),
+        (
+            {"1.txt": "1 2\n"},
+            (*RATE, "--shape", "2x-1"),
+            "--shape must be ROWSxCOLS, such as 16x",
+        ),
         ({"1.txt": "1 2\n", "2.txt": "1 2 3\n"}, RATE, "2.txt: has 3 taxels, and "),
         ({}, (), "in: holds no file .csv"),
-        ({"a.csv": "1 2\n"}, ("--frames",), "in: holds no folder of frames; give a folder of"),
-        ({"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"}, ("--frames",), "a: not a folder of files that "),
-        ({"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"}, ("--frames",), "1.csv: is 2 x 1 taxels, and "),
+        (
+            {"a.csv": "1 2\n"},
+            ("--frames",),
+            "in: holds no folder of frames; give a folder of",
+        ),
+        (
+            {"a/0.csv": "1 2\n", "a/b.csv": "1 2\n"},
+            ("--frames",),
+            "a: not a folder of files that ",
+        ),
+        (
+            {"a/0.csv": "1 2\n", "a/1.csv": "1\n2\n"},
+            ("--frames",),
+            "1.csv: is 2 x 1 taxels, and ",
+        ),
         ({"a/0.csv": "1 0.5\n"}, ("--frames",), "a: 0.5 to 1 are no counts"),
-        ({"1.txt": "1 2\n", "skin.json": "[1]"}, RATE, "skin.json: the file must be a table"),
-        ({"1.txt": "1 2\n", "skin.json": '{"rows": "x"}'}, RATE, "skin.json: rows must be a whole"),
-        ({"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"}, RATE, "labels.csv: needs a column "
-         "trial with names such as ['1']"),
-        ({"1.txt": "1 2\n", "labels.csv": "object,who\n1,me\n"}, RATE, "labels.csv: needs a col"),
+        (
+            {"1.txt": "1 2\n", "skin.json": "[1]"},
+            RATE,
+            "skin.json: the file must be a table",
+        ),
+        (
+            {"1.txt": "1 2\n", "skin.json": '{"rows": "x"}'},
+            RATE,
+            "skin.json: rows must be a whole",
+        ),
+        (
+            {"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"},
+            RATE,
+            "labels.csv: needs a column trial with names such as ['1']",
+        ),
+        (
+            {"1.txt": "1 2\n", "labels.csv": "object,who\n1,me\n"},
+            RATE,
+            "labels.csv: needs a col",
+        ),
         ({"1.txt": "1 2\n", "labels.csv": ""}, RATE, f"labels.csv: {EMPTY}"),
         ({"1.txt": "1 2\n", "1.csv": "1 2\n"}, RATE, "in: two trials are named 1"),
-        ({"all.csv": "trial,a\n../1,2\n"}, RATE, "all.csv: the trial '../1' needs a name "),
+        (
+            {"all.csv": "trial,a\n../1,2\n"},
+            RATE,
+            "all.csv: the trial '../1' needs a name ",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refusal):
     for name, content in files.items():
         (folder / name).parent.mkdir(exist_ok=True)

@@ -40,14 +40,16 @@ def dsa(
     pads=range(6),
 ) -> str:
     matrices = "".join(
-        f'<matrix index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
+        "<matrix "
+        f'index="{i}"><cells_x>6</cells_x><cells_y>{13 if i % 2 else 14}</cells_y>'
         f"<texel_width>{width}</texel_width>"
         + (f"<static_mask>{mask}</static_mask>" if i == 1 else "")
         + "</matrix>"
         for i in pads
     )
     data = "".join(
-        f"<frame><time_stamp>{stamp}</time_stamp><frame_data>\n  {packed(values)}\n</frame_data>"
+        f"<frame><time_stamp>{stamp}</time_stamp><frame_data>\n  "
+        f"{packed(values)}\n</frame_data>"
         "</frame>"
         for stamp, values in zip(stamps, frames, strict=True)
     )

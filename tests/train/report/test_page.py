@@ -37,8 +37,10 @@ def test_a_table_is_the_same_in_its_csv():
     ((name, text),) = table_csv(table()).items()
     assert name == "speed.csv"
     assert list(csv.reader(io.StringIO(text))) == [
-        ["case", "n", "seconds"], ["a,b", "1", "0.5"], [HOSTILE, "2", "0.25"]
-    ]  # fmt: skip
+        ["case", "n", "seconds"],
+        ["a,b", "1", "0.5"],
+        [HOSTILE, "2", "0.25"],
+    ]
 
 
 def test_a_column_has_as_many_decimals_as_its_numbers_need():

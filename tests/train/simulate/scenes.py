@@ -78,9 +78,19 @@ class Rig:
     """
 
     def __init__(
-        self, *, h, arm_k=115.0, arm_d=0.0, speed=0.15, travel_s=1e9, effects=(),
-        gaps=((-math.inf,),), slopes=((1e4,),), intercepts=((0.0,),), **values,
-    ):  # fmt: skip
+        self,
+        *,
+        h,
+        arm_k=115.0,
+        arm_d=0.0,
+        speed=0.15,
+        travel_s=1e9,
+        effects=(),
+        gaps=((-math.inf,),),
+        slopes=((1e4,),),
+        intercepts=((0.0,),),
+        **values,
+    ):
         given = [np.asarray(v, dtype=float) for v in values.values()]
         law = [np.asarray(part, dtype=float) for part in (gaps, slopes, intercepts)]
         n = max([v.size for v in (*given, np.asarray(h), law[1][0])])

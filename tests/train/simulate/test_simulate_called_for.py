@@ -40,9 +40,16 @@ def everything():
     """One object of each family, with every key that calls for an effect; a plant of
     few stems."""
     full = {
-        **MOVES, "skin_friction": 0.3, "cover_n_m": 3000.0, "stribeck_m_s": 0.05, "base_m": 0.1,
-        "height_m": 0.3, "foot_m": 0.2, "aside_m": 0.02, "slope_deg": 1.0,
-    }  # fmt: skip
+        **MOVES,
+        "skin_friction": 0.3,
+        "cover_n_m": 3000.0,
+        "stribeck_m_s": 0.05,
+        "base_m": 0.1,
+        "height_m": 0.3,
+        "foot_m": 0.2,
+        "aside_m": 0.02,
+        "slope_deg": 1.0,
+    }
     objects = [
         {"name": family, "family": family, "conditions": ["fixed", "movable"], **full}
         for family in ("rigid", "foam", "pillow", "bubbles", "foliage")
@@ -63,7 +70,8 @@ def test_1_an_effect_not_called_for_is_not_loaded():
         "table = {'trials': {'count': 1, 'after_s': 0.2}, 'step_s': {'base': 0.01},"
         "'object': [{'name': 'box', 'family': 'rigid', 'conditions': ['fixed']}]}\n"
         "assert len(list(simulate(from_dict(table)))) == 1\n"
-        "print(json.dumps([m for m in sys.modules if m.startswith('train.simulate.effects.')]))\n"
+        "print(json.dumps([m for m in sys.modules if "
+        "m.startswith('train.simulate.effects.')]))\n"
     )
     assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
 

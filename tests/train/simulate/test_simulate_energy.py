@@ -19,18 +19,38 @@ from train.simulate.plan import Call, make_plan
 from train.simulate.schema import EFFECTS, FAMILIES
 
 RANGES = {
-    "mass_kg": [0.02, 1.0], "friction_static": [0.5, 1.1], "friction_kinetic": [0.1, 0.5],
-    "skin_friction": [0.2, 1.5], "cover_n_m": [200.0, 1e4], "stribeck_m_s": [0.01, 0.1],
-    "base_m": [0.05, 0.3], "height_m": [0.2, 0.6], "foot_m": [0.1, 0.4], "aside_m": [-0.1, 0.1],
-    "slope_deg": [-10.0, 10.0], "width_m": [0.03, 0.3],
-}  # fmt: skip
+    "mass_kg": [0.02, 1.0],
+    "friction_static": [0.5, 1.1],
+    "friction_kinetic": [0.1, 0.5],
+    "skin_friction": [0.2, 1.5],
+    "cover_n_m": [200.0, 1e4],
+    "stribeck_m_s": [0.01, 0.1],
+    "base_m": [0.05, 0.3],
+    "height_m": [0.2, 0.6],
+    "foot_m": [0.1, 0.4],
+    "aside_m": [-0.1, 0.1],
+    "slope_deg": [-10.0, 10.0],
+    "width_m": [0.03, 0.3],
+}
 """Values such that things slide, tip, turn, bounce and slip."""
 OWN_RANGES = {
-    "foam": {"modulus_pa": [1e3, 2e4], "depth_m": [0.02, 0.2], "relax_ratio": [0.2, 10.0],
-             "relax_s": [0.01, 1.0]},
-    "bubbles": {"bubble_n_m": [300.0, 3000.0], "bubble_m": [0.004, 0.02], "pop_n": [0.5, 5.0]},
-    "foliage": {"stem_n_m": [5.0, 50.0], "stem_slip_m": [0.02, 0.1], "stem_damping": [0.05, 1.0]},
-}  # fmt: skip
+    "foam": {
+        "modulus_pa": [1e3, 2e4],
+        "depth_m": [0.02, 0.2],
+        "relax_ratio": [0.2, 10.0],
+        "relax_s": [0.01, 1.0],
+    },
+    "bubbles": {
+        "bubble_n_m": [300.0, 3000.0],
+        "bubble_m": [0.004, 0.02],
+        "pop_n": [0.5, 5.0],
+    },
+    "foliage": {
+        "stem_n_m": [5.0, 50.0],
+        "stem_slip_m": [0.02, 0.1],
+        "stem_damping": [0.05, 1.0],
+    },
+}
 MOVES = ("mass_kg", "friction_static", "friction_kinetic")
 CONTACT = [name for name, info in EFFECTS.items() if info.stage == "contact"]
 ROUNDING = 1e-9

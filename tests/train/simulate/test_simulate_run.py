@@ -174,8 +174,10 @@ class TestCommand:
     ("rest", "said"),
     [
         (
-            "step_s.base = 0.01\ntrials.after_s = 0.3\neffects.dead_band.counts = 65000",
-            "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is felt",
+            "step_s.base = 0.01\ntrials.after_s = 0.3\neffects.dead_band.counts = "
+            "65000",
+            "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is "
+            "felt",
         ),
         (
             "labels.slides_m = 0.0\ntrials.lead_s = 0.05\ntrials.after_s = 0.15",

@@ -232,9 +232,12 @@ def test_a_motion_about_the_forearm_itself_is_refused():
 
 def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
     robot = (
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="lift" '
-        'type="{}"><parent link="a"/><child link="b"/><axis xyz="0 -1 0"/><limit lower="-1" '
-        'upper="1"/></joint><joint name="tip" type="fixed"><parent link="b"/><child link="c"/>'
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint '
+        'name="lift" '
+        'type="{}"><parent link="a"/><child link="b"/><axis xyz="0 -1 0"/><limit '
+        'lower="-1" '
+        'upper="1"/></joint><joint name="tip" type="fixed"><parent link="b"/><child '
+        'link="c"/>'
         '<origin xyz="0 0 -0.4"/></joint></robot>'
     )
     urdf, here = tmp_path / "arm.urdf", str(tmp_path / "scene.toml")

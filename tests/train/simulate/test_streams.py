@@ -24,9 +24,16 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
 
 
 @pytest.mark.parametrize(
-    "other", [(2, "noise", "soft", 0), (1, "drift", "soft", 0), (1, "noise", "hard", 0),
-              (1, "noise", "soft", 1), (1, "noise", "soft", None), (1, "soft", "noise", 0)]
-)  # fmt: skip
+    "other",
+    [
+        (2, "noise", "soft", 0),
+        (1, "drift", "soft", 0),
+        (1, "noise", "hard", 0),
+        (1, "noise", "soft", 1),
+        (1, "noise", "soft", None),
+        (1, "soft", "noise", 0),
+    ],
+)
 def test_seed_name_condition_and_trial_each_give_another_stream(other):
     numbers = streams.stream(1, "noise", "soft", 0).random(4)
     assert not np.isin(streams.stream(*other).random(4), numbers).any()

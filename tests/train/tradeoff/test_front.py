@@ -12,14 +12,23 @@ POINTS = [(100, 0.60), (200, 0.80), (901, 0.90)]
 
 
 def text(points=POINTS, **more):
-    return json.dumps({
-        "task": "object",
-        "data_digest": DIGEST,
-        "points": [
-            {"window_s": ms / 1000, "milliseconds": ms, "accuracy": accuracy, "low": 0, "high": 1}
-            for ms, accuracy in points
-        ],
-    } | more)  # fmt: skip
+    return json.dumps(
+        {
+            "task": "object",
+            "data_digest": DIGEST,
+            "points": [
+                {
+                    "window_s": ms / 1000,
+                    "milliseconds": ms,
+                    "accuracy": accuracy,
+                    "low": 0,
+                    "high": 1,
+                }
+                for ms, accuracy in points
+            ],
+        }
+        | more
+    )
 
 
 @pytest.fixture

@@ -112,8 +112,11 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     task = info.tasks["category"]
     assert info.window_s == 0.4
     assert (task.features, task.scaling, task.k, task.projection) == (
-        choice.choice.features, choice.choice.scaling, choice.choice.k, choice.choice.projection
-    )  # fmt: skip
+        choice.choice.features,
+        choice.choice.scaling,
+        choice.choice.k,
+        choice.choice.projection,
+    )
     assert task.accuracy == choice.accuracy.accuracy
 
 
@@ -156,9 +159,15 @@ class TestCosts:
         raw = read([recordings])
         cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
         assert list(cases) == [
-            "all candidates (`make export`)", "50 frames a second", "25 frames a second",
-            "96 taxels", "24 taxels", "6 taxels", "1 taxel", "the paper's features",
-        ]  # fmt: skip
+            "all candidates (`make export`)",
+            "50 frames a second",
+            "25 frames a second",
+            "96 taxels",
+            "24 taxels",
+            "6 taxels",
+            "1 taxel",
+            "the paper's features",
+        ]
         assert cases["24 taxels"].source.recordings[0].frames.shape[1:] == (4, 6)
         assert (
             cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"

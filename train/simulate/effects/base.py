@@ -64,7 +64,8 @@ def place(t: Trials, i: Index) -> None:
     size = np.sqrt(dot(speed, speed))
     if not (size > STILL_M_S).all():
         raise InputError(
-            f"{t.scene.name}: motion.rate_deg_s does not move the forearm where it is to meet "
+            f"{t.scene.name}: motion.rate_deg_s does not move the forearm where it is "
+            "to meet "
             "an object (motion.place_m); turn a joint that carries it there"
         )
     normal, yaw = speed / size, np.radians(values["yaw_deg"])
