@@ -164,6 +164,16 @@ def add_error(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the program that runs the model."""
+    parser.add_argument(
+        "--engine",
+        choices=("onnxruntime", "numpy"),
+        help="the program that runs the model; both give the same bits (default: "
+        "onnxruntime, or numpy where it is not installed)",
+    )
+
+
 def check_error(model: Model, error: float | None) -> None:
     """Log how each task is decided under an error rate; None is not checked.
 

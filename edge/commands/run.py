@@ -12,7 +12,7 @@ from contextlib import closing
 from typing import Any
 
 from edge.classifier import Classifier
-from edge.commands.options import add_error, add_reading, check_error
+from edge.commands.options import add_engine, add_error, add_reading, check_error
 from edge.commands.output import LOG
 from edge.commands.source import reading
 from edge.events import Decided, Event
@@ -30,6 +30,7 @@ LAST_TOUCHES, FEWEST_TOUCHES = 20, 8
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
+    add_engine(parser)
     add_error(parser)
     add_reading(parser)
     parser.add_argument(
@@ -107,7 +108,7 @@ def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, decide and print until the recording ends, or someone stops it."""
-    model = Model(arguments.model)
+    model = Model(arguments.model, arguments.engine)
     check_error(model, arguments.error)
     on_skin = arguments.without_joints == "skin"
     notifier = Notifier(now=time.monotonic)

@@ -8,6 +8,7 @@ The exit status is 1 if a result differs.
 import argparse
 from typing import Any
 
+from edge.commands.options import add_engine
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
 from edge.model.verify import verify
@@ -19,12 +20,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--golden", required=True, help="golden.npz, written together with the model"
     )
+    add_engine(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per result; 1 if one differs."""
     output = Output.of(arguments)
-    checks = verify(Model(arguments.model), arguments.golden)
+    checks = verify(Model(arguments.model, arguments.engine), arguments.golden)
     width = max(len(check.name) for check in checks)
     for check in checks:
         line: dict[str, Any] = {

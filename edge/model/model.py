@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.errors import EdgeError, InputError, OutOfRange
+from edge.errors import InputError, OutOfRange
 from edge.files import read_bytes
-from edge.interrupt import delayed
 from edge.model import onnx_file
-from edge.model.agreement import agreed
+from edge.model.engines import open_engine
 from edge.model.info import METADATA_KEY, ModelInfo
 
 LARGEST_BYTES = 1 << 30
@@ -77,9 +76,16 @@ class Model:
             itself.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Load the file."""
-        self.path = name = os.fspath(path)
+    def __init__(self, path: str | os.PathLike[str], engine: str | None = None) -> None:
+        """Load the file.
+
+        Args:
+            path: of the file.
+            engine: `onnxruntime` or `numpy`; None for the first, or the second where
+                the first is not installed.
+        """
+        name = os.fspath(path)
+        self.path = name
         if not os.path.lexists(name) and "\0" not in name:
             raise InputError(f"{name}: no such model; make one with `make export`")
         data = read_bytes(name, LARGEST_BYTES)
@@ -94,58 +100,36 @@ class Model:
         # number.
         self.info = ModelInfo.from_json(text, name)
         onnx_file.check(self.contents, name)
-        runtime = _onnxruntime()
-        options = runtime.SessionOptions()
-        # One thread is fastest for models of this size.
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        # Converts the constants that are stored in float32 once. More would change
-        # nothing.
-        options.graph_optimization_level = (
-            runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
-        )
-        options.enable_cpu_mem_arena = False
-        try:
-            self._session = runtime.InferenceSession(
-                data, options, providers=["CPUExecutionProvider"]
-            )
-        except (
-            Exception
-        ) as error:  # onnxruntime's own exceptions share no base but this
-            raise InputError(
-                f"{name}: ONNX Runtime refuses it ({type(error).__name__}); export it "
-                "again"
-            ) from None
         self._outputs = _outputs(self.info)
+        self._engine = open_engine(name, self.contents, engine)
         self._check()
 
+    @property
+    def engine(self) -> str:
+        """The program that runs the graph, one of `edge.model.engines.ENGINES`."""
+        return self._engine.name
+
     def _check(self) -> None:
-        """Refuse a graph whose inputs and outputs are not those that the metadata
-        describes."""
-        session = self._session
+        """Refuse a graph whose inputs and outputs are not those of its metadata."""
         expected = {"features": ("tensor(double)", [self.info.width]), **self._outputs}
         if self.info.decision_points_s:
             expected["decision_point"] = "tensor(int64)", []
-        inputs = [*session.get_inputs(), *session.get_overridable_initializers()]
-        declared = {
-            x.name: (x.type, x.shape[1:]) for x in (*inputs, *session.get_outputs())
-        }
+        inputs = self._engine.inputs()
+        declared = {**inputs, **self._engine.outputs()}
         for name, (kind, shape) in expected.items():
-            seen_kind, seen = declared.get(name, (None, []))
+            declared_kind, sizes = declared.get(name, (None, []))
             # Older versions of ONNX Runtime leave some sizes open; `run` checks these.
-            sizes = [size if isinstance(size, int) else None for size in seen]
-            if seen_kind != kind or sizes not in (shape, [None] * len(shape)):
+            known = [size if isinstance(size, int) else None for size in sizes[1:]]
+            if declared_kind != kind or known not in (shape, [None] * len(shape)):
                 raise InputError(
                     f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
-                    "which its "
-                    "metadata describes; export it again"
+                    "which its metadata describes; export it again"
                 )
-        for value in inputs:
-            if value.name not in expected:
+        for name in inputs:
+            if name not in expected:
                 raise InputError(
-                    f"{self.path}: has an input {value.name}, which no exported model "
-                    "has; export "
-                    "it again"
+                    f"{self.path}: has an input {name}, which no exported model has; "
+                    "export it again"
                 )
 
     @property
@@ -198,8 +182,8 @@ class Model:
         if self.info.decision_points_s:
             inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
-            values = self._session.run(list(self._outputs), inputs)
-        except Exception as error:  # an index past its tensor, shapes that do not match
+            values = self._engine.run(list(self._outputs), inputs)
+        except InputError as error:
             raise self._broken(str(error)) from None
         outputs = dict(zip(self._outputs, values, strict=True))
         for name, (_, shape) in self._outputs.items():
@@ -227,40 +211,44 @@ class Model:
             raise InputError(
                 f"{self.path}: takes {self.info.width} features, not {x.shape}"
             )
-        outputs = {
-            name: value[0] for name, value in self.run(x[None], decision_point).items()
-        }
-        labels: dict[str, Any] = {
-            task: outputs[f"{task}_label"] for task in self.info.tasks
-        }
+        outputs = self.run(x[None], decision_point)
+        answers = {name: value[0] for name, value in outputs.items()}
+        tasks = self.info.tasks
+        labels: dict[str, Any] = {task: answers[f"{task}_label"] for task in tasks}
         if min(labels.values()) < 0:
             raise self._refusal(x)
-        distances: dict[str, Any] = {
-            task: outputs.get(f"{task}_label_distances") for task in self.info.tasks
-        }
-        for task, factors in self.info.products.items():
-            agreed_labels, agreed_distances = agreed(task, factors, distances)
-            labels |= agreed_labels
-            distances |= agreed_distances
+        distances = {task: answers.get(f"{task}_label_distances") for task in tasks}
+        if self.info.products:
+            self._agree(labels, distances)
         decisions: dict[str, Decision] = {}
-        for task, entry in self.info.tasks.items():
-            index, scores = int(labels[task]), outputs[f"{task}_scores"]
+        for task, entry in tasks.items():
+            index = int(labels[task])
+            scores = answers[f"{task}_scores"]
             shares = scores.tolist()
             if index >= len(shares) or not 0.0 <= shares[index] <= 1.0:
                 raise self._broken(
                     f"{task} is answered by label {index} of {len(shares)}"
                 )
             decisions[task] = Decision(
-                entry.labels[index],
-                shares[index],
-                scores,
-                outputs[f"{task}_distances"],
-                outputs[f"{task}_neighbours"],
-                shares.count(max(shares)) > 1,
-                distances[task],
-                bool(outputs["out_of_range"] > 0.0),
+                label=entry.labels[index],
+                confidence=shares[index],
+                scores=scores,
+                distances=answers[f"{task}_distances"],
+                neighbours=answers[f"{task}_neighbours"],
+                tie=shares.count(max(shares)) > 1,
+                label_distances=distances[task],
+                out_of_range=bool(answers["out_of_range"] > 0.0),
             )
         return decisions
+
+    def _agree(self, labels: dict[str, Any], distances: dict[str, Any]) -> None:
+        """Give products and their factors the nearest answer in which they agree."""
+        from edge.model.agreement import agreed  # few models have products
+
+        for task, factors in self.info.products.items():
+            agreed_labels, agreed_distances = agreed(task, factors, distances)
+            labels |= agreed_labels
+            distances |= agreed_distances
 
     def _broken(self, reason: str) -> InputError:
         """The error for a file that loads, but does not answer as an exported model
@@ -297,16 +285,3 @@ def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
         if info.has_label_distances:
             outputs[f"{task}_label_distances"] = "tensor(double)", [len(entry.labels)]
     return outputs
-
-
-def _onnxruntime() -> Any:
-    """onnxruntime, imported where a model is first needed: it is most of the start-up
-    time."""
-    try:
-        with delayed():
-            import onnxruntime
-    except ImportError as error:
-        raise EdgeError(
-            f"onnxruntime cannot be imported ({error}); install it with pip"
-        ) from None
-    return onnxruntime

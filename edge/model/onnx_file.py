@@ -7,9 +7,8 @@ of its size.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 
 OPERATORS = frozenset(
-    "Add ArgMax Cast Clip Div Gather GatherElements GatherND Gemm LessOrEqual MatMul "
-    "Max Mul Pad "
-    "ReduceL1 ReduceMean ReduceSum ReduceSumSquare Round Sqrt Squeeze Sub TopK Where".split()
+    "Add ArgMax Cast Clip Div Gather GatherElements GatherND Gemm LessOrEqual MatMul Max "
+    "Mul Pad ReduceL1 ReduceMean ReduceSum ReduceSumSquare Round Sqrt Squeeze Sub TopK "
+    "Where".split()
 )
 """The operators of an exported model, all of the standard domain."""
 MOST_NODES = 1000
@@ -28,18 +27,32 @@ MOST_NODES = 1000
 
 GRAPH, METADATA, FUNCTIONS = 7, 14, 25
 """Fields of a ModelProto."""
-NODES, INITIALIZERS, SPARSE = 1, 5, 15
+NODES, INITIALIZERS, INPUTS, OUTPUTS, SPARSE = 1, 5, 11, 12, 15
 """Fields of a GraphProto."""
 OPERATOR, ATTRIBUTES, DOMAIN = 4, 5, 7
 """Fields of a NodeProto."""
+WHOLE = 3
+"""Field of an attribute that is a whole number."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number, a text or several numbers, not a tensor or a
 graph."""
 TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
 """Fields of a TensorProto."""
 
+UNUSUAL = "functions, inner graphs or sparse tensors"
+
 TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
 """{type of a TensorProto: its numbers}."""
+
+TENSORS = {
+    1: "tensor(float)",
+    7: "tensor(int64)",
+    9: "tensor(bool)",
+    11: "tensor(double)",
+}
+"""{type of a TensorProto: its name in ONNX Runtime}."""
+Declared = tuple[str, list[int | None]]
+"""Type and shape of an input or output."""
 
 Message = dict[int, list[Any]]
 """{field number: its values}: numbers, or memoryviews of the bytes of a text or an
@@ -52,6 +65,7 @@ class Node(NamedTuple):
     operator: str
     inputs: list[str]
     outputs: list[str]
+    attributes: dict[str, int]
 
 
 @dataclass
@@ -64,46 +78,20 @@ class Contents:
     tensors: dict[str, Message] = field(default_factory=dict)
     """{name of a constant: the fields of its TensorProto}."""
     metadata: dict[str, str] = field(default_factory=dict)
+    inputs: dict[str, Declared] = field(default_factory=dict)
+    outputs: dict[str, Declared] = field(default_factory=dict)
     foreign: list[str] = field(default_factory=list)
     """Its contents that no exported model has, in words."""
 
-    @cached_property
-    def makers(self) -> dict[str, Node]:
-        """{output: its node}."""
-        return {output: node for node in self.nodes for output in node.outputs}
-
-    def constant(self, name: str, point: int | None = None) -> NDArray[Any]:
-        """A constant, or the constant that a value is taken from.
-
-        Args:
-            name: of the constant, or of a value that `Gather` and `Cast` make of one.
-            point: the decision point at which to take such a value; None for all of
-                them.
+    def constant(self, name: str) -> NDArray[Any]:
+        """A constant of the graph.
 
         Raises:
             KeyError: the graph has no such constant.
         """
-        if name in self.tensors:
-            tensor: Any = self.tensors[name]
-            return np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]]).reshape(
-                tensor.get(1, [])
-            )
-        node = self.makers[name]
-        values = self.constant(node.inputs[0], point)
-        return values if point is None or node.operator != "Gather" else values[point]
-
-    def path(self, output: str) -> list[tuple[str, list[str]]]:
-        """The nodes from the features to an output, through the first input of each.
-
-        Returns:
-            Operator and further inputs of each node, in the order of computation.
-        """
-        nodes = []
-        while output in self.makers:
-            node = self.makers[output]
-            output, *further = node.inputs
-            nodes.append((node.operator, further))
-        return nodes[::-1]
+        tensor: Any = self.tensors[name]
+        values = np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]])
+        return values.reshape(tensor.get(1, []))
 
 
 def _varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -117,7 +105,7 @@ def _varint(data: memoryview, at: int) -> tuple[int, int]:
     raise ValueError("a number of more than 64 bits")
 
 
-def _fields(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
+def fields_of(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
     """Number, value and bytes of each field of a protobuf message (protobuf.dev,
     Encoding)."""
     at = 0
@@ -139,23 +127,23 @@ def _fields(value: memoryview) -> Iterator[tuple[int, Any, memoryview]]:
         yield key >> 3, value[at - size : at], value[first:at]
 
 
-def _message(value: memoryview) -> Message:
+def message_of(value: memoryview) -> Message:
     """The values of a protobuf message's fields."""
     fields: Message = defaultdict(list)
-    for number, content, _ in _fields(value):
+    for number, content, _ in fields_of(value):
         fields[number].append(content)
     return fields
 
 
 def _messages(message: Message, number: int) -> Sequence[Message]:
-    return [_message(value) for value in message.get(number, ())]
+    return [message_of(value) for value in message.get(number, ())]
 
 
 def _texts(message: Message, number: int) -> list[str]:
     return [str(value, "utf-8") for value in message.get(number, [])]
 
 
-def _text(message: Message, number: int) -> str:
+def text_of(message: Message, number: int) -> str:
     """The last of a field's values, as protobuf takes them; empty without a value."""
     return ["", *_texts(message, number)][-1]
 
@@ -167,38 +155,70 @@ def read(data: bytes, name: str) -> Contents:
         InputError: it is not an ONNX model; the sentence names the file.
     """
     contents = Contents(data)
-    foreign = contents.foreign
     try:
-        model = _message(memoryview(data))
-        unusual = FUNCTIONS in model
+        model = message_of(memoryview(data))
+        if FUNCTIONS in model:
+            contents.foreign.append(UNUSUAL)
         for entry in _messages(model, METADATA):
-            contents.metadata[_text(entry, 1)] = _text(entry, 2)
+            contents.metadata[text_of(entry, 1)] = text_of(entry, 2)
         for graph in _messages(model, GRAPH):
-            unusual |= SPARSE in graph
-            for fields in _messages(graph, NODES):
-                domain, operator = _text(fields, DOMAIN), _text(fields, OPERATOR)
-                contents.nodes.append(
-                    Node(operator, _texts(fields, 1), _texts(fields, 2))
-                )
-                if domain not in ("", "ai.onnx") or operator not in OPERATORS:
-                    foreign.append(f"operator {domain}.{operator}".replace(" .", " "))
-                for attribute in _messages(fields, ATTRIBUTES):
-                    unusual |= not attribute.keys() <= NUMBERS
-            for tensor in _messages(graph, INITIALIZERS):
-                contents.tensors[_text(tensor, TENSOR_NAME)] = tensor
-                if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
-                    foreign.append("weights in another file")
+            _read_graph(graph, contents)
     # A field that runs past its message or is of no known kind; a number in place of
     # bytes.
     except (IndexError, TypeError, ValueError):
         contents.nodes.clear()
     if not contents.nodes:
         raise InputError(f"{name}: not an ONNX model; copy or export it again")
-    if unusual:
-        foreign.append("functions, inner graphs or sparse tensors")
     if len(contents.nodes) > MOST_NODES:
-        foreign.append(f"{len(contents.nodes)} nodes")
+        contents.foreign.append(f"{len(contents.nodes)} nodes")
     return contents
+
+
+def _read_graph(graph: Message, contents: Contents) -> None:
+    """Take in the nodes, constants, inputs and outputs of a graph."""
+    if SPARSE in graph:
+        contents.foreign.append(UNUSUAL)
+    for fields in _messages(graph, NODES):
+        _read_node(fields, contents)
+    for tensor in _messages(graph, INITIALIZERS):
+        contents.tensors[text_of(tensor, TENSOR_NAME)] = tensor
+        if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
+            contents.foreign.append("weights in another file")
+    for number, declared in ((INPUTS, contents.inputs), (OUTPUTS, contents.outputs)):
+        for value in _messages(graph, number):
+            declared[text_of(value, 1)] = _declared(value)
+
+
+def _declared(value: Message) -> Declared:
+    """Type and shape of a ValueInfoProto; a size that is not known is None."""
+    kind = "another type"
+    sizes: list[int | None] = []
+    for declared in _messages(value, 2):
+        for tensor in _messages(declared, 1):
+            kind = TENSORS.get(tensor[1][-1], kind)
+            for shape in _messages(tensor, 2):
+                for dimension in _messages(shape, 1):
+                    sizes.append(dimension[1][-1] if 1 in dimension else None)
+    return kind, sizes
+
+
+def _read_node(fields: Message, contents: Contents) -> None:
+    domain = text_of(fields, DOMAIN)
+    operator = text_of(fields, OPERATOR)
+    if domain not in ("", "ai.onnx") or operator not in OPERATORS:
+        foreign = f"operator {domain}.{operator}".replace(" .", " ")
+        contents.foreign.append(foreign)
+    attributes = {}
+    for attribute in _messages(fields, ATTRIBUTES):
+        if not attribute.keys() <= NUMBERS:
+            contents.foreign.append(UNUSUAL)
+        if WHOLE in attribute:
+            value = attribute[WHOLE][-1]
+            # Negative numbers are stored modulo 2^64.
+            negative = value >= 1 << 63
+            attributes[text_of(attribute, 1)] = value - (1 << 64) * negative
+    inputs = _texts(fields, 1)
+    contents.nodes.append(Node(operator, inputs, _texts(fields, 2), attributes))
 
 
 def check(contents: Contents, name: str) -> None:
@@ -211,55 +231,3 @@ def check(contents: Contents, name: str) -> None:
         raise InputError(
             f"{name}: has {reason}, as no exported model has; export it again"
         )
-
-
-def rewritten(
-    data: bytes, constants: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]
-) -> bytes:
-    """A model's bytes with other values of some constants, and other metadata."""
-    model: list[bytes | memoryview] = []
-    for number, value, unchanged in _fields(memoryview(data)):
-        if number == GRAPH:
-            model.append(_field(GRAPH, b"".join(_constants_changed(value, constants))))
-        elif number == METADATA and (key := _text(_message(value), 1)) in metadata:
-            entry = _field(1, key.encode()) + _field(2, metadata[key].encode())
-            model.append(_field(METADATA, entry))
-        else:
-            model.append(unchanged)
-    return b"".join(model)
-
-
-def _constants_changed(
-    graph: memoryview, constants: Mapping[str, NDArray[Any]]
-) -> Iterator[bytes | memoryview]:
-    kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
-    for number, value, unchanged in _fields(graph):
-        if (
-            number == INITIALIZERS
-            and (name := _text(_message(value), TENSOR_NAME)) in constants
-        ):
-            array = np.ascontiguousarray(constants[name])
-            tensor = [_field(1, size) for size in array.shape]
-            tensor += [
-                _field(2, kinds[array.dtype]),
-                _field(TENSOR_NAME, name.encode()),
-            ]
-            yield _field(INITIALIZERS, b"".join([*tensor, _field(9, array.tobytes())]))
-        else:
-            yield unchanged
-
-
-def _field(number: int, value: int | bytes) -> bytes:
-    """A field of a protobuf message: a number, or bytes."""
-    if isinstance(value, int):
-        return _encoded(number << 3) + _encoded(value)
-    return _encoded(number << 3 | 2) + _encoded(len(value)) + value
-
-
-def _encoded(value: int) -> bytes:
-    """A varint."""
-    out = bytearray()
-    while value >= 0x80:
-        out.append(value & 0x7F | 0x80)
-        value >>= 7
-    return bytes([*out, value])

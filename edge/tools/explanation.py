@@ -1,5 +1,4 @@
-"""Why a model answers as it does: how much each feature drew a touch towards a training
-trial.
+"""Why a model answers as it does: each feature's pull towards a training trial.
 
 A touch's coordinates are z = W'd, where d are its features less their mean in training,
 scaled and cut off at the training data's reach. Its squared distance to a trial at b is
@@ -8,12 +7,13 @@ feature f brings the touch to the trial than its mean would.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.files import parsing
+from edge.model.graph import Graph
 from edge.model.model import Model
 
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
@@ -52,38 +52,46 @@ class Space(NamedTuple):
             InputError: the file is damaged.
         """
         with parsing(model.path, "a model that can be explained", "; export it again"):
-            contents, components = model.contents, model.info.tasks[task].components
-            neighbours = f"{task}_neighbours"
-
-            def constant(name: str) -> NDArray[Any]:
-                return contents.constant(name, -1)
-
+            graph = Graph(model.contents)
+            nodes = graph.path(f"{task}_neighbours")
             # Of two operators of a kind, the one nearer to the features counts.
-            path = contents.path(neighbours)
-            further = dict(reversed(path))
-            limits = [
-                float(constant(bounds[1]))
-                for operator, bounds in path
-                if operator == "Clip"
-            ]
-            unit = constant(contents.makers[f"{task}_distances"].inputs[1])
-            rows = constant(further["Gemm"][0]).T[:, :components] * (-0.5 * unit)
-            rows[np.isinf(constant(further["Gemm"][1]))] = (
-                np.inf
-            )  # trials without a label
-            columns = further.get("Gather")
+            first = {node.operator: node.inputs for node in reversed(nodes)}
+            limits = [node.inputs[2] for node in nodes if node.operator == "Clip"]
             voters = next(
-                node.inputs for node in contents.nodes if neighbours in node.inputs
+                node.inputs[0]
+                for node in model.contents.nodes
+                if f"{task}_neighbours" in node.inputs
             )
+            names = {
+                "mean": first["Sub"][1],
+                "gain": first["Mul"][1],
+                "weights": first["MatMul"][1],
+                "columns of rows": first["Gemm"][1],
+                "lengths": first["Gemm"][2],
+                "unit": graph.makers[f"{task}_distances"].inputs[1],
+                "labels": voters,
+                "reach": limits[0],
+                "limit": limits[1],
+            }
+            if "Gather" in first:
+                names["columns"] = first["Gather"][1]
+            last = len(model.decision_points_s) - 1
+            inputs = {"decision_point": np.array([last])}
+            computed = graph.run(list(names.values()), inputs)
+            values = dict(zip(names, computed, strict=True))
+            unit = values["unit"]
+            components = model.info.tasks[task].components
+            rows = values["columns of rows"].T[:, :components] * (-0.5 * unit)
+            rows[np.isinf(values["lengths"])] = np.inf  # trials without a label
             return cls(
-                constant(columns[0]) if columns else np.arange(model.info.width),
-                constant(further["Sub"][0]),
-                constant(further["Mul"][0]),
-                constant(further["MatMul"][0])[:, :components] * unit,
-                rows,
-                constant(voters[0]),
-                limits[0],
-                limits[1] * float(unit),
+                columns=values.get("columns", np.arange(model.info.width)),
+                mean=values["mean"],
+                gain=values["gain"],
+                weights=values["weights"][:, :components] * unit,
+                rows=rows,
+                labels=values["labels"],
+                reach=float(values["reach"]),
+                limit=float(values["limit"]) * float(unit),
             )
 
     def differences(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from edge.classifier import Classifier, suited
-from edge.commands.options import add_error, check_error
+from edge.commands.options import add_engine, add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
 from edge.model.info import Task
@@ -33,6 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="print each task's accuracy and confusion matrix, for labelled recordings",
     )
+    add_engine(parser)
     add_error(parser)
     parser.add_argument(
         "recordings", nargs="+", metavar="REC", help=".npz files or folders"
@@ -76,7 +77,7 @@ def decide(
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 if a file could not be used."""
-    model = Model(arguments.model)
+    model = Model(arguments.model, arguments.engine)
     check_error(model, arguments.error)
     summary, output = Summary(model.info.tasks), Output.of(arguments)
     failed = 0

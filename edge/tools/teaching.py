@@ -1,5 +1,4 @@
-"""Teaching a model on the board: trials become neighbours, in the projection that the
-model has.
+"""Teaching a model on the board: trials become neighbours, in its own projection.
 
 The neighbours of a task are constants of the model's graph that carry the task's name.
 Only these constants change. Scaling, projection, calibration and certificates remain
@@ -18,10 +17,10 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError, about, printable
 from edge.files import parsing
-from edge.model import onnx_file
-from edge.model.info import METADATA_KEY, ModelInfo
+from edge.model.graph import Graph, coordinates_of
+from edge.model.info import METADATA_KEY, ModelInfo, Task
 from edge.model.model import Model
-from edge.model.onnx_file import Contents
+from edge.tools.rewriting import rewritten
 
 NEAREST_OF_LABEL = 3
 LABEL_SHARE = 20
@@ -30,8 +29,7 @@ JOINED = ("category", "softness", "mobility")
 
 
 def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many trials stand for a label with so many trials: a twentieth, but at least
-    three.
+    """Number of trials that stand for a label: a twentieth of its own, at least three.
 
     A label with fewer than three trials is represented by all of them. With a share
     rather than a number, a label's distance does not shrink as its trials become more.
@@ -85,22 +83,20 @@ def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str
 def unknown_labels(
     info: ModelInfo, labels: Sequence[Mapping[str, str]]
 ) -> dict[str, Counter[str]]:
-    """{task: {label that the model does not know: how many trials have it}}, the labels
-    sorted.
+    """{task: {label that the model does not know: its number of trials}}, sorted.
 
     Args:
         info: of the model.
         labels: of each trial, {task: label}.
     """
-    of_task = {
-        task: [own[task] for own in labels if task in own] for task in info.tasks
-    }
-    return {
-        task: Counter(
-            sorted(label for label in each if label not in info.tasks[task].labels)
-        )
-        for task, each in of_task.items()
-    }
+    unknown = {}
+    for task, entry in info.tasks.items():
+        counts: Counter[str] = Counter()
+        for trial in labels:
+            if task in trial and trial[task] not in entry.labels:
+                counts[trial[task]] += 1
+        unknown[task] = Counter(dict(sorted(counts.items())))
+    return unknown
 
 
 def spelled_like(label: str, labels: Sequence[str]) -> str:
@@ -172,57 +168,17 @@ def taught(
     for name, trial, trial_labels in zip(
         names, vectors.swapaxes(0, 1), labels, strict=True
     ):
-        with about(name):
-            points = [model.decide(vector, point) for point, vector in enumerate(trial)]
-        if any(next(iter(decisions.values())).out_of_range for decisions in points):
-            raise InputError(
-                f"{name}: lies far outside the trials that the model was fitted on, so "
-                "its "
-                "projection cannot place it; export a model with it"
-            )
-        if not any(
-            trial_labels.get(task) in entry.labels for task, entry in info.tasks.items()
-        ):
-            known = "; ".join(
-                f"{t}: {', '.join(e.labels[:6])}" for t, e in info.tasks.items()
-            )
-            meant = [
-                spelled_like(trial_labels.get(t, ""), e.labels)
-                for t, e in info.tasks.items()
-            ]
-            raise InputError(
-                f"{name}: has no label that the model knows ({known}); label it, or "
-                "teach it with "
-                f"--new-labels{''.join(meant)}"
-            )
-    contents = model.contents
+        _check_reach(model, name, trial)
+        _check_labels(info, name, trial_labels)
+    changed: dict[str, NDArray[Any]] = {}
     with parsing(model.path, "a model that can be taught", "; export it again"):
-        changed: dict[str, NDArray[Any]] = {}
+        graph = Graph(model.contents)
         for task, entry in info.tasks.items():
-            index = {label: i for i, label in enumerate(entry.labels)}
-            new = np.array([index.get(named.get(task, ""), -1) for named in labels])
-            z = np.stack(
-                [coordinates(contents, task, p, x) for p, x in enumerate(vectors)]
-            )
-            lengths = np.where(new < 0, np.inf, (z**2).sum(axis=2))
-            more = {"columns": -2.0 * z.swapaxes(1, 2) * (new >= 0), "lengths": lengths}
-            for key, values in more.items():
-                old = contents.constant(f"{key} of {task}")
-                values = values.reshape(*old.shape[:-1], len(names)).astype(old.dtype)
-                changed[f"{key} of {task}"] = np.concatenate([old, values], axis=-1)
-            all_labels = np.concatenate([contents.constant(f"labels of {task}"), new])
-            changed[f"labels of {task}"] = all_labels
-            tables, classes = {}, len(entry.labels)
-            if classes > len(model.info.tasks[task].labels):
-                tables = {
-                    "ballots": np.eye(classes + 1, classes),
-                    "k": np.array([entry.k]),
-                }
-            if f"members of {task}" in contents.tensors:
-                tables |= label_tables(all_labels, classes)
-            for key, table in tables.items():
-                old = contents.constant(f"{key} of {task}")
-                changed[f"{key} of {task}"] = table.astype(old.dtype)
+            indices = label_indices(entry.labels, task, labels)
+            z = coordinates(graph, task, vectors)
+            further = _rows(graph, task, z, indices)
+            further |= _votes(model, graph, entry, task, further)
+            changed |= further
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
     trials = tuple(printable(Path(name).stem) for name in names)
     after = replace(
@@ -232,24 +188,97 @@ def taught(
         taught=info.taught + len(names),
         data_digest=digest,
     )
-    return onnx_file.rewritten(contents.data, changed, {METADATA_KEY: after.to_json()})
+    metadata = {METADATA_KEY: after.to_json()}
+    return rewritten(model.contents.data, changed, metadata)
+
+
+def _check_reach(model: Model, name: str, trial: NDArray[np.float64]) -> None:
+    """Refuse a trial (decision points, width) far outside those of the model."""
+    for point, vector in enumerate(trial):
+        with about(name):
+            decisions = model.decide(vector, point)
+        if next(iter(decisions.values())).out_of_range:
+            raise InputError(
+                f"{name}: lies far outside the trials that the model was fitted on, so "
+                "its projection cannot place it; export a model with it"
+            )
+
+
+def _check_labels(info: ModelInfo, name: str, labels: Mapping[str, str]) -> None:
+    """Refuse a trial without a label that the model knows."""
+    tasks = info.tasks
+    if any(labels.get(task) in entry.labels for task, entry in tasks.items()):
+        return
+    examples = []
+    questions = ""
+    for task, entry in tasks.items():
+        examples.append(f"{task}: {', '.join(entry.labels[:6])}")
+        questions += spelled_like(labels.get(task, ""), entry.labels)
+    raise InputError(
+        f"{name}: has no label that the model knows ({'; '.join(examples)}); label it, "
+        f"or teach it with --new-labels{questions}"
+    )
+
+
+def label_indices(
+    classes: Sequence[str], task: str, labels: Sequence[Mapping[str, str]]
+) -> NDArray[np.int64]:
+    """(m,) index of each trial's label for a task; -1 where it has none."""
+    index = {label: i for i, label in enumerate(classes)}
+    return np.array([index.get(trial.get(task, ""), -1) for trial in labels])
 
 
 def coordinates(
-    contents: Contents, task: str, point: int, x: NDArray[np.float64]
+    graph: Graph, task: str, vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(m, c) whole coordinates of vectors (m, width), by the graph's own operators."""
-    *steps, _, _ = contents.path(
-        f"{task}_neighbours"
-    )  # the last two take the coordinates
-    for operator, further in steps:
-        values = [contents.constant(name, point) for name in further]
-        if operator == "Gather":
-            x = x[:, values[0]]
-        elif operator in ("Sub", "Mul", "MatMul"):
-            x = {"Sub": np.subtract, "Mul": np.multiply, "MatMul": np.matmul}[operator](
-                x, *values
-            )
-        else:
-            x = np.clip(x, *values) if operator == "Clip" else np.rint(x)
-    return x
+    """(points, m, components) whole coordinates of vectors (points, m, width)."""
+    name = coordinates_of(graph, task)
+    points = []
+    for point, x in enumerate(vectors):
+        inputs = {"features": x, "decision_point": np.array([point])}
+        points.append(graph.run([name], inputs)[0])
+    return np.stack(points)
+
+
+def _rows(
+    graph: Graph, task: str, z: NDArray[np.float64], indices: NDArray[np.int64]
+) -> dict[str, NDArray[Any]]:
+    """The constants of a task's rows with further ones at coordinates `z`.
+
+    A trial without a label for the task is infinitely far away.
+    """
+    labelled = indices >= 0
+    lengths = np.where(labelled, (z**2).sum(axis=2), np.inf)
+    further = {
+        f"columns of {task}": -2.0 * z.swapaxes(1, 2) * labelled,
+        f"lengths of {task}": lengths,
+        f"labels of {task}": indices,
+    }
+    changed = {}
+    for name, values in further.items():
+        former = graph.constants[name]
+        shaped = values.reshape(*former.shape[:-1], len(indices)).astype(former.dtype)
+        changed[name] = np.concatenate([former, shaped], axis=-1)
+    return changed
+
+
+def _votes(
+    model: Model,
+    graph: Graph,
+    entry: Task,
+    task: str,
+    rows: Mapping[str, NDArray[Any]],
+) -> dict[str, NDArray[Any]]:
+    """The constants that count a task's labels, where its rows change them."""
+    classes = len(entry.labels)
+    tables: dict[str, NDArray[Any]] = {}
+    if classes > len(model.info.tasks[task].labels):
+        tables["ballots"] = np.eye(classes + 1, classes)
+        tables["k"] = np.array([entry.k])
+    if f"members of {task}" in graph.constants:
+        tables |= label_tables(rows[f"labels of {task}"], classes)
+    changed = {}
+    for key, table in tables.items():
+        name = f"{key} of {task}"
+        changed[name] = table.astype(graph.constants[name].dtype)
+    return changed

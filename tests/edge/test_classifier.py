@@ -167,7 +167,11 @@ def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
     exported, make_touch, monkeypatch
 ):
     broken = Model(exported / "model.onnx")
-    monkeypatch.setattr(broken, "_session", None)
+
+    def run(names, inputs):
+        raise InputError("an index past its tensor")
+
+    monkeypatch.setattr(broken._engine, "run", run)
     with pytest.raises(InputError, match="cannot be run .*; copy or export it again"):
         list(Classifier(broken).classify(make_touch()))
 

@@ -21,6 +21,7 @@ from edge.touch.features import FEATURES
 from export.api import save as save_model
 from export.graph import to_onnx
 from tests.conftest import PAPER, export, save_touches
+from tests.edge.model.test_engines import assert_same_bits, hostile
 from tests.hard_cases.everywhere import LEVELS
 from tests.hard_cases.models import session
 from tests.sequential import fitted_model
@@ -54,6 +55,11 @@ def decided(model, recording, error):
     """{task: the decision} of a recording."""
     events = Classifier(model, recording.layout, error=error).classify(recording)
     return {event.task: event for event in events if isinstance(event, Decided)}
+
+
+def test_numpy_gives_the_same_bits_at_every_decision_point(early):
+    rng = np.random.default_rng(2)
+    assert_same_bits(early.path, hostile(early.info.width, rng))
 
 
 def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):

@@ -1,0 +1,156 @@
+"""The programs that can run a model: ONNX Runtime, or numpy where that is missing."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from edge.errors import EdgeError, InputError
+from edge.interrupt import delayed
+from edge.model.onnx_file import Contents
+
+LOG = logging.getLogger("edge.model")
+ENGINES = ("onnxruntime", "numpy")
+Kind = tuple[str, list[int]]
+"""Type and shape of a value for one vector, as ONNX Runtime names them."""
+
+
+class Engine(Protocol):
+    """A program that runs the graph of a model.
+
+    Attributes:
+        name: one of `ENGINES`.
+    """
+
+    name: str
+
+    def run(
+        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
+    ) -> list[NDArray[Any]]:
+        """The named outputs of the graph.
+
+        Raises:
+            InputError: the graph cannot be computed.
+        """
+
+    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{input: its type and shape}; a size that is not known is no number."""
+
+    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{output: its type and shape}."""
+
+
+def open_engine(path: str, contents: Contents, engine: str | None) -> Engine:
+    """The engine of a model.
+
+    Args:
+        path: of the model's file, for errors.
+        contents: of the file.
+        engine: one of `ENGINES`; None for ONNX Runtime, or numpy where it is missing.
+
+    Raises:
+        InputError: the engine does not exist, or refuses the file.
+        EdgeError: ONNX Runtime is asked for and cannot be imported.
+    """
+    if engine not in (None, *ENGINES):
+        raise InputError(f"there is no engine {engine!r}; give {' or '.join(ENGINES)}")
+    if engine != "numpy":
+        try:
+            with delayed():
+                import onnxruntime
+        except ImportError as error:
+            if engine is not None:
+                raise EdgeError(
+                    f"onnxruntime cannot be imported ({error}); install it with pip"
+                ) from None
+            LOG.warning(
+                f"{path}: numpy runs the model, with the same bits, as onnxruntime "
+                "cannot be imported"
+            )
+        else:
+            return OnnxRuntime(path, contents, onnxruntime)
+    return Numpy(contents)
+
+
+class OnnxRuntime:
+    """ONNX Runtime with one thread."""
+
+    name = "onnxruntime"
+
+    def __init__(self, path: str, contents: Contents, runtime: Any) -> None:
+        """Load the file.
+
+        Raises:
+            InputError: ONNX Runtime refuses it.
+        """
+        options = runtime.SessionOptions()
+        # One thread is fastest for models of this size.
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        # Converts the constants that are stored in float32 once. More would change
+        # nothing.
+        level = runtime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+        options.graph_optimization_level = level
+        options.enable_cpu_mem_arena = False
+        try:
+            self._session = runtime.InferenceSession(
+                contents.data, options, providers=["CPUExecutionProvider"]
+            )
+        # ONNX Runtime's own exceptions share no base but this.
+        except Exception as error:
+            raise InputError(
+                f"{path}: ONNX Runtime refuses it ({type(error).__name__}); export it "
+                "again"
+            ) from None
+
+    def run(
+        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
+    ) -> list[NDArray[Any]]:
+        """The named outputs of the graph."""
+        try:
+            values: list[NDArray[Any]] = self._session.run(list(names), dict(inputs))
+        # An index past its tensor, or shapes that do not match.
+        except Exception as error:
+            raise InputError(str(error)) from None
+        return values
+
+    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{input: its type and shape}."""
+        session = self._session
+        values = [*session.get_inputs(), *session.get_overridable_initializers()]
+        return {value.name: (value.type, value.shape) for value in values}
+
+    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{output: its type and shape}."""
+        values = self._session.get_outputs()
+        return {value.name: (value.type, value.shape) for value in values}
+
+
+class Numpy:
+    """The graph in numpy."""
+
+    name = "numpy"
+
+    def __init__(self, contents: Contents) -> None:
+        from edge.model.graph import Graph  # most boards have ONNX Runtime
+
+        self._contents = contents
+        self._graph = Graph(contents)
+
+    def run(
+        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
+    ) -> list[NDArray[Any]]:
+        """The named outputs of the graph."""
+        return self._graph.run(names, inputs)
+
+    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{input: its type and shape}, as the file declares them."""
+        return self._contents.inputs
+
+    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
+        """{output: its type and shape}, as the file declares them."""
+        return self._contents.outputs

@@ -1,0 +1,224 @@
+"""The exported graph in numpy: any value of it by name, with ONNX Runtime's bits.
+
+Each operator follows its definition in ONNX's operator set 18
+(onnx.ai/onnx/operators). All that decides is made of whole numbers below 2^53, which no
+order of summation rounds, so that numpy and ONNX Runtime agree to the last bit. Where
+features are cut off, the size of the excess is a sum of fractions, and may differ in
+its last bits; whether there is an excess may not.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+from edge.model.onnx_file import TYPES, Contents, Node
+
+Array = NDArray[Any]
+Attributes = Mapping[str, int]
+
+
+def _arg_max(x: Array, attributes: Attributes) -> Array:
+    axis = attributes.get("axis", 0)
+    keep = bool(attributes.get("keepdims", 1))
+    return np.asarray(x.argmax(axis=axis, keepdims=keep), dtype=np.int64)
+
+
+def _cast(x: Array, attributes: Attributes) -> Array:
+    return x.astype(TYPES[attributes["to"]])
+
+
+def _clip(x: Array, low: Array, high: Array, attributes: Attributes) -> Array:
+    return np.minimum(np.maximum(x, low), high)
+
+
+def _gather(x: Array, indices: Array, attributes: Attributes) -> Array:
+    return x.take(indices, axis=attributes.get("axis", 0))
+
+
+def _gather_elements(x: Array, indices: Array, attributes: Attributes) -> Array:
+    return np.take_along_axis(x, indices, axis=attributes.get("axis", 0))
+
+
+def _gather_nd(x: Array, indices: Array, attributes: Attributes) -> Array:
+    """Elements at coordinates (..., r) behind the batch axes."""
+    batch = attributes.get("batch_dims", 0)
+    coordinates = list(np.moveaxis(indices, -1, 0))
+    grid = np.indices(coordinates[0].shape, sparse=True)
+    return np.asarray(x[(*grid[:batch], *coordinates)])
+
+
+def _gemm(a: Array, b: Array, c: Array, attributes: Attributes) -> Array:
+    return a @ b + c
+
+
+def _pad(x: Array, pads: Array, value: Array, attributes: Attributes) -> Array:
+    sides = pads.reshape(2, -1).T.tolist()
+    return np.pad(x, sides, constant_values=value.item())
+
+
+def _reduction(
+    combine: Callable[..., Array],
+) -> Callable[..., Array]:
+    """An operator that combines the values along some axes."""
+
+    def reduce(x: Array, axes: Array, attributes: Attributes) -> Array:
+        keep = bool(attributes.get("keepdims", 1))
+        return combine(x, axis=tuple(axes.tolist()), keepdims=keep)
+
+    return reduce
+
+
+def _sum_of_magnitudes(x: Array, **axes: Any) -> Array:
+    return np.asarray(np.abs(x).sum(**axes))
+
+
+def _sum_of_squares(x: Array, **axes: Any) -> Array:
+    return np.asarray(np.square(x).sum(**axes))
+
+
+def _squeeze(x: Array, axes: Array | None = None, *, attributes: Attributes) -> Array:
+    return x.squeeze(None if axes is None else tuple(axes.tolist()))
+
+
+def _top_k(x: Array, k: Array, attributes: Attributes) -> tuple[Array, Array]:
+    """The smallest (or largest) values, and their places; of equal ones the first."""
+    axis = attributes.get("axis", -1)
+    keys = -x if attributes.get("largest", 1) else x
+    order = keys.argsort(axis=axis, kind="stable")
+    places = order.take(np.arange(int(k.item())), axis=axis)
+    return np.take_along_axis(x, places, axis=axis), places
+
+
+def _plain(function: Callable[..., Any]) -> Callable[..., Array]:
+    """An operator of numpy that takes no attributes."""
+
+    def operator(*inputs: Array, attributes: Attributes) -> Array:
+        return np.asarray(function(*inputs))
+
+    return operator
+
+
+def _maximum(*inputs: Array, attributes: Attributes) -> Array:
+    largest = inputs[0]
+    for x in inputs[1:]:
+        largest = np.maximum(largest, x)
+    return largest
+
+
+OPERATORS: dict[str, Callable[..., Any]] = {
+    "Add": _plain(np.add),
+    "ArgMax": _arg_max,
+    "Cast": _cast,
+    "Clip": _clip,
+    "Div": _plain(np.divide),
+    "Gather": _gather,
+    "GatherElements": _gather_elements,
+    "GatherND": _gather_nd,
+    "Gemm": _gemm,
+    "LessOrEqual": _plain(np.less_equal),
+    "MatMul": _plain(np.matmul),
+    "Max": _maximum,
+    "Mul": _plain(np.multiply),
+    "Pad": _pad,
+    "ReduceL1": _reduction(_sum_of_magnitudes),
+    "ReduceMean": _reduction(np.mean),
+    "ReduceSum": _reduction(np.sum),
+    "ReduceSumSquare": _reduction(_sum_of_squares),
+    "Round": _plain(np.rint),
+    "Sqrt": _plain(np.sqrt),
+    "Squeeze": _squeeze,
+    "Sub": _plain(np.subtract),
+    "TopK": _top_k,
+    "Where": _plain(np.where),
+}
+"""By name. Each takes its inputs and `attributes`, and gives its output or outputs."""
+
+
+class Graph:
+    """A graph whose values can be asked for by name.
+
+    >>> from edge import demo
+    >>> from edge.model import onnx_file
+    >>> contents = onnx_file.read(demo.MODEL.read_bytes(), "the demo")
+    >>> features = np.zeros((1, 120))
+    >>> Graph(contents).run(["mobility_label"], {"features": features})[0].shape
+    (1,)
+
+    Attributes:
+        makers: {value: the node that makes it}.
+        constants: {name: value}.
+    """
+
+    def __init__(self, contents: Contents) -> None:
+        """Read the constants of a model file.
+
+        Raises:
+            InputError: the file uses an operator in a form that no export writes.
+        """
+        self.constants = {name: contents.constant(name) for name in contents.tensors}
+        self.makers: dict[str, Node] = {}
+        self._plans: dict[tuple[str, ...], list[Node]] = {}
+        self._nodes = contents.nodes
+        for node in contents.nodes:
+            for output in node.outputs:
+                self.makers[output] = node
+
+    def run(self, names: Sequence[str], inputs: Mapping[str, Array]) -> list[Array]:
+        """Values of the graph, in the order of the names.
+
+        Args:
+            names: of outputs, or of any other value.
+            inputs: {name: value}; they replace constants of the same name.
+
+        Raises:
+            InputError: the graph has no such value, or cannot compute it.
+        """
+        values: dict[str, Array] = {**self.constants, **inputs}
+        try:
+            with np.errstate(all="ignore"):
+                for node in self._plan(tuple(names)):
+                    self._compute(node, values)
+            return [values[name] for name in names]
+        except (KeyError, IndexError, TypeError, ValueError, MemoryError) as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"the graph cannot be computed ({reason})") from None
+
+    def _compute(self, node: Node, values: dict[str, Array]) -> None:
+        inputs = [values[name] for name in node.inputs]
+        computed = OPERATORS[node.operator](*inputs, attributes=node.attributes)
+        if len(node.outputs) == 1:
+            computed = (computed,)
+        for name, value in zip(node.outputs, computed, strict=True):
+            values[name] = value
+
+    def _plan(self, names: tuple[str, ...]) -> list[Node]:
+        """The nodes that the values need, in the order of computation."""
+        if names not in self._plans:
+            needed = set(names)
+            plan = []
+            # A file holds its nodes in the order of computation.
+            for node in reversed(self._nodes):
+                if not needed.isdisjoint(node.outputs):
+                    needed.update(node.inputs)
+                    plan.append(node)
+            self._plans[names] = plan[::-1]
+        return self._plans[names]
+
+    def path(self, output: str) -> list[Node]:
+        """The nodes from the features to a value, through the first input of each."""
+        nodes = []
+        while output in self.makers:
+            node = self.makers[output]
+            nodes.append(node)
+            output = node.inputs[0]
+        return nodes[::-1]
+
+
+def coordinates_of(graph: Graph, task: str) -> str:
+    """The name of the coordinates (n, components) in which a task compares touches."""
+    nearest = graph.makers[f"{task}_neighbours"]
+    product = graph.makers[nearest.inputs[0]]
+    return product.inputs[0]

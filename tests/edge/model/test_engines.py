@@ -1,0 +1,131 @@
+"""ONNX Runtime and numpy give the same bits; numpy steps in where the other is missing."""
+
+import logging
+import os
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import edge as edge_package
+from edge import demo
+from edge.errors import EdgeError, InputError
+from edge.model.model import Model
+from export.graph import to_onnx
+from tests.conftest import ROOT
+from tests.export.test_graph import describe, fit, hard_set
+from train.pipeline import Choice
+
+MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
+RANDOM = int(os.environ.get("RANDOM_MODELS", "100"))
+"""Random models of the test; RANDOM_MODELS=1000 tries as many."""
+
+
+def assert_same_bits(path, vectors):
+    """Both engines answer the same vectors alike; what is not finite has no label."""
+    runtime = Model(path, "onnxruntime")
+    graph = Model(path, "numpy")
+    for point in range(len(runtime.decision_points_s)):
+        for vector in vectors:
+            expected = runtime.run(vector[None], point)
+            seen = graph.run(vector[None], point)
+            assert seen.keys() == expected.keys()
+            excess = expected.pop("out_of_range")
+            assert (seen.pop("out_of_range") > 0.0) == (excess > 0.0)
+            for task in runtime.info.tasks:
+                label = expected[f"{task}_label"]
+                assert seen[f"{task}_label"] == label
+                for name in expected:
+                    if name.startswith(f"{task}_") and label >= 0:
+                        assert seen[name].dtype == expected[name].dtype
+                        assert seen[name].shape == expected[name].shape
+                        assert seen[name].tobytes() == expected[name].tobytes()
+
+
+def hostile(width, rng):
+    """Vectors of every kind: plain, far, equal, not finite."""
+    plain = rng.normal(size=(6, width))
+    far = 10.0 ** rng.uniform(0, 14, (6, 1)) * rng.normal(size=(6, width))
+    odd = np.zeros((4, width))
+    odd[1] = np.nan
+    odd[2, 0] = np.inf
+    odd[3] = 1e308
+    return np.concatenate([plain, far, odd])
+
+
+@pytest.mark.parametrize("path", MODELS, ids=["demo", "golden"])
+def test_the_models_of_the_checkout_have_the_same_bits_in_both(path):
+    golden = path.with_name("golden.npz")
+    rng = np.random.default_rng(1)
+    vectors = hostile(Model(path).info.width, rng)
+    if golden.exists():
+        vectors = np.concatenate([vectors, np.load(golden)["vectors"]])
+    assert_same_bits(path, vectors)
+
+
+def test_decision_points_have_the_same_bits_in_both(exported):
+    path = exported / "model.onnx"
+    rng = np.random.default_rng(2)
+    assert_same_bits(path, hostile(Model(path).info.width, rng))
+
+
+@settings(max_examples=RANDOM, deadline=None)
+@given(
+    kind=st.sampled_from(
+        ["plain", "lattice", "duplicates", "offset", "outlier", "far"]
+    ),
+    projection=st.sampled_from(["pca", "lda"]),
+    scaling=st.sampled_from(["none", "I", "III", "IV"]),
+    k=st.integers(1, 6),
+    labels=st.integers(2, 5),
+    seed=st.integers(0, 10**6),
+)
+def test_random_models_have_the_same_bits_in_both(
+    tmp_path_factory, kind, projection, scaling, k, labels, seed
+):
+    X, queries = hard_set(kind, np.random.default_rng(seed))
+    k = min(len(X), k)
+    fitted = fit(X, {"t": Choice(scaling, 6, k, projection)}, labels=labels)
+    path = tmp_path_factory.mktemp("random") / "model.onnx"
+    path.write_bytes(to_onnx(fitted, describe(fitted, samples=8)))
+    assert_same_bits(path, queries)
+
+
+def without_onnxruntime(monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+
+
+def test_numpy_steps_in_where_onnxruntime_is_missing_and_says_so(monkeypatch, caplog):
+    expected = Model(demo.MODEL).decide(np.zeros(120))
+    without_onnxruntime(monkeypatch)
+    with caplog.at_level(logging.WARNING, "edge.model"):
+        model = edge_package.Model(demo.MODEL)
+    assert model.engine == "numpy"
+    assert "numpy runs the model, with the same bits" in caplog.text
+    decided = model.decide(np.zeros(120))
+    assert decided.keys() == expected.keys()
+    for task, decision in decided.items():
+        assert decision.label == expected[task].label
+        assert decision.distances.tobytes() == expected[task].distances.tobytes()
+
+
+def test_an_engine_that_is_asked_for_must_be_there(monkeypatch):
+    without_onnxruntime(monkeypatch)
+    with pytest.raises(EdgeError, match="onnxruntime cannot be imported"):
+        Model(demo.MODEL, "onnxruntime")
+    with pytest.raises(InputError, match="no engine 'tea'; give onnxruntime or numpy"):
+        Model(demo.MODEL, "tea")
+
+
+def test_run_takes_the_engine_that_is_asked_for(edge):
+    touch = demo.FOLDER / "pillow-movable.npz"
+    arguments = ("run", "--model", demo.MODEL, "--fake", touch)
+    status, expected, _ = edge(*arguments)
+    assert status == 0
+    status, events, _ = edge(*arguments, "--engine", "numpy")
+    assert status == 0
+    labels = [event["label"] for event in events if event["event"] == "decision"]
+    assert labels == [e["label"] for e in expected if e["event"] == "decision"]
+    assert labels
