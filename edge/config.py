@@ -8,7 +8,7 @@ import math
 import os
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Self
 
 from edge.errors import InputError
@@ -91,6 +91,28 @@ def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[An
     """
     with parsing(os.fspath(path), kind, f"; {mend}"):
         yield _decoded(read_bytes(path))
+
+
+def _number(value: object) -> float:
+    """A number as a float; NaN where it is none, or not finite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number larger than any float
+        return math.nan
+    return number if math.isfinite(number) else math.nan
+
+
+def _range_text(low: float, high: float, open_low: bool) -> str:
+    """The range of a number, in words."""
+    if math.isfinite(high) and open_low:
+        return f"a number above {low:g}, at most {high:g}"
+    if math.isfinite(high):
+        return f"a number from {low:g} to {high:g}"
+    if math.isfinite(low):
+        return f"a number {'above' if open_low else 'of at least'} {low:g}"
+    return "a finite number"
 
 
 class ConfigTable:
@@ -180,19 +202,10 @@ class ConfigTable:
         its list.
         """
         value = self.get(key, default) if value is REQUIRED else value
-        number = math.nan
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            with suppress(OverflowError):  # a whole number larger than any float
-                number = float(value)
+        number = _number(value)
         in_range = low < number <= high or (number == low and not open_low)
-        if not (in_range and math.isfinite(number)):
-            wanted = "a finite number"
-            if math.isfinite(high):
-                between = ", at most" if open_low else " to"
-                wanted = f"a number {'above' if open_low else 'from'} {low:g}{between} {high:g}"
-            elif math.isfinite(low):
-                wanted = f"a number {'above' if open_low else 'of at least'} {low:g}"
-            raise self.fail(key, wanted, value)
+        if math.isnan(number) or not in_range:
+            raise self.fail(key, _range_text(low, high, open_low), value)
         return number
 
     def numbers(
@@ -216,7 +229,7 @@ class ConfigTable:
         )
 
     def flag(self, key: str, default: Any = REQUIRED) -> bool:
-        """True or false."""
+        """The boolean value of a key."""
         value = self.get(key, default)
         if not isinstance(value, bool):
             raise self.fail(key, "true or false")
@@ -230,7 +243,7 @@ class ConfigTable:
         return value
 
     def choice(self, key: str, options: Sequence[str], default: Any = REQUIRED) -> str:
-        """One of the given words."""
+        """One of some words."""
         value = self.get(key, default)
         if value not in options:
             raise self.fail(key, f"one of {', '.join(options)}")

@@ -5,11 +5,11 @@ import json
 import logging
 import os
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn, Self
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from edge.config import parse_json, shown
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing, write_whole
-from edge.touch.arm import joint_columns
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.thresholds import doubt
@@ -92,6 +91,8 @@ class Recording:
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
+        from edge.touch.arm import joint_columns  # few recordings need it
+
         with about(where):
             columns = joint_columns(self.joint_names or (), names)
         meta = {**self.meta, "joint_names": list(names)}
@@ -124,124 +125,157 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
     Raises:
         InputError: the recording breaks the contract.
     """
-
-    def fail(problem: str) -> NoReturn:
-        raise InputError(f"{path}: {problem}")
-
-    def expect(
-        name: str, values: Any, dtype: type, *shapes: tuple[int, ...]
-    ) -> NDArray[Any]:
-        array: NDArray[Any] = np.asarray(values)
-        if array.dtype.kind == "f":
-            array = array.astype(np.float64)
-        if array.dtype != dtype or array.shape not in shapes:
-            wanted = f"{np.dtype(dtype)} {' or '.join(map(str, shapes))}"
-            fail(f"{name} must be {wanted}, not {array.dtype} {array.shape}")
-        return array
-
-    meta, frames = dict(recording.meta), np.asarray(recording.frames)
-    if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
-        frames = _counts(path, frames, scale)
-        meta |= {} if scale is None else {"scale": scale}
-    skin, labels = meta.get("skin", {}), meta.get("labels", {})
-    if not isinstance(skin, dict):
-        fail("meta.skin must be an object")
-    if frames.ndim == 2:
-        rows, cols = skin.get("rows"), skin.get("cols")
-        if not (
-            type(rows) is type(cols) is int
-            and rows > 0
-            and rows * cols == frames.shape[1]
-        ):
-            fail('frames are flat; give their "rows" and "cols" in meta.skin')
-        frames = frames.reshape(len(frames), rows, cols)
-    if frames.dtype != np.uint16 or frames.ndim != 3:
-        fail(
-            f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} "
-            f"{frames.shape}"
-        )
-    n, rows, cols = frames.shape
-    if 0 in frames.shape:
-        fail(f"frames are empty {frames.shape}; record at least one frame")
+    with about(path):
+        meta = dict(recording.meta)
+        if scale is not None and recording.frames.dtype.kind in "iuf":
+            meta["scale"] = scale
+        skin = meta.get("skin", {})
+        if not isinstance(skin, dict):
+            raise InputError("meta.skin must be an object")
+        frames = _frames(recording.frames, skin, scale)
+    rows, cols = frames.shape[1:]
     layout = SkinLayout.from_dict({"rows": rows, "cols": cols, **skin}, where=path)
-    if layout.shape != (rows, cols):
-        fail(
-            f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are {rows} x "
-            f"{cols}"
-        )
-
-    t = expect("t", recording.t, np.float64, (n,))
-    if not np.isfinite(t).all():
-        fail(
-            f"t of frame {int(np.argmin(np.isfinite(t)))} is not finite; repair the "
-            "clock"
-        )
-    backwards = np.flatnonzero(t[1:] < t[:-1])
-    if backwards.size:
-        fail(
-            f"time goes back at frame {backwards[0] + 1}; sort the frames or split the "
-            "recording"
-        )
-    joints, dof = recording.joints, 0
-    if joints is not None:
-        joints = np.asarray(joints)
-        dof = max(joints.shape[1], 1) if joints.ndim == 2 else 1
-        joints = expect("joints", joints, np.float64, (n, dof))
-        unknown = np.isnan(joints)
-        odd = (np.isinf(joints) | (unknown != unknown[:, :1])).any(axis=1)
-        if odd.any():
-            fail(
-                f"a joint angle of frame {int(np.argmax(odd))} is not finite; in a "
-                "frame without "
-                "a known pose, all angles must be NaN"
+    with about(path):
+        if layout.shape != (rows, cols):
+            raise InputError(
+                f"meta.skin says {layout.rows} x {layout.cols} taxels, frames are "
+                f"{rows} x {cols}"
             )
-    if recording.valid is not None:
-        expect("valid", recording.valid, np.bool_, (rows, cols), (n, rows, cols))
-
-    def are_names(texts: object) -> bool:
-        return isinstance(texts, list) and all(
-            isinstance(x, str) and x != "" for x in texts
-        )
-
-    if isinstance(labels, dict) and labels:
-        meta["labels"] = labels = {
-            task: str(label)
-            if type(label) is int or isinstance(label, np.integer)
-            else label
-            for task, label in labels.items()
-        }
-    if not isinstance(labels, dict) or not are_names([*labels, *labels.values()]):
-        fail("meta.labels must map task names to labels, both text")
-    names = meta.get("joint_names")
-    if names is not None:
-        if not are_names(names) or len(set(names)) < len(names):
-            fail("meta.joint_names must be a list of different names")
-        if len(names) != dof:
-            fail(
-                f"the number of meta.joint_names is {len(names)}, of joint angles {dof}"
-            )
+        t = _times(recording.t, len(frames))
+        joints = _joints(recording.joints, len(frames))
+        if recording.valid is not None:
+            _typed("valid", recording.valid, np.bool_, (rows, cols), frames.shape)
+        labels = _labels(meta.get("labels", {}))
+        if labels:
+            meta["labels"] = labels
+        if meta.get("joint_names") is not None:
+            _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta)
 
 
-def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
-    """Frames of another type as uint16, multiplied by `scale` and rounded if it is
-    given."""
+def _typed(
+    name: str, values: Any, dtype: type, *shapes: tuple[int, ...]
+) -> NDArray[Any]:
+    """An array that must have a type and one of some shapes; floats become float64."""
+    array: NDArray[Any] = np.asarray(values)
+    if array.dtype.kind == "f":
+        array = array.astype(np.float64)
+    if array.dtype != dtype or array.shape not in shapes:
+        expected = f"{np.dtype(dtype)} {' or '.join(map(str, shapes))}"
+        raise InputError(f"{name} must be {expected}, not {array.dtype} {array.shape}")
+    return array
+
+
+def _frames(
+    values: Any, skin: Mapping[str, Any], scale: float | None
+) -> NDArray[np.uint16]:
+    """The counts (n, rows, cols) of at least one frame."""
+    frames: NDArray[Any] = np.asarray(values)
+    if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
+        frames = _counts(frames, scale)
+    if frames.ndim == 2:
+        rows: Any = skin.get("rows")
+        cols: Any = skin.get("cols")
+        if not _are_sides(rows, cols, frames.shape[1]):
+            raise InputError(
+                'frames are flat; give their "rows" and "cols" in meta.skin'
+            )
+        frames = frames.reshape(len(frames), rows, cols)
+    if frames.dtype != np.uint16 or frames.ndim != 3:
+        raise InputError(
+            f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} "
+            f"{frames.shape}"
+        )
+    if 0 in frames.shape:
+        raise InputError(f"frames are empty {frames.shape}; record at least one frame")
+    return frames
+
+
+def _are_sides(rows: Any, cols: Any, taxels: int) -> bool:
+    """Whether two values are the rows and columns of so many taxels."""
+    if type(rows) is not int or type(cols) is not int:
+        return False
+    return rows > 0 and rows * cols == taxels
+
+
+def _times(values: Any, frames: int) -> NDArray[np.float64]:
+    """Finite times (frames,) that never go back."""
+    t = _typed("t", values, np.float64, (frames,))
+    finite = np.isfinite(t)
+    if not finite.all():
+        raise InputError(
+            f"t of frame {int(finite.argmin())} is not finite; repair the clock"
+        )
+    backwards = np.flatnonzero(t[1:] < t[:-1])
+    if backwards.size:
+        raise InputError(
+            f"time goes back at frame {backwards[0] + 1}; sort the frames or split the "
+            "recording"
+        )
+    return t
+
+
+def _joints(values: Any, frames: int) -> NDArray[np.float64] | None:
+    """Joint angles (frames, dof), all NaN in a frame whose pose is not known."""
+    if values is None:
+        return None
+    shape = np.shape(values)
+    dof = max(shape[1], 1) if len(shape) == 2 else 1
+    joints = _typed("joints", values, np.float64, (frames, dof))
+    missing = np.isnan(joints)
+    odd = (np.isinf(joints) | (missing != missing[:, :1])).any(axis=1)
+    if odd.any():
+        raise InputError(
+            f"a joint angle of frame {int(np.argmax(odd))} is not finite; in a frame "
+            "without a known pose, all angles must be NaN"
+        )
+    return joints
+
+
+def _are_names(texts: object) -> bool:
+    if not isinstance(texts, list):
+        return False
+    return all(isinstance(text, str) and text != "" for text in texts)
+
+
+def _labels(values: Any) -> dict[str, str]:
+    """{task: label}; labels that are whole numbers become text."""
+    labels = {}
+    if isinstance(values, dict):
+        for task, label in values.items():
+            whole = type(label) is int or isinstance(label, np.integer)
+            labels[task] = str(label) if whole else label
+    if not isinstance(values, dict) or not _are_names([*labels, *labels.values()]):
+        raise InputError("meta.labels must map task names to labels, both text")
+    return labels
+
+
+def _check_joint_names(names: Any, joints: NDArray[np.float64] | None) -> None:
+    if not _are_names(names) or len(set(names)) < len(names):
+        raise InputError("meta.joint_names must be a list of different names")
+    dof = 0 if joints is None else joints.shape[1]
+    if len(names) != dof:
+        raise InputError(
+            f"the number of meta.joint_names is {len(names)}, of joint angles {dof}"
+        )
+
+
+def _counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
+    """Frames of another type as uint16, multiplied by `scale` and rounded."""
     if scale is not None:
         if not 0.0 < scale < np.inf:
-            raise InputError(
-                f"{path}: the scale must be a number above 0, not {scale:g}"
-            )
+            raise InputError(f"the scale must be a number above 0, not {scale:g}")
         frames = np.rint(frames.astype(np.float64) * scale)
     if not np.isfinite(frames).all():
         raise InputError(
-            f"{path}: frames hold values that are not finite; set them to 0 and mark "
+            "frames hold values that are not finite; set them to 0 and mark "
             "the taxels "
             "in `valid`"
         )
     low, high = frames.min(initial=0), frames.max(initial=0)
     if low < 0:
         raise InputError(
-            f"{path}: frames go down to {low:g}, but counts are above baseline: "
+            f"frames go down to {low:g}, but counts are above baseline: "
             "subtract the "
             "frame before touch, then use np.clip(frames, 0, None)"
         )
@@ -250,7 +284,7 @@ def _counts(path: str, frames: NDArray[Any], scale: float | None) -> NDArray[np.
         # With a power of ten, all recordings of a set can share the factor.
         factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MAX_COUNTS / high))
         raise InputError(
-            f"{path}: frames are {frames.dtype} up to {high:g}"
+            f"frames are {frames.dtype} up to {high:g}"
             f"{', with fractions' if fractions else ''}; counts are whole numbers up "
             "to "
             f"{MAX_COUNTS}: use edge.save(path, recording, scale={factor:g}), with the "

@@ -20,16 +20,9 @@ from edge.recording import LARGEST_BYTES, Recording, find, load
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.features import (
-    FEATURES,
-    SAMPLES,
-    WINDOW_S,
-    feature_vector,
-    kernel_channels,
-    widths,
-)
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.touch.frame import Frame
-from edge.touch.kernels import KernelTable
+from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
 from train.arms import arm_of, joint_angles

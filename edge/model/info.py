@@ -1,10 +1,12 @@
 """The metadata of a model file, which the board reads beside the graph."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +14,16 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
 from edge.model.novelty import Novelty
-from edge.model.stopping import Stopping
 from edge.touch import measures
-from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
-from edge.touch.features import channels_of, feature_vector, widths
-from edge.touch.kernels import KernelTable
+from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
+
+if TYPE_CHECKING:
+    from edge.model.stopping import Stopping
+    from edge.touch.arm import Chain
+    from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
 FORMAT = 6
@@ -91,7 +95,7 @@ class ModelInfo:
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
     """{feature: its table} of the features that are made of kernels."""
     name: str = ""
-    """Of the model, as its owner calls it."""
+    """The model's name."""
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be
     kept."""
@@ -116,8 +120,7 @@ class ModelInfo:
     def vector(
         self, series: FeatureSeries, window_s: float | None = None
     ) -> NDArray[np.float64]:
-        """The model's features of a contact, by default at the full window:
-        `feature_vector`."""
+        """The model's `feature_vector` of a contact, by default at the full window."""
         window_s = window_s or self.window_s
         return feature_vector(
             series, window_s, self.samples, self.features, self.kernels
@@ -193,106 +196,152 @@ class ModelInfo:
             if meta.whole("format") != FORMAT:
                 raise InputError(
                     f"{where} is of format {shown(meta.raw['format'])}, but this "
-                    "edge-classify "
-                    f"reads {FORMAT}"
+                    f"edge-classify reads {FORMAT}"
                 )
-            tasks, tracking = meta.table("tasks"), meta.table("tracking")
-            points = meta.numbers("decision_points_s", default=())
-            rules = meta.table("stopping") if points else ConfigTable({}, where)
-            novelty = meta.table("novelty") if points else None
-            layout = SkinLayout.from_dict(meta.get("skin"), where=where)
-            names, arm = meta.texts("features"), meta.get("arm", None)
-            info = cls(
-                tasks={task: _task(tasks.table(task)) for task in map(str, tasks.raw)},
-                layout=layout,
-                debounce=tracking.whole("debounce", allowed=range(1, 1001)),
-                window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
-                samples=meta.whole("samples", allowed=range(2, 10_001)),
-                features=names,
-                units={name: meta.table("units").text(name) for name in names},
-                motion_frame=meta.choice("motion_frame", ("world", "skin")),
-                chain=Chain.from_dict(arm, where=f"{where}: arm")
-                if arm is not None
-                else None,
-                rows=meta.whole("rows"),
-                data_digest=meta.text("data_digest", empty=True),
-                versions={
-                    str(k): str(v) for k, v in meta.table("versions", {}).raw.items()
-                },
-                decision_points_s=points,
-                stopping={
-                    task: Stopping.from_table(rules.table(task), len(points))
-                    for task in rules.raw
-                },
-                novelty=None
-                if novelty is None
-                else Novelty.from_table(novelty, len(points)),
-                joints=meta.whole("joints", 0, allowed=range(0, 1001)),
-                kernels={
-                    name: KernelTable.from_table(
-                        meta.table("kernels").table(name),
-                        channels_of(name, layout),
-                        measures.KERNELS[name],
-                    )
-                    for name in names
-                    if name in measures.KERNELS
-                },
-                name=meta.text("name", "", empty=True),
-                trials=meta.texts("trials", ()),
-                taught=meta.whole("taught", 0, allowed=range(1 << 31)),
-            )
-            tracking.done()
+            info = cls._read(meta)
         except InputError as error:
             raise InputError(f"{error}; export it again") from None
-        info._check(name)
+        _check_features(info, name)
+        _check(info, name)
         return info
 
-    def _check(self, name: str) -> None:
-        try:
-            types = measures.features(self.features)
-        except InputError as error:
-            raise InputError(
-                f"{name}: was made for the features {', '.join(self.features)}; "
-                f"{error}; "
-                "export it with this version of edge-classify"
-            ) from None
-        of_joints = any(feature.of_joints for feature in types)
-        dof = self.joints if self.chain is None else self.chain.dof
-        points = self.decision_points_s
-        contradictions = {
-            "its features contradict its joints": self.joints
-            != (dof if of_joints else 0)
-            or of_joints > (self.joints > 0),
-            "its metadata names no task": not self.tasks,
-            "its decision points are impossible": points
-            and (
-                (0.0, *points) != tuple(sorted({0.0, *points}))
-                or points[-1] != self.window_s
-                or self.stopping.keys() != self.tasks.keys()
-                or self.novelty is None
-                or self.novelty.task not in self.tasks
-            ),
-            "the factors of a task are impossible": not all(
-                map(self._factors_fit, self.products)
-            ),
-            f"names {len(self.trials)} of {self.rows} trials": self.trials
-            and len(self.trials) != self.rows,
-            "its motion frame contradicts its arm": (self.motion_frame == "world")
-            != (self.chain is not None),
-        }
-        for contradiction, holds in contradictions.items():
-            if holds:
-                raise InputError(f"{name}: {contradiction}; export it again")
+    @classmethod
+    def _read(cls, meta: ConfigTable) -> Self:
+        """Read the table of a model's metadata."""
+        where = meta.where
+        tasks = {}
+        for task in meta.table("tasks").raw:
+            tasks[str(task)] = _task(meta.table("tasks").table(task))
+        tracking = meta.table("tracking")
+        points = meta.numbers("decision_points_s", default=())
+        names = meta.texts("features")
+        units = meta.table("units")
+        layout = SkinLayout.from_dict(meta.get("skin"), where=where)
+        versions = {}
+        for program, version in meta.table("versions", {}).raw.items():
+            versions[str(program)] = str(version)
+        info = cls(
+            tasks=tasks,
+            layout=layout,
+            debounce=tracking.whole("debounce", allowed=range(1, 1001)),
+            window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
+            samples=meta.whole("samples", allowed=range(2, 10_001)),
+            features=names,
+            units={name: units.text(name) for name in names},
+            motion_frame=meta.choice("motion_frame", ("world", "skin")),
+            chain=_chain(meta),
+            rows=meta.whole("rows"),
+            data_digest=meta.text("data_digest", empty=True),
+            versions=versions,
+            decision_points_s=points,
+            stopping=_stopping(meta, len(points)),
+            novelty=_novelty(meta, len(points)),
+            joints=meta.whole("joints", 0, allowed=range(0, 1001)),
+            kernels=_kernels(meta, names, layout),
+            name=meta.text("name", "", empty=True),
+            trials=meta.texts("trials", ()),
+            taught=meta.whole("taught", 0, allowed=range(1 << 31)),
+        )
+        tracking.done()
+        return info
 
-    def _factors_fit(self, task: str) -> bool:
-        """Whether each pair of the factors' labels is one label of the task."""
-        indices = self.products[task]
-        ranges = [range(len(self.tasks[f].labels)) for f in indices if f in self.tasks]
-        if len(ranges) != 2 or {len(self.tasks[task].labels)} != {
-            *map(len, indices.values())
-        }:
-            return False
-        return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
+
+def _chain(meta: ConfigTable) -> Chain | None:
+    """The arm, where the model has one."""
+    arm = meta.get("arm", None)
+    if arm is None:
+        return None
+    from edge.touch.arm import Chain
+
+    return Chain.from_dict(arm, where=f"{meta.where}: arm")
+
+
+def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
+    """The stopping rules of each task, where the model has decision points."""
+    if not points:
+        return {}
+    from edge.model.stopping import Stopping
+
+    rules = meta.table("stopping")
+    return {task: Stopping.from_table(rules.table(task), points) for task in rules.raw}
+
+
+def _novelty(meta: ConfigTable, points: int) -> Novelty | None:
+    """The limits of novelty, where the model has decision points."""
+    return Novelty.from_table(meta.table("novelty"), points) if points else None
+
+
+def _kernels(
+    meta: ConfigTable, names: Sequence[str], layout: SkinLayout
+) -> dict[str, KernelTable]:
+    """{feature: its table} of convolution features."""
+    tables = {}
+    for name in names:
+        if name in measures.KERNELS:
+            from edge.touch.kernels import KernelTable, channels_of
+
+            table = meta.table("kernels").table(name)
+            channels = channels_of(name, layout)
+            biases = measures.KERNELS[name]
+            tables[name] = KernelTable.from_table(table, channels, biases)
+    return tables
+
+
+def _check_features(info: ModelInfo, name: str) -> None:
+    """Refuse features that do not exist, or contradict the joints."""
+    try:
+        types = measures.features(info.features)
+    except InputError as error:
+        raise InputError(
+            f"{name}: was made for the features {', '.join(info.features)}; {error}; "
+            "export it with this version of edge-classify"
+        ) from None
+    of_joints = any(feature.of_joints for feature in types)
+    dof = info.joints if info.chain is None else info.chain.dof
+    expected = dof if of_joints else 0
+    if info.joints != expected or (of_joints and not info.joints):
+        features = "joint features" if of_joints else "no joint features"
+        raise InputError(
+            f"{name}: names {features} but gives {info.joints} joints; export it again"
+        )
+
+
+def _check(info: ModelInfo, name: str) -> None:
+    """Refuse metadata that contradict themselves."""
+    contradiction = ""
+    if not info.tasks:
+        contradiction = "its metadata names no task"
+    elif info.decision_points_s and not _points_fit(info):
+        contradiction = "its decision points are impossible"
+    elif info.trials and len(info.trials) != info.rows:
+        contradiction = f"names {len(info.trials)} of {info.rows} trials"
+    elif (info.motion_frame == "world") != (info.chain is not None):
+        contradiction = "its motion frame contradicts its arm"
+    for task in info.products:
+        if not contradiction and not _factors_fit(info, task):
+            contradiction = f"task {task!r} is not the product of its factors"
+    if contradiction:
+        raise InputError(f"{name}: {contradiction}; export it again")
+
+
+def _points_fit(info: ModelInfo) -> bool:
+    """Whether decision points rise to the window, and each task has its rules."""
+    points = info.decision_points_s
+    rising = (0.0, *points) == tuple(sorted({0.0, *points}))
+    if not rising or points[-1] != info.window_s:
+        return False
+    named = info.novelty is not None and info.novelty.task in info.tasks
+    return named and info.stopping.keys() == info.tasks.keys()
+
+
+def _factors_fit(info: ModelInfo, task: str) -> bool:
+    """Whether each pair of the factors' labels is one label of the task."""
+    indices = info.products[task]
+    ranges = [range(len(info.tasks[f].labels)) for f in indices if f in info.tasks]
+    lengths = {len(labels) for labels in indices.values()}
+    if len(ranges) != 2 or lengths != {len(info.tasks[task].labels)}:
+        return False
+    return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
 
 
 def _task(table: ConfigTable) -> Task:

@@ -1,19 +1,22 @@
-"""One contact: its measurements frame by frame, and the series that features are made
-of."""
+"""One contact: its measurements frame by frame, and the series that they make."""
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.touch.arm import Chain, Vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import ZONE_WIDTH, Measurer
 from edge.touch.region import ActiveTaxels, Region
+
+if TYPE_CHECKING:
+    from edge.touch.arm import Chain, Vector
 
 CLOCK_ROUNDING_S = 1e-6
 """Shorter than a frame, and longer than the rounding of a clock that counts 1e9
@@ -119,15 +122,21 @@ class Contact:
     def __init__(
         self, onset_s: float, region: Region, measurer: Measurer, chain: Chain | None
     ) -> None:
-        self.onset_s, self.age_s, self.touched_s = onset_s, 0.0, 0.0
+        self.onset_s = onset_s
+        self.age_s = 0.0
+        self.touched_s = 0.0
         self.frames = 0
-        self.region, self.layout, self.chain = region, measurer.layout, chain
-        self.ended = self.missing_taxels = self.missing_pose = False
+        self.region = region
+        self.layout = measurer.layout
+        self.chain = chain
+        self.ended = False
+        self.missing_taxels = False
+        self.missing_pose = False
         self.joints: NDArray[np.float64] | None = None
         self._measurer = measurer
         self._rows: list[dict[str, Any]] = []
-        """Of each frame, what was measured: fields of `FeatureSeries`, but `counted`
-        (m,) for the whole numbers of region and zones."""
+        """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
+        numbers of region and zones."""
         self._starts: dict[str, Vector] = {}
 
     def add(
@@ -143,45 +152,58 @@ class Contact:
         """
         measurer = self._measurer
         if self._rows and age_s <= self.age_s:
-            # Two readings of one instant: the later one counts.
             age_s = self.age_s
-            self._rows.pop()
-            for name in tuple(self._starts):
-                if not any(math.isfinite(row[name]) for row in self._rows):
-                    del self._starts[name]
+            self._forget_last()
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         zones = measurer.measure(active, region)
         plain = [0] * PLAIN
-        row: dict[str, Any] = {"t": age_s, "motion": 0.0}
-        if measurer.force_motion:
-            row["force_motion"] = 0.0
+        row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
         if region is not None:
-            self.region, self.joints = region, frame.joints
+            self.region = region
+            self.joints = frame.joints
             plain[:2] = region.peak, region.area
             if measurer.motion:
                 plain[2:] = region.sums
-                row["motion"] = self._distance("motion", region.centroid, frame.joints)
-            if measurer.force_motion:
-                # The contact's zone comes first.
-                _, _, force, rows, cols, *_ = zones
-                centroid = rows / force, cols / force % self.layout.cols
-                row["force_motion"] = self._distance(
-                    "force_motion", centroid, frame.joints
-                )
-        elif self._rows:
-            row |= {name: self._rows[-1][name] for name in row.keys() - {"t"}}
         row["counted"] = np.array(plain + zones, dtype=np.int64)
-        for name, cells in (
-            ("taxels", measurer.cells),
-            ("kernel_cells", measurer.kernel_cells),
-        ):
-            if cells is not None:
-                row[name] = cells.read(frame)
+        if measurer.cells is not None:
+            row["taxels"] = measurer.cells.read(frame)
+        if measurer.kernel_cells is not None:
+            row["kernel_cells"] = measurer.kernel_cells.read(frame)
         if measurer.joints:
             row["joints"] = self._joints_of(frame)
         self._rows.append(row)
         self.age_s = age_s
+
+    def _forget_last(self) -> None:
+        """Drop the last frame: of two readings of one instant the later one counts."""
+        self._rows.pop()
+        for name in tuple(self._starts):
+            if not any(math.isfinite(row[name]) for row in self._rows):
+                del self._starts[name]
+
+    def _motions(
+        self, frame: Frame, region: Region | None, zones: list[int]
+    ) -> dict[str, float]:
+        """The distances that the centroids have travelled, without contact the last."""
+        measurer = self._measurer
+        motions = {"motion": 0.0}
+        if measurer.force_motion:
+            motions["force_motion"] = 0.0
+        if region is None:
+            if self._rows:
+                return {name: self._rows[-1][name] for name in motions}
+            return motions
+        if measurer.motion:
+            motions["motion"] = self._distance("motion", region.centroid, frame.joints)
+        if measurer.force_motion:
+            # The contact's zone comes first.
+            _, _, force, rows, cols, *_ = zones
+            centroid = rows / force, cols / force % self.layout.cols
+            motions["force_motion"] = self._distance(
+                "force_motion", centroid, frame.joints
+            )
+        return motions
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
         if frame.joints is None:
@@ -205,8 +227,7 @@ class Contact:
         centroid: tuple[float, float],
         joints: NDArray[np.float64] | None,
     ) -> float:
-        """Distance from where this centroid was first seen; NaN where the pose is not
-        known."""
+        """Distance from where this centroid was first seen; NaN without a pose."""
         position = self._located(centroid, joints)
         if position is None:
             self.missing_pose = True
@@ -216,8 +237,7 @@ class Contact:
     def _located(
         self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
     ) -> Vector | None:
-        """Where a point of the skin lies; None where an arm's joint angles are not
-        known."""
+        """Where a point of the skin lies; None if an arm's angles are not known."""
         point = self.layout.position(*centroid)
         if self.chain is None:
             return point

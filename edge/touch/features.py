@@ -1,19 +1,23 @@
 """A contact's series to the vector that is classified (paper, section III-B)."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError, OutOfRange
-from edge.touch import kernels, measures
-from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
-from edge.touch.kernels import KernelTable
+from edge.touch import measures
+from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import KERNEL_CELLS, KERNELS, ZONE_WIDTH, ZONES, Cells, Feature
+from edge.touch.measures import KERNELS, Cells, Feature, not_measured
+
+if TYPE_CHECKING:
+    from edge.touch.kernels import KernelTable
 
 FEATURES = measures.PAPER
 SAMPLES = 40
@@ -124,6 +128,43 @@ def feature_vector(
         )
 
 
+def _transformed(
+    values: NDArray[np.float64],
+    transform: str,
+    floors: NDArray[np.float64],
+    wide: bool,
+) -> NDArray[np.float64]:
+    """A transform of samples (rows, times); `wide` rows are those of one feature."""
+    if transform == "log":
+        above = values + floors
+        return np.asarray(np.log(np.where(above > 0.0, above, 1.0)))
+    if transform == "sqrt":
+        return np.asarray(np.copysign(np.sqrt(np.abs(values)), values))
+    # The cells or joints of one feature share one largest value.
+    largest = np.abs(values).max(axis=None if wide else 1, keepdims=True)
+    shares = np.zeros_like(values)
+    return np.asarray(np.divide(values, largest, out=shares, where=largest > 0.0))
+
+
+def _summarised(
+    values: NDArray[np.float64], summary: str, step_s: float
+) -> NDArray[Any]:
+    """A summary of samples (rows, times) that are `step_s` apart."""
+    if summary == "rate":
+        return np.asarray(np.gradient(values, step_s, axis=1))
+    if summary == "mean":
+        return np.asarray(values.mean(axis=1))
+    if summary == "deviation":
+        # Powers of two change no digit, and keep the squares within the range of
+        # floats.
+        power = np.frexp(np.abs(values).max(axis=1, keepdims=True))[1]
+        deviation = np.ldexp(values, -power).std(axis=1)
+        return np.asarray(np.ldexp(deviation, power[:, 0]))
+    if summary == "roughness":
+        return np.asarray(np.abs(np.diff(values, axis=1)).mean(axis=1))
+    return values
+
+
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
     """Features of equal kind are the rows of one array; each wide feature is its own
     kind."""
@@ -150,41 +191,23 @@ class _Course:
         """Values of features of one kind, one after another."""
         first = group[0]
         if first.name in KERNELS:
-            channels = kernel_channels(self._series, self._window_s, first.name)
-            if first.name not in self._tables:
-                raise InputError(f"{first.name} needs a table that training made")
-            return kernels.shares(channels, self._tables[first.name])
+            return self._kernel_shares(first.name)
         samples = first.samples or samples
         step = self._window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
         floors = np.array([[self._floor(feature)] for feature in group])
         for transform in first.transforms:
-            if transform == "log":
-                above = values + floors
-                values = np.log(np.where(above > 0.0, above, 1.0))
-            elif transform == "sqrt":
-                values = np.copysign(np.sqrt(np.abs(values)), values)
-            else:
-                # The cells or joints of one feature share one largest value.
-                largest = np.abs(values).max(
-                    axis=None if first.wide else 1, keepdims=True
-                )
-                values = np.divide(
-                    values, largest, out=np.zeros_like(values), where=largest > 0.0
-                )
+            values = _transformed(values, transform, floors, first.wide)
             floors = np.ones_like(floors)
-        if first.summary == "rate":
-            values = np.gradient(values, step, axis=1)
-        elif first.summary == "mean":
-            values = values.mean(axis=1)
-        elif first.summary == "deviation":
-            # Powers of two change no digit, and keep the squares within the range of
-            # floats.
-            power = np.frexp(np.abs(values).max(axis=1, keepdims=True))[1]
-            values = np.ldexp(np.ldexp(values, -power).std(axis=1), power[:, 0])
-        elif first.summary == "roughness":
-            values = np.abs(np.diff(values, axis=1)).mean(axis=1)
-        return values.reshape(-1)
+        return _summarised(values, first.summary, step).reshape(-1)
+
+    def _kernel_shares(self, name: str) -> NDArray[np.float64]:
+        from edge.touch import kernels  # few models have convolution features
+
+        channels = kernels.kernel_channels(self._series, self._window_s, name)
+        if name not in self._tables:
+            raise InputError(f"{name} needs a table that training made")
+        return kernels.shares(channels, self._tables[name])
 
     def _sampled(
         self, group: tuple[Feature, ...], times: NDArray[np.float64]
@@ -195,7 +218,7 @@ class _Course:
         if first.wide:
             wide = self._series.joints if first.of_joints else self._series.taxels
             if wide is None:
-                raise _not_measured(first)
+                raise not_measured(first)
             values: NDArray[Any] = wide.T
         else:
             values = np.array([self._measured(f) for f in group], dtype=np.float64)
@@ -240,51 +263,8 @@ class _Course:
             force = zone["force"] + self._force_floor
             values = force / (series.force_motion + self._length_floor)
         if values is None:
-            raise _not_measured(feature)
+            raise not_measured(feature)
         return values
-
-
-def kernel_channels(
-    series: FeatureSeries, window_s: float, name: str
-) -> NDArray[np.int64]:
-    """(channels, `edge.touch.kernels.SAMPLES`) numbers to which a feature's kernels are
-    applied.
-
-    The last value before each time is held, and nothing is interpolated, so all are
-    whole numbers.
-
-    Args:
-        series: the contact, as `FeatureSeries.felt` gives it.
-        window_s: seconds from onset.
-        name: of the feature.
-
-    Raises:
-        InputError: the feature was not measured.
-    """
-    rows: NDArray[np.int64] | None = series.kernel_cells
-    if name == "zone_kernels":
-        measured = len(series.zones) == len(ZONES)
-        rows = np.column_stack(list(series.zones.values())) if measured else None
-    if rows is None:
-        raise _not_measured(measures.feature(name))
-    times = (
-        np.arange(kernels.SAMPLES) * (window_s / (kernels.SAMPLES - 1))
-        + CLOCK_ROUNDING_S
-    )
-    return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)
-
-
-def channels_of(name: str, layout: SkinLayout) -> int:
-    """How many channels the kernels of a feature are applied to."""
-    if name == "zone_kernels":
-        return ZONE_WIDTH * len(ZONES)
-    return Cells(layout, KERNEL_CELLS).count
-
-
-def _not_measured(feature: Feature) -> InputError:
-    return InputError(
-        f"{feature.name} was not measured; name it where contacts are followed"
-    )
 
 
 def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:

@@ -21,6 +21,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from edge.config import ConfigTable
+from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import (
+    KERNEL_CELLS,
+    ZONE_WIDTH,
+    ZONES,
+    Cells,
+    feature,
+    not_measured,
+)
 
 SAMPLES = 40
 """Times of the window at which a channel is taken."""
@@ -150,3 +160,38 @@ def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float6
     above = results > np.array([table.biases], np.int32).T
     counts = np.count_nonzero(above & inside, axis=1)
     return np.asarray(counts / np.count_nonzero(inside, axis=1))
+
+
+def kernel_channels(
+    series: FeatureSeries, window_s: float, name: str
+) -> NDArray[np.int64]:
+    """(channels, `edge.touch.SAMPLES`) numbers to which a feature's kernels are
+    applied.
+
+    The last value before each time is held, and nothing is interpolated, so all are
+    whole numbers.
+
+    Args:
+        series: the contact, as `FeatureSeries.felt` gives it.
+        window_s: seconds from onset.
+        name: of the feature.
+
+    Raises:
+        InputError: the feature was not measured.
+    """
+    rows: NDArray[np.int64] | None = series.kernel_cells
+    if name == "zone_kernels":
+        measured = len(series.zones) == len(ZONES)
+        rows = np.column_stack(list(series.zones.values())) if measured else None
+    if rows is None:
+        raise not_measured(feature(name))
+    step_s = window_s / (SAMPLES - 1)
+    times = np.arange(SAMPLES) * step_s + CLOCK_ROUNDING_S
+    return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)
+
+
+def channels_of(name: str, layout: SkinLayout) -> int:
+    """Number of channels to which the kernels of a feature are applied."""
+    if name == "zone_kernels":
+        return ZONE_WIDTH * len(ZONES)
+    return Cells(layout, KERNEL_CELLS).count

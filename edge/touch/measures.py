@@ -146,18 +146,11 @@ def feature(name: str) -> Feature:
         InputError: there is no such feature; the sentence offers the nearest names.
     """
     match = _NAME.fullmatch(name)
-    prefix, base, summary, times = match.groups("") if match else ("", name, "", "")
+    if match is None:
+        raise _no_feature(name, name)
+    prefix, base, summary, times = match.groups("")
     transforms = tuple(reversed(prefix.split("_")[:-1]))
-    zone, _, quantity = base.partition("_")
-    if base in ALONE:
-        zone, quantity = ALONE[base]
-    elif zone not in ZONES or quantity not in QUANTITIES or base == "contact_max_force":
-        import difflib  # a slow board starts sooner without it
-
-        nearest = difflib.get_close_matches(base, names(), 3) or names()[:3]
-        raise InputError(
-            f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"
-        )
+    zone, quantity = _zone_and_quantity(name, base)
     if len(set(transforms)) < len(transforms):
         raise InputError(
             f"the feature {name!r} applies one transform twice; once is enough"
@@ -178,6 +171,25 @@ def feature(name: str) -> Feature:
     return Feature(name, zone, quantity, transforms, summary, int(times or 0))
 
 
+def _zone_and_quantity(name: str, base: str) -> tuple[str, str]:
+    """The zone and the quantity of a feature without transforms and summary."""
+    if base in ALONE:
+        return ALONE[base]
+    zone, _, quantity = base.partition("_")
+    if zone not in ZONES or quantity not in QUANTITIES or base == "contact_max_force":
+        raise _no_feature(name, base)
+    return zone, quantity
+
+
+def _no_feature(name: str, base: str) -> InputError:
+    import difflib  # a slow board starts sooner without it
+
+    nearest = difflib.get_close_matches(base, names(), 3) or names()[:3]
+    return InputError(
+        f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"
+    )
+
+
 def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
     """The feature types of several names.
 
@@ -190,6 +202,13 @@ def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
     if twice:
         raise InputError(f"the feature {min(twice)} is named twice; leave one out")
     return tuple(feature(name) for name in wanted)
+
+
+def not_measured(feature: Feature) -> InputError:
+    """The error for a feature that the contact's series lacks."""
+    return InputError(
+        f"{feature.name} was not measured; name it where contacts are followed"
+    )
 
 
 class Cells:

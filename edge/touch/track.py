@@ -1,10 +1,12 @@
 """Contacts over time: when each begins, which region it is, and when it ends."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from edge.errors import InputError
-from edge.touch.arm import Chain
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
@@ -16,6 +18,9 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import PAPER, Measurer
 from edge.touch.region import ActiveTaxels, Region
+
+if TYPE_CHECKING:
+    from edge.touch.arm import Chain
 
 MAX_CONTACTS = 8
 """Contacts followed at once where every region counts. The limit keeps a flickering
@@ -81,10 +86,12 @@ class ContactTracker:
         """
         if max_contacts < 1:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
-        self.layout, self.horizon_s = layout, horizon_s
+        self.layout = layout
+        self.horizon_s = horizon_s
         self.region: Region | None = None
         self._debounce = debounce
-        self._chain, self._motion_on_skin = chain, motion_on_skin
+        self._chain = chain
+        self._motion_on_skin = motion_on_skin
         self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
         self._contacts: list[Contact] = []
@@ -108,31 +115,45 @@ class ContactTracker:
             valid=frame.valid,
             wraps=self.layout.wraps,
         )
-        contacts = list(self._contacts)
-        if self._max_contacts > 1:
-            regions = active.regions
-            shares = _shared(contacts, regions)
-        else:
-            largest = active.largest(contacts[0].region if contacts else None)
-            regions = [] if largest is None else [largest]
-            shares = dict.fromkeys(range(len(contacts)), 0) if regions else {}
+        regions = self._regions(active)
         self.region = regions[0] if regions else None
-        of_contacts = [
-            regions[shares[i]] if i in shares else None for i in range(len(contacts))
-        ]
-        for j, region in enumerate(regions):
-            begins = j not in shares.values() and region.peak > self.layout.onset
-            if begins and len(contacts) < self._max_contacts:
-                on_skin = self._motion_on_skin and frame.joints is None
-                chain = None if on_skin else self._chain
-                contacts.append(
-                    Contact(region_time(frame, region), region, self._measurer, chain)
-                )
-                of_contacts.append(region)
-        for contact, of_contact in zip(contacts, of_contacts, strict=True):
-            self._follow(contact, frame, active, of_contact)
+        shares = self._shares(regions)
+        for number, contact in enumerate(self._contacts):
+            share = shares.get(number)
+            region = None if share is None else regions[share]
+            self._follow(contact, frame, active, region)
+        contacts = list(self._contacts)
+        for number, region in enumerate(regions):
+            if number not in shares.values() and self._may_begin(region, contacts):
+                contact = self._begin(frame, region)
+                contacts.append(contact)
+                self._follow(contact, frame, active, region)
         self._contacts = [contact for contact in contacts if not contact.ended]
         return [contact for contact in contacts if contact.frames >= self._debounce]
+
+    def _regions(self, active: ActiveTaxels) -> list[Region]:
+        """The regions to follow, the largest first."""
+        if self._max_contacts > 1:
+            return active.regions
+        former = self._contacts[0].region if self._contacts else None
+        largest = active.largest(former)
+        return [] if largest is None else [largest]
+
+    def _shares(self, regions: list[Region]) -> dict[int, int]:
+        """{contact: the region that continues it}, as indices."""
+        if self._max_contacts > 1:
+            return _shared(self._contacts, regions)
+        # The one contact is the largest region, wherever it lies.
+        return dict.fromkeys(range(len(self._contacts)), 0) if regions else {}
+
+    def _may_begin(self, region: Region, contacts: Sequence[Contact]) -> bool:
+        room = len(contacts) < self._max_contacts
+        return room and region.peak > self.layout.onset
+
+    def _begin(self, frame: Frame, region: Region) -> Contact:
+        on_skin = self._motion_on_skin and frame.joints is None
+        chain = None if on_skin else self._chain
+        return Contact(region_time(frame, region), region, self._measurer, chain)
 
     def _follow(
         self,
@@ -175,8 +196,7 @@ class ContactTracker:
 
 
 def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
-    """{contact: region} by the most taxels in common, then the older, then the larger
-    region."""
+    """{contact: region} by most taxels in common, then the older, then the larger."""
     pairs = []
     for i, contact in enumerate(contacts):
         for j, region in enumerate(regions):

@@ -171,7 +171,7 @@ REFUSED = {
         lambda m: m["tasks"]["object"].update(
             factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
         )
-    ): "the factors of a task are impossible",
+    ): "task 'object' is not the product of its factors",
 }
 
 

@@ -8,6 +8,7 @@ import pytest
 from edge.errors import InputError
 from edge.model import onnx_file
 from edge.model.model import Model
+from edge.tools.rewriting import rewritten
 from edge.tools.teaching import (
     joined,
     label_tables,
@@ -96,12 +97,12 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
 ):
     data = (exported / "model.onnx").read_bytes()
     contents = onnx_file.read(data, "model")
-    assert onnx_file.rewritten(data, {}, {}) == data
+    assert rewritten(data, {}, {}) == data
     same = {
         name: contents.constant(name)
         for name in ("columns of category", "columns of object")
     }
-    again = onnx_file.rewritten(data, same, {})
+    again = rewritten(data, same, {})
     (tmp_path / "model.onnx").write_bytes(again)
     assert len(again) == len(data)
     vectors = np.random.default_rng(0).normal(size=(5, model.info.width))

@@ -9,8 +9,15 @@ import pytest
 from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch import kernels
-from edge.touch.features import channels_of, feature_vector, kernel_channels
-from edge.touch.kernels import SAMPLES, KernelTable, convolution_of_bias, shares
+from edge.touch.features import feature_vector
+from edge.touch.kernels import (
+    SAMPLES,
+    KernelTable,
+    channels_of,
+    convolution_of_bias,
+    kernel_channels,
+    shares,
+)
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import feature
 from tests.edge.touch.pressed import followed, pressed
