@@ -56,7 +56,7 @@ def test_training_and_the_board_compute_the_same_bits(recordings, exported):
         seen = []
         for frame in recording:
             classifier.push(frame)
-            seen += [w.contact for w in classifier._waiting if w.contact not in seen]
+            seen += [w.contact for w in classifier._pending if w.contact not in seen]
         vector = feature_vector(seen[0].series(), 1.2)
         assert vector.tobytes() == expected.tobytes()
 
