@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from edge.touch.region import find_regions as find_regions
     from edge.touch.region import largest_region as largest_region
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "edge.classifier": ["Classifier"],
