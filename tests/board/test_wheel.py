@@ -3,6 +3,7 @@
 `make wheel-test` builds it and runs this.
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -23,24 +24,15 @@ def contents(wheel):
         return {name: archive.read(name) for name in archive.namelist()}
 
 
-@pytest.fixture(scope="session")
-def command(wheel, tmp_path_factory):
-    """Runs `edge-classify ...` from a fresh environment, in an empty folder."""
-    folder = tmp_path_factory.mktemp("elsewhere")
+def environment_of(folder, *packages):
+    """A function that runs `edge-classify ...` from a fresh environment in a folder."""
     programs = folder / "env" / "bin"
     subprocess.run(
         [sys.executable, "-m", "venv", "--without-pip", programs.parent], check=True
     )
-    pip = [
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        programs / "python",
-        "install",
-        "--quiet",
-    ]
-    subprocess.run([*pip, "-c", CHECKOUT / "constraints.txt", wheel], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", programs / "python", "install"]
+    pins = ["--quiet", "-c", CHECKOUT / "constraints.txt"]
+    subprocess.run([*pip, *pins, *packages], check=True)
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
 
     def run(*arguments, program="edge-classify"):
@@ -49,6 +41,19 @@ def command(wheel, tmp_path_factory):
         return subprocess.run(command, cwd=folder, env=environment, **caught)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def command(wheel, tmp_path_factory):
+    """Runs `edge-classify ...` with all that the wheel asks for."""
+    return environment_of(tmp_path_factory.mktemp("elsewhere"), wheel)
+
+
+@pytest.fixture(scope="session")
+def bare_command(wheel, tmp_path_factory):
+    """Runs `edge-classify ...` with numpy and smbus2 alone."""
+    folder = tmp_path_factory.mktemp("bare")
+    return environment_of(folder, "--no-deps", wheel, "numpy", "smbus2")
 
 
 def test_it_is_small(wheel):
@@ -89,3 +94,27 @@ def test_a_command_without_hardware_says_so_in_one_sentence(command):
     done = command("run", "--model", "model.onnx", "--skin", "skin.toml")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert done.stderr.startswith("edge-classify: ")
+
+
+def test_numpy_runs_the_models_where_onnxruntime_is_missing(bare_command, exported):
+    assert bare_command("-c", "import onnxruntime", program="python").returncode != 0
+    done = bare_command("demo")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("numpy runs the model, with the same bits") == 1
+    files = ("--model", exported / "model.onnx", "--golden", exported / "golden.npz")
+    done = bare_command("verify", *files)
+    assert done.returncode == 0, done.stderr
+    passed = [json.loads(line)["passed"] for line in done.stdout.splitlines()]
+    assert passed
+    assert all(passed)
+
+
+def test_both_engines_print_the_same_decisions(bare_command, command):
+    def decisions(run):
+        done = run("demo", "--json")
+        lines = map(json.loads, done.stdout.splitlines())
+        return [{**line, "latency_ms": 0} for line in lines]
+
+    expected = decisions(command)
+    assert expected
+    assert decisions(bare_command) == expected

@@ -1,0 +1,77 @@
+"""The core: the modules that `edge-classify run` loads for Cody's skin on I2C.
+
+`python -m tests.reading_list` prints them with their lines of code, in the order in
+which a frame passes their rooms.
+"""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+from edge import demo
+from edge.skin import file as skinfile
+
+ROOT = Path(__file__).parents[1]
+ROOMS = "edge commands bus chips skin touch model output tools fake".split()
+"""In the order of the list; modules of `edge` itself come first."""
+PROGRAM = """
+import sys
+from edge import cli
+try:
+    cli.main(sys.argv[1:])
+finally:
+    for name, module in sorted(sys.modules.items()):
+        if name.split(".")[0] == "edge" and getattr(module, "__file__", None):
+            print("module", module.__file__)
+"""
+
+
+def loaded(*arguments: str, environment: dict[str, str] | None = None) -> list[Path]:
+    """Paths, below the checkout, of the modules of edge that a command loads."""
+    command = [sys.executable, "-c", PROGRAM, *arguments]
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    paths = []
+    for line in done.stdout.splitlines():
+        if line.startswith("module "):
+            path = Path(line.removeprefix("module ")).relative_to(ROOT)
+            if path.name != "__init__.py":
+                paths.append(path)
+    return sorted(paths, key=lambda path: (_room(path), path.name))
+
+
+def _room(path: Path) -> int:
+    return ROOMS.index(path.parent.name)
+
+
+def lines_of_code(path: Path) -> int:
+    """Lines of a module without blank lines, comments and docstrings."""
+    text = (ROOT / path).read_text()
+    tree = ast.parse(text)
+    docstrings: set[int] = set()
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        for child in body if isinstance(body, list) else []:
+            if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant):
+                docstrings.update(range(child.lineno, (child.end_lineno or 0) + 1))
+    count = 0
+    for number, line in enumerate(text.splitlines(), 1):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("#") and number not in docstrings:
+            count += 1
+    return count
+
+
+def main() -> None:
+    """Print the list; the skin's buses need not be there."""
+    skin = str(skinfile.shipped("cody"))
+    paths = loaded("run", "--model", str(demo.MODEL), "--skin", skin)
+    for path in paths:
+        print(f"{lines_of_code(path):5}  {path}")
+    print(f"{sum(map(lines_of_code, paths)):5}  lines in {len(paths)} modules")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""The core: what a real run on Cody's skin loads, and what it leaves out."""
+
+import pytest
+
+from edge import demo
+from edge.skin import file as skinfile
+from tests import reading_list
+from tests.conftest import ROOT
+from tests.edge.bus.shim import build as shim
+
+OPTIONAL = (
+    "edge/bus/serial_bus.py",
+    "edge/chips/block.py",
+    "edge/chips/mpr121.py",
+    "edge/early.py",
+    "edge/model/agreement.py",
+    "edge/model/graph.py",
+    "edge/model/stopping.py",
+    "edge/output/touch_map.py",
+    "edge/recording.py",
+    "edge/touch/joint_stream.py",
+    "edge/touch/kernels.py",
+    "edge/touch/urdf.py",
+)
+"""Modules that neither this skin, nor the demo's model, nor an option calls for."""
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory):
+    """Paths of the modules that a run loads over a stand-in for /dev/i2c-N."""
+    if shim.compiler() is None:
+        pytest.skip("needs Linux and a C compiler to stand in for /dev/i2c-N")
+    folder = tmp_path_factory.mktemp("core")
+    skin = folder / "skin.toml"
+    text = skinfile.shipped("cody").read_text()
+    rest = "[" + ", ".join(["20946"] * 24) + "],\n"
+    noise = "[" + ", ".join(["0.7"] * 24) + "],\n"
+    calibration = f"baseline = [\n{rest * 16}]\nnoise = [\n{noise * 16}]\n"
+    skin.write_text(f"{text}\n[calibration]\n{calibration}")
+    arguments = ["run", "--model", str(demo.MODEL), "--skin", str(skin)]
+    arguments += ["--seconds", "0.3", "--without-joints", "skin"]
+    environment = shim.environment(shim.build(folder))
+    return [
+        path.as_posix()
+        for path in reading_list.loaded(*arguments, environment=environment)
+    ]
+
+
+def test_a_run_reads_the_skin_and_decides_with_a_model(core):
+    needed = ("edge/bus/linux.py", "edge/chips/ad7147.py", "edge/model/engines.py")
+    assert set(needed) <= set(core)
+
+
+def test_the_core_loads_neither_tools_nor_fakes(core):
+    assert core
+    beside = [path for path in core if path.startswith(("edge/fake/", "edge/tools/"))]
+    assert beside == []
+
+
+@pytest.mark.parametrize("path", OPTIONAL)
+def test_what_nothing_calls_for_is_not_loaded(core, path):
+    assert (ROOT / path).exists()
+    assert path not in core
+
+
+def test_the_list_has_the_lines_of_each_module(capsys):
+    reading_list.main()
+    lines = capsys.readouterr().out.splitlines()
+    assert "edge/skin/bus_reader.py" in " ".join(lines)
+    count, words = lines[-1].split(maxsplit=1)
+    assert int(count) == sum(int(line.split()[0]) for line in lines[:-1])
+    assert words == f"lines in {len(lines) - 1} modules"
