@@ -36,7 +36,7 @@ class Machine:
             Path(numpy.__file__).parents[1],
         )
         variables = {"BASE": sys.base_prefix, "PYTHON": python, "PACKAGES": packages}
-        variables |= {"CHECKOUT": HERE.parent, "FOLDER": folder, "SYSTEMD": SYSTEMD}
+        variables |= {"CHECKOUT": HERE.parents[1], "FOLDER": folder, "SYSTEMD": SYSTEMD}
         command = ["env", *(f"{name}={value}" for name, value in variables.items())]
         command += (
             "unshare --pid --fork --mount --mount-proc --uts --kill-child".split()

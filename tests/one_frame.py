@@ -1,0 +1,147 @@
+"""The way of one frame: the functions that a frame passes from the wire to a decision.
+
+`python -m tests.one_frame > docs/one-frame.md` renews the page from a trace.
+"""
+
+import ast
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any
+
+from edge import demo
+from edge.classifier import Classifier
+from edge.events import Decided
+from edge.fake.player import play, skin_file
+from edge.model.model import Model
+from edge.recording import load
+from edge.skin.loop import Loop
+from edge.touch.frame import Frame
+
+ROOT = Path(__file__).parents[1]
+EDGE = str(ROOT / "edge")
+HEAD = """# The way of one frame
+
+The functions that a frame passes from the wire to a decision, file by file, in the order
+in which they are first called. The page is made from a trace of a touch on Cody's skin,
+at the frame that decides (`python -m tests.one_frame`), and a test compares it with the
+code. The models of the chips on the fake bus are left out; on a robot `edge/bus/linux.py`
+stands in their place. A frame in contact that decides nothing ends before the last {last}
+files.
+"""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A function that a frame passes.
+
+    Attributes:
+        path: of its file, below the checkout.
+        name: with its class.
+    """
+
+    path: str
+    name: str
+
+
+def _step(code: CodeType) -> Step | None:
+    """The function of a code object, if it belongs to the program and has a name."""
+    inside = code.co_filename.startswith(EDGE)
+    if not inside or "/fake/" in code.co_filename or "<" in code.co_qualname:
+        return None
+    path = Path(code.co_filename).relative_to(ROOT).as_posix()
+    return Step(path, code.co_qualname)
+
+
+def traced(work: Callable[[], Any]) -> tuple[Any, list[Step]]:
+    """What a call returns, and the functions that it passes, in order of first call."""
+    steps: dict[Step, None] = {}
+
+    def note(frame: FrameType, event: str, _: Any) -> None:
+        step = _step(frame.f_code) if event == "call" else None
+        if step is not None:
+            steps.setdefault(step)
+
+    threading.setprofile_all_threads(note) if sys.version_info >= (3, 12) else None
+    sys.setprofile(note)
+    try:
+        result = work()
+    finally:
+        sys.setprofile(None)
+    return result, list(steps)
+
+
+def ways() -> dict[str, list[Step]]:
+    """The way of a frame in contact, and of the one that decides."""
+    recording = load(demo.FOLDER / "cardboard-box-movable.npz")
+    skin, playback = play(skin_file(recording.layout), recording)
+    # The buses are read in this thread, one after another, so that a trace sees it.
+    skin._threads.map = map  # type: ignore[method-assign, assignment]
+    classifier = Classifier(Model(demo.MODEL), skin.layout)
+    found: dict[str, list[Step]] = {}
+    with skin:
+        frames = Loop(skin, joints=playback, lasts_s=playback.ends).frames()
+
+        def step() -> list[Any] | None:
+            frame: Frame | None = next(frames, None)
+            return None if frame is None else classifier.push(frame)
+
+        while "decision" not in found:
+            in_contact = bool(classifier._pending)
+            events, steps = traced(step)
+            if events is None:
+                raise RuntimeError("the recording is over before a decision")
+            if any(isinstance(event, Decided) for event in events):
+                found["decision"] = steps
+            elif in_contact:
+                found["contact"] = steps
+        frames.close()
+    return found
+
+
+@cache
+def _docstrings(path: str) -> dict[str, str]:
+    """{function with its class: the first line of its docstring}."""
+    lines: dict[str, str] = {}
+
+    def visit(node: ast.AST, prefix: str) -> None:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.ClassDef | ast.FunctionDef):
+                name = f"{prefix}{child.name}"
+                lines[name] = (ast.get_docstring(child) or "").partition("\n")[0]
+                visit(child, f"{name}.")
+
+    visit(ast.parse((ROOT / path).read_text()), "")
+    return lines
+
+
+def files(steps: list[Step]) -> list[str]:
+    """The files that a frame visits, in order."""
+    return list(dict.fromkeys(step.path for step in steps))
+
+
+def page() -> str:
+    """The page as Markdown."""
+    found = ways()
+    decision = found["decision"]
+    contact = set(files(found["contact"]))
+    visited = files(decision)
+    lines = [HEAD.format(last=len([f for f in visited if f not in contact]))]
+    lines.append(f"A deciding frame visits {len(visited)} files, a contact frame")
+    lines.append(f"{len(contact)}.\n")
+    for path in visited:
+        lines.append(f"**`{path}`**\n")
+        for step in decision:
+            if step.path == path:
+                text = _docstrings(path).get(step.name, "")
+                lines.append(f"- `{step.name}`" + (f": {text}" if text else ""))
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())
