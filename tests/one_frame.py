@@ -5,7 +5,6 @@
 
 import ast
 import sys
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -27,11 +26,12 @@ EDGE = str(ROOT / "edge")
 HEAD = """# The way of one frame
 
 The functions that a frame passes from the wire to a decision, file by file, in the order
-in which they are first called. The page is made from a trace of a touch on Cody's skin,
-at the frame that decides (`python -m tests.one_frame`), and a test compares it with the
-code. The models of the chips on the fake bus are left out; on a robot `edge/bus/linux.py`
-stands in their place. A frame in contact that decides nothing ends before the last {last}
-files.
+in which they are first called; those without a docstring are details of their neighbours.
+The page is made from a trace of a touch on Cody's skin, at the frame that decides
+(`python -m tests.one_frame`), and a test compares it with the code. The models of the
+chips on the fake bus are left out; on a robot `edge/bus/linux.py` stands in their place.
+A deciding frame visits {files} files. A frame in contact that decides nothing visits
+{contact}: it asks neither for features nor for a decision.
 """
 
 
@@ -66,7 +66,6 @@ def traced(work: Callable[[], Any]) -> tuple[Any, list[Step]]:
         if step is not None:
             steps.setdefault(step)
 
-    threading.setprofile_all_threads(note) if sys.version_info >= (3, 12) else None
     sys.setprofile(note)
     try:
         result = work()
@@ -82,7 +81,7 @@ def ways() -> dict[str, list[Step]]:
     # The buses are read in this thread, one after another, so that a trace sees it.
     skin._threads.map = map  # type: ignore[method-assign, assignment]
     classifier = Classifier(Model(demo.MODEL), skin.layout)
-    found: dict[str, list[Step]] = {}
+    traces: dict[str, list[Step]] = {}
     with skin:
         frames = Loop(skin, joints=playback, lasts_s=playback.ends).frames()
 
@@ -90,17 +89,17 @@ def ways() -> dict[str, list[Step]]:
             frame: Frame | None = next(frames, None)
             return None if frame is None else classifier.push(frame)
 
-        while "decision" not in found:
+        while "decision" not in traces:
             in_contact = bool(classifier._pending)
             events, steps = traced(step)
             if events is None:
                 raise RuntimeError("the recording is over before a decision")
             if any(isinstance(event, Decided) for event in events):
-                found["decision"] = steps
+                traces["decision"] = steps
             elif in_contact:
-                found["contact"] = steps
+                traces["contact"] = steps
         frames.close()
-    return found
+    return traces
 
 
 @cache
@@ -126,19 +125,18 @@ def files(steps: list[Step]) -> list[str]:
 
 def page() -> str:
     """The page as Markdown."""
-    found = ways()
-    decision = found["decision"]
-    contact = set(files(found["contact"]))
+    traces = ways()
+    decision = traces["decision"]
+    contact = files(traces["contact"])
     visited = files(decision)
-    lines = [HEAD.format(last=len([f for f in visited if f not in contact]))]
-    lines.append(f"A deciding frame visits {len(visited)} files, a contact frame")
-    lines.append(f"{len(contact)}.\n")
+    lines = [HEAD.format(files=len(visited), contact=len(contact))]
     for path in visited:
         lines.append(f"**`{path}`**\n")
         for step in decision:
-            if step.path == path:
-                text = _docstrings(path).get(step.name, "")
-                lines.append(f"- `{step.name}`" + (f": {text}" if text else ""))
+            text = _docstrings(path).get(step.name, "") if step.path == path else ""
+            # What has no docstring is a detail of what stands before it.
+            if text:
+                lines.append(f"- `{step.name}`: {text}")
         lines.append("")
     return "\n".join(lines).rstrip() + "\n"
 

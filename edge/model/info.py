@@ -128,8 +128,7 @@ class ModelInfo:
 
     @property
     def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
-        """{task: its factors} of the tasks that are decided together with two
-        others."""
+        """{task: its factors} of tasks that are decided together with two others."""
         return {name: task.factors for name, task in self.tasks.items() if task.factors}
 
     @property

@@ -156,8 +156,7 @@ class Model:
 
     @property
     def decision_points_s(self) -> tuple[float, ...]:
-        """Windows for which the model can decide; without calibration, only the full
-        one."""
+        """Windows for which the model can decide; uncalibrated, only the full one."""
         return self.info.decision_points_s or (self.info.window_s,)
 
     def run(

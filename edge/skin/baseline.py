@@ -59,8 +59,7 @@ class Baseline:
         return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
     def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
-        """Counts above the baseline (n,), 0 to 65535, with sign and dead band
-        applied."""
+        """Counts above the baseline (n,), 0 to 65535, by sign and dead band."""
         counts = (raw.astype(np.int32) - self.counts) * self._sign
         counts *= counts >= self._dead
         return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)

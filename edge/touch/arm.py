@@ -120,8 +120,7 @@ class Chain:
         return pose
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
-        """A point of the tip in the base's frame: `pose(q)` times the point, as plain
-        floats.
+        """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
 
         It is much faster than computing the pose.
 
@@ -141,8 +140,7 @@ class Chain:
     def _carried(
         self, angles: Any, position: Any, sin: Callable[[Any], Any]
     ) -> tuple[Any, ...]:
-        """(x, y, z) in the base's frame of homogeneous coordinates (4,) in the tip's
-        frame.
+        """(x, y, z) in the base's frame of coordinates (4,) in the tip's frame.
 
         Angles and coordinates are numbers, or arrays of equal shape.
         """

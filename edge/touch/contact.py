@@ -66,8 +66,7 @@ class FeatureSeries:
     joints: NDArray[np.float64] | None = None
 
     def felt(self, window_s: float) -> Self:
-        """The frames in which the contact is felt, up to the first one at the window's
-        end.
+        """The frames in which the contact is felt, up to the end of the window.
 
         A board decides with that frame, so later ones must not count. Frames in which
         the contact has lifted off are left out, as it may go on. But once it has been
@@ -277,8 +276,7 @@ def released(touched_s: float, now_s: float, release_s: float) -> bool:
 
 
 def region_time(frame: Frame, region: Region | None) -> float:
-    """When the region was read: the mean over its taxels, as a frame is a rolling
-    shutter.
+    """When the region was read, as a mean over its taxels: a frame is a rolling shutter.
 
     Raises:
         InputError: a taxel of the region has a time that is not finite.

@@ -166,8 +166,7 @@ def _summarised(
 
 
 def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
-    """Features of equal kind are the rows of one array; each wide feature is its own
-    kind."""
+    """The kind of a feature: those of one kind are the rows of one array."""
     name = feature.name if feature.wide else ""
     return name, feature.samples, feature.transforms, feature.summary
 
@@ -212,8 +211,7 @@ class _Course:
     def _sampled(
         self, group: tuple[Feature, ...], times: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(rows, times) features of one value a frame, or the cells or joints of one
-        feature."""
+        """(rows, times) features of one value a frame, or of one wide feature."""
         first, t = group[0], self._series.t
         if first.wide:
             wide = self._series.joints if first.of_joints else self._series.taxels

@@ -96,8 +96,7 @@ class SkinLayout:
 
     @property
     def pitch(self) -> tuple[float, float]:
-        """Distance between taxels along the rows and along the columns; 1 if
-        unknown."""
+        """Distances between taxels along rows and along columns; 1 if unknown."""
         return (
             self.pitch_m
             if isinstance(self.pitch_m, tuple)
@@ -126,8 +125,7 @@ class SkinLayout:
         )
 
     def _angle(self, col: float) -> float:
-        """Angle in radians of a place between columns, which lies on the shorter
-        arc."""
+        """Angle in radians of a place between columns, on the shorter arc."""
         if self.column_angles_deg is None:
             return 2.0 * math.pi * col / self.cols
         column = math.floor(col)

@@ -139,8 +139,7 @@ def best_cut(weights: Sequence[int]) -> int:
 
 
 def _sum_of_planes(planes: Sequence[int], bits: int) -> int:
-    """Sum of a coordinate over `bits`, whose plane n holds the taxels with bit n of it
-    set."""
+    """Sum of a coordinate over `bits`; plane n holds the taxels with its bit n set."""
     return sum((bits & plane).bit_count() << n for n, plane in enumerate(planes))
 
 
@@ -184,8 +183,7 @@ class Region:
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """(row, col) of the mean of the taxels; col is on the circle where the skin
-        wraps."""
+        """(row, col) of the mean of the taxels, on the circle where the skin wraps."""
         rows, cols = self.sums
         return rows / self.area, cols / self.area
 

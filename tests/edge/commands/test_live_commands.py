@@ -2,6 +2,7 @@
 
 import json
 import signal
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +10,7 @@ from edge import recording
 from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
+from edge.skin.loop import Stop
 from tests.conftest import lines, python
 
 
@@ -180,3 +182,19 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
         edge(command, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
     )
     assert handled == [signal.SIG_DFL]
+
+
+@pytest.mark.parametrize(
+    ("virtual", "asked", "waits"),
+    [
+        (False, False, False),
+        (False, True, False),
+        (True, False, True),
+        (True, True, False),
+    ],
+)
+def test_a_slow_reader_never_delays_a_decision_in_real_time(virtual, asked, waits):
+    """In virtual time the loop may wait, until it has been asked to stop."""
+    opened = SimpleNamespace(virtual=virtual)
+    live = source.Reading(opened, None, Stop(asked), None, None)
+    assert live.may_wait() is waits
