@@ -114,11 +114,17 @@ def second_opinion(model: Model, arrays: Mapping[str, NDArray[Any]]) -> Check | 
     rows = len(arrays["vectors"])
     other = answers(Model(model.path, "numpy"), arrays)
     for key, seen in answers(model, arrays).items():
-        answered = arrays[answered_key(key)] >= 0
+        answered = golden_labels(arrays, key) >= 0
         check = compared(key, seen[answered], other[key][answered], 0.0)
         if not check.passed:
             return replace(check, name=f"{name}: {key}", rows=rows)
     return Check(name, rows, 0.0, None)
+
+
+def golden_labels(arrays: Mapping[str, NDArray[Any]], key: str) -> NDArray[np.int64]:
+    """The golden labels that belong to an output; -1 for vectors that are refused."""
+    labels: NDArray[np.int64] = arrays[answered_key(key)]
+    return labels
 
 
 def answered_key(key: str) -> str:
@@ -186,6 +192,10 @@ def _graph(
             )
     for key, seen in answers(model, arrays).items():
         bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
+        refused = golden_labels(arrays, key) < 0
+        if key != answered_key(key):
+            seen = seen.copy()
+            seen[refused] = arrays[key][refused]
         yield key, seen, arrays[key], bound
 
 

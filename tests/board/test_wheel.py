@@ -15,7 +15,7 @@ import pytest
 import edge
 from tests.board.debian import CHECKOUT
 
-LARGEST = 240_000
+LARGEST = 260_000
 
 
 @pytest.fixture(scope="session")
