@@ -1,11 +1,9 @@
-"""Recordings to a fitted model: its settings are chosen, and their accuracy is
-measured."""
+"""Recordings to a fitted model: settings are chosen, and their accuracy measured."""
 
-import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from joblib import cpu_count
@@ -18,7 +16,7 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, candidates
 from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
-from train.dataset import DataSet, load_trials, read
+from train.dataset import DataSet, Recordings, load_trials, read
 from train.evaluate import Labels
 from train.feature_sets import expand
 from train.mix import mix
@@ -36,8 +34,8 @@ MOST_TRIALS = 2000
 LARGEST_BYTES = 950_000
 """Bytes of weights with which a model stays below 1 MB."""
 LEAK = 0.5
-"""The data leak where the first frame recognises more than this share of the trials
-that do not have the most frequent label."""
+"""Warn of a leak if a nearest neighbour on the first frame beats the majority class by
+more than this share of the remainder."""
 FEWEST_TRIALS = 3
 LONG_TOUCHES = 2.0
 """Longer windows are tried where half of the touches last so many windows."""
@@ -72,29 +70,113 @@ class Fitted:
     notes: tuple[str, ...] = ()
 
 
-def fit(
-    data: DataSet | str | Path | Sequence[str | Path],
-    *,
-    features: Sequence[str] | None = None,
-    projection: str | None = None,
-    scaling: str | None = None,
-    components: int | None = None,
-    k: int | None = None,
-    window_s: float | None = None,
-    samples: int = SAMPLES,
-    tasks: Sequence[str] | None = None,
-    leave_out: str = LEAVE_OUT,
-    decision_points_s: Sequence[float] | None = None,
-    threshold: int | None = None,
-    onset: int | None = None,
-    arm: Chain | None = None,
-    quick: bool = False,
-    jobs: int | None = None,
-    progress: bool = False,
-) -> Fitted:
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """What a fit holds fixed, and what it may choose; see `fit`."""
+
+    features: Sequence[str] | None = None
+    projection: str | None = None
+    scaling: str | None = None
+    components: int | None = None
+    k: int | None = None
+    window_s: float | None = None
+    samples: int = SAMPLES
+    tasks: Sequence[str] | None = None
+    leave_out: str = LEAVE_OUT
+    decision_points_s: Sequence[float] | None = None
+    threshold: int | None = None
+    onset: int | None = None
+    arm: Chain | None = None
+    quick: bool = False
+    jobs: int | None = None
+    progress: bool = False
+
+    @property
+    def processes(self) -> int:
+        """Number of processes."""
+        return self.jobs or cpu_count()
+
+    @property
+    def fixed_window_s(self) -> float | None:
+        """The window that is asked for; None where it is to be chosen."""
+        if self.window_s is None and self.decision_points_s:
+            return self.decision_points_s[-1]
+        return self.window_s
+
+    def candidates(self, y: Labels, *, joints: bool, drawn: bool) -> list[Candidate]:
+        """The candidates for some labels."""
+        return candidates(
+            y,
+            self.features,
+            self.projection,
+            self.scaling,
+            self.components,
+            self.k,
+            joints=joints,
+            drawn=drawn,
+            quick=self.quick,
+        )
+
+    def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
+        """The choice of the settings of some trials."""
+        tried = self.candidates(y, joints=dataset.joints > 0, drawn=drawn)
+        return Choosing(
+            dataset,
+            y,
+            tried,
+            self.samples,
+            self.leave_out,
+            self.quick,
+            self.processes,
+            self.progress,
+        )
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """The trials of a fit.
+
+    Attributes:
+        dataset: with the features of every candidate.
+        windows: that may be chosen, the usual one first.
+        notes: sentences that a user should read.
+    """
+
+    dataset: DataSet
+    windows: tuple[float, ...]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The settings that a fit has chosen.
+
+    Attributes:
+        chosen: {task: its settings}.
+        folds: (n,) of the accuracies.
+        without: [fold]{task: the choice made without the fold's trials}.
+        tried: the candidates that they were chosen among.
+        window_s: of the full decision.
+        notes: sentences that a user should read.
+    """
+
+    chosen: dict[str, Chosen]
+    folds: NDArray[np.int64]
+    without: list[dict[str, Choice]]
+    tried: Sequence[Candidate]
+    window_s: float
+    notes: list[str]
+
+    @property
+    def choices(self) -> dict[str, Choice]:
+        """{task: its choice}."""
+        return {task: settled.choice for task, settled in self.chosen.items()}
+
+
+def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
     """Choose and fit every task of some recordings.
 
-    Arguments you pass are held fixed. The others are chosen for each task among the
+    Options you pass are held fixed. The others are chosen for each task among the
     candidates of `train.choose`: the features and projection of the smallest model
     within one standard error of the best in cross-validation, with the scaling,
     shrinkage, components and k that are best there.
@@ -126,7 +208,7 @@ def fit(
         progress: show progress bars on stderr.
 
     Raises:
-        InputError: the recordings cannot be used, or an argument is not possible with
+        InputError: the recordings cannot be used, or an option is not possible with
             them.
 
     Example:
@@ -135,123 +217,195 @@ def fit(
         >>> fitted.chosen["category"].accuracy.accuracy > 0.5
         True
     """
-    jobs = jobs or cpu_count()
-    if window_s is None and decision_points_s:
-        window_s = decision_points_s[-1]
-    windows: tuple[float, ...] = (window_s or WINDOW_S,)
-    notes: list[str] = []
-
-    def choosing(
-        of: DataSet, y: Labels, quick: bool, mixed: bool, shown: bool
-    ) -> Choosing:
-        drawn = mixed or kinds_of([trial.recording for trial in of.trials]) is not None
-        fixed = (features, projection, scaling, components, k)
-        tried = candidates(y, *fixed, joints=of.joints > 0, drawn=drawn, quick=quick)
-        return Choosing(of, y, tried, samples, leave_out, quick, jobs, shown)
-
-    if isinstance(data, DataSet):
-        dataset = data
-    else:
-        raw = read([data] if isinstance(data, str | Path) else data, progress=progress)
-        drawn = raw.mixed or kinds_of(raw.recordings) is not None
-        every = candidates(
-            {}, joints=raw.joints, drawn=drawn, features=features, quick=quick
-        )
-        if window_s is None and not (quick or raw.mixed):
-            windows = _windows([float(r.t[-1] - r.t[0]) for r in raw.recordings])
-        load = partial(
-            load_trials,
-            raw,
-            horizon_s=windows[-1],
-            features=expand([name for candidate in every for name in candidate.sets]),
-            arm=arm,
-            partial=True,
-            progress=progress,
-            jobs=jobs,
-        )
-        fixed = threshold is not None or onset is not None
-        if not fixed and "threshold_counts" not in raw.own[0].meta.get("skin", {}):
-            threshold, onset = thresholds.proposed(raw.own)
-            notes.append(
-                "warning: the skin was saved without thresholds; a threshold of "
-                f"{threshold} and "
-                f"an onset of {onset} counts come from the noise before contact"
-            )
-        dataset = load(threshold=threshold, onset=onset)
-        if not (fixed or any("simulation" in r.meta for r in raw.recordings)):
-
-            def accuracy(of: DataSet) -> float:
-                y = {task: of.labels(task) for task in _tasks(of, tasks)}
-                few = choosing(of, y, quick=True, mixed=False, shown=False)
-                return few.accuracy(windows[0])
-
-            dataset, lower = thresholds.chosen(
-                dataset, lambda low, high: load(threshold=low, onset=high), accuracy
-            )
-            notes += lower
-    y = {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
-    n = len(dataset.trials)
-    if n < FEWEST_TRIALS:
-        counted = "1 trial is" if n == 1 else f"{n} trials are"
-        raise InputError(f"{counted} too few to fit; record at least {FEWEST_TRIALS}")
-    if k is not None and not 1 <= k <= n - 1:
-        raise InputError(f"k must be 1 to {n - 1} with {n} trials, not {k}")
-    own = dataset.own
-    if own is None:
-        choice = choosing(dataset, y, quick, mixed=False, shown=progress)
-        if len(windows) > 1:
-            windows = _windows(
-                [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
-            )
-        window_s, why = choice.window(windows)
-        chosen, folds, without = choice.choose(window_s)
-        tried = choice.tried
-    else:
-        window_s = windows[0]
-        X = dataset.with_kernels(window_s).features(window_s, samples)
-
-        def settings(of: DataSet, y: Labels) -> dict[str, Chosen]:
-            return choosing(of, y, quick, mixed=True, shown=progress).choose(
-                windows[0]
-            )[0]
-
-        chosen, folds, without, why = mix(
-            dataset, y, own, settings, X, samples, leave_out, quick=quick, jobs=jobs
-        )
-        y = {task: y[task] for task in chosen}
-        tried = choosing(dataset, y, quick, mixed=True, shown=False).tried
-    notes += why
-    dataset = dataset.with_kernels(window_s)
-    choices = {task: settings.choice for task, settings in chosen.items()}
-    measured = dataset
-    dataset = measured.of(
-        [name for choice in choices.values() for name in choice.features]
-    )
-    X = dataset.features(window_s, samples)
-    felt = np.ones(n, dtype=bool) if own is None else own
-    notes += _leaks(
-        measured.part(felt), {task: labels[felt] for task, labels in y.items()}
-    )
-    tested = int((folds >= 0).sum())
-    points = _decision_points(
-        dataset, choices, decision_points_s, window_s, samples, notes, tested
-    )
+    fixed = FitOptions(**options)
+    loaded = load(data, fixed)
+    y = _labels(loaded.dataset, fixed.tasks)
+    _check_size(len(loaded.dataset.trials), fixed.k)
+    settings = choose(loaded, y, fixed)
+    if loaded.dataset.own is not None:
+        y = {task: y[task] for task in settings.chosen}
+    measured = loaded.dataset.with_kernels(settings.window_s)
+    notes = [*loaded.notes, *settings.notes, *_leaks_of(measured, y)]
+    dataset = measured.of(_features(settings.choices.values()))
+    points = _decision_points(dataset, settings, fixed, notes)
+    X = dataset.features(settings.window_s, fixed.samples)
     sequential = None
     if points:
-        used = [
-            choice for by_task in (choices, *without) for choice in by_task.values()
-        ]
-        seen = measured.of([name for choice in used for name in choice.features])
-        at_points = np.stack([seen.features(s, samples) for s in points])
-        sequential = SequentialClassifier(
-            choices, points, seen.names, jobs=jobs, widths=seen.widths(samples)
-        ).fit(at_points, y, folds, without, own)
+        sequential = calibrate(measured, y, points, settings, fixed)
         classifier = sequential.decision_points_[-1]
     else:
-        classifier = ContactClassifier(choices, dataset.names, dataset.widths(samples))
-        classifier.fit(X, y, own)
-    settled = chosen, tuple(tried), classifier, sequential, tuple(notes)
-    return Fitted(dataset, measured, window_s, samples, X, *settled)
+        widths = dataset.widths(fixed.samples)
+        classifier = ContactClassifier(settings.choices, dataset.names, widths)
+        classifier.fit(X, y, dataset.own)
+    return Fitted(
+        dataset=dataset,
+        measured=measured,
+        window_s=settings.window_s,
+        samples=fixed.samples,
+        X=X,
+        chosen=settings.chosen,
+        candidates=tuple(settings.tried),
+        classifier=classifier,
+        sequential=sequential,
+        notes=tuple(notes),
+    )
+
+
+def load(
+    data: DataSet | str | Path | Sequence[str | Path], options: FitOptions
+) -> Loaded:
+    """The trials, with the features of every candidate and suitable thresholds."""
+    windows: tuple[float, ...] = (options.fixed_window_s or WINDOW_S,)
+    if isinstance(data, DataSet):
+        return Loaded(data, windows, [])
+    paths = [data] if isinstance(data, str | Path) else data
+    recordings = read(paths, progress=options.progress)
+    if options.fixed_window_s is None and not (options.quick or recordings.mixed):
+        seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
+        windows = _windows(seconds)
+    notes: list[str] = []
+    dataset = _with_thresholds(recordings, windows, options, notes)
+    return Loaded(dataset, windows, notes)
+
+
+def _with_thresholds(
+    recordings: Recordings,
+    windows: tuple[float, ...],
+    options: FitOptions,
+    notes: list[str],
+) -> DataSet:
+    """The trials, by thresholds that are given, saved, proposed or chosen."""
+    drawn = recordings.mixed or kinds_of(recordings.recordings) is not None
+    tried = options.candidates({}, joints=recordings.joints, drawn=drawn)
+    names = [name for candidate in tried for name in candidate.sets]
+
+    def by(threshold: int | None, onset: int | None) -> DataSet:
+        return load_trials(
+            recordings,
+            threshold=threshold,
+            onset=onset,
+            horizon_s=windows[-1],
+            features=expand(names),
+            arm=options.arm,
+            partial=True,
+            progress=options.progress,
+            jobs=options.processes,
+        )
+
+    threshold = options.threshold
+    onset = options.onset
+    fixed = threshold is not None or onset is not None
+    skin = recordings.own[0].meta.get("skin", {})
+    if not fixed and "threshold_counts" not in skin:
+        threshold, onset = thresholds.proposed(recordings.own)
+        notes.append(
+            "warning: the skin was saved without thresholds; a threshold of "
+            f"{threshold} and an onset of {onset} counts come from the noise before "
+            "contact"
+        )
+    dataset = by(threshold, onset)
+    if fixed or any("simulation" in r.meta for r in recordings.recordings):
+        return dataset
+
+    def accuracy(trials: DataSet) -> float:
+        hasty = replace(options, quick=True, progress=False)
+        few = hasty.choosing(
+            trials, _labels(trials, options.tasks), drawn=_are_drawn(trials)
+        )
+        return few.accuracy(windows[0])
+
+    dataset, lower = thresholds.chosen(dataset, by, accuracy)
+    notes += lower
+    return dataset
+
+
+def _are_drawn(dataset: DataSet) -> bool:
+    """Whether the trials are of things that a scene drew from kinds."""
+    return kinds_of([trial.recording for trial in dataset.trials]) is not None
+
+
+def _labels(dataset: DataSet, tasks: Sequence[str] | None) -> Labels:
+    return {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
+
+
+def _check_size(trials: int, k: int | None) -> None:
+    if trials < FEWEST_TRIALS:
+        number = "1 trial is" if trials == 1 else f"{trials} trials are"
+        raise InputError(f"{number} too few to fit; record at least {FEWEST_TRIALS}")
+    if k is not None and not 1 <= k <= trials - 1:
+        raise InputError(f"k must be 1 to {trials - 1} with {trials} trials, not {k}")
+
+
+def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
+    """The settings of each task, and the window."""
+    dataset = loaded.dataset
+    if dataset.own is not None:
+        return _choose_mixed(loaded, y, dataset.own, options)
+    choosing = options.choosing(dataset, y, drawn=_are_drawn(dataset))
+    windows = loaded.windows
+    if len(windows) > 1:
+        windows = _windows(
+            [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
+        )
+    window_s, notes = choosing.window(windows)
+    chosen, folds, without = choosing.choose(window_s)
+    return Settings(chosen, folds, without, choosing.tried, window_s, notes)
+
+
+def _choose_mixed(
+    loaded: Loaded, y: Labels, own: NDArray[np.bool_], options: FitOptions
+) -> Settings:
+    """The settings where simulated trials stand beside the owner's."""
+    dataset = loaded.dataset
+    window_s = loaded.windows[0]
+    X = dataset.with_kernels(window_s).features(window_s, options.samples)
+
+    def settings(trials: DataSet, labels: Labels) -> dict[str, Chosen]:
+        return options.choosing(trials, labels, drawn=True).choose(window_s)[0]
+
+    chosen, folds, without, notes = mix(
+        dataset,
+        y,
+        own,
+        settings,
+        X,
+        options.samples,
+        options.leave_out,
+        quick=options.quick,
+        jobs=options.processes,
+    )
+    y = {task: y[task] for task in chosen}
+    silent = replace(options, progress=False)
+    tried = silent.choosing(dataset, y, drawn=True).tried
+    return Settings(chosen, folds, without, tried, window_s, notes)
+
+
+def _features(choices: Iterable[Choice]) -> list[str]:
+    """The names of the features that some choices take."""
+    return [name for choice in choices for name in choice.features]
+
+
+def calibrate(
+    measured: DataSet,
+    y: Labels,
+    points: tuple[float, ...],
+    settings: Settings,
+    options: FitOptions,
+) -> SequentialClassifier:
+    """A classifier for all decision points, with its stopping rules."""
+    used = list(settings.choices.values())
+    for by_task in settings.without:
+        used += by_task.values()
+    dataset = measured.of(_features(used))
+    at_points = np.stack([dataset.features(s, options.samples) for s in points])
+    classifier = SequentialClassifier(
+        settings.choices,
+        points,
+        dataset.names,
+        jobs=options.processes,
+        widths=dataset.widths(options.samples),
+    )
+    return classifier.fit(at_points, y, settings.folds, settings.without, measured.own)
 
 
 def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
@@ -274,6 +428,14 @@ def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
     return tuple(
         WINDOW_S * times for times in (1, 2, 4, 8) if WINDOW_S * times <= median
     )
+
+
+def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:
+    """`_leaks` of the trials that the owner has felt."""
+    if dataset.own is None:
+        return _leaks(dataset, y)
+    felt = {task: labels[dataset.own] for task, labels in y.items()}
+    return _leaks(dataset.part(dataset.own), felt)
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
@@ -314,47 +476,59 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
 
 
 def _decision_points(
-    dataset: DataSet,
-    choices: Mapping[str, Choice],
-    wanted: Sequence[float] | None,
-    window_s: float,
-    samples: int,
-    notes: list[str],
-    tested: int,
+    dataset: DataSet, settings: Settings, options: FitOptions, notes: list[str]
 ) -> tuple[float, ...]:
-    """The decision points asked for, or the default ones where they can be
-    calibrated."""
-    if wanted is not None:
-        return tuple(wanted)
+    """The decision points asked for, or the usual ones where they can be calibrated."""
+    if options.decision_points_s is not None:
+        return tuple(options.decision_points_s)
+    tested = int((settings.folds >= 0).sum())
     if not FEWEST <= tested <= MOST_TRIALS:
         notes.append(
             f"no decision points before the full window: {tested} trials are not the "
-            f"{FEWEST} "
-            f"to {MOST_TRIALS} that are calibrated by default"
+            f"{FEWEST} to {MOST_TRIALS} that are calibrated by default"
         )
         return ()
-    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    n, each = len(dataset.trials), 0
-    for task, choice in choices.items():
-        columns = sum(widths[name] for name in choice.features)
-        c = min(choice.components, len(set(dataset.labels(task).tolist())) * 2, n)
-        each += c * (4 * columns + 8 * n)
+    bytes_a_point = _bytes_a_point(dataset, settings.choices, options.samples)
     points: list[float] = []
-    for every in STEPS_S:
+    for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
-        step = every * max(window_s / WINDOW_S, 1.0)
-        rising = (round(max(FIRST_S, step) + i * step, 6) for i in itertools.count())
-        points = [*itertools.takewhile(lambda s: s < window_s, rising), window_s]
-        if len(points) * each <= LARGEST_BYTES:
-            if every > STEPS_S[0]:
+        step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
+        points = _rising(step_s, settings.window_s)
+        if len(points) * bytes_a_point <= LARGEST_BYTES:
+            if every_s > STEPS_S[0]:
                 notes.append(
-                    f"{len(points)} decision points, one every {step:g} s, so that the "
-                    "model stays "
-                    "below 1 MB; --decision-points asks for more"
+                    f"{len(points)} decision points, one every {step_s:g} s, so that "
+                    "the model stays below 1 MB; --decision-points asks for more"
                 )
             return tuple(points)
+    megabytes = len(points) * bytes_a_point / 1e6
     notes.append(
-        f"no decision points before the full window: they would make the model about "
-        f"{len(points) * each / 1e6:.1f} MB; --decision-points asks for them"
+        "no decision points before the full window: they would make the model about "
+        f"{megabytes:.1f} MB; --decision-points asks for them"
     )
     return ()
+
+
+def _bytes_a_point(
+    dataset: DataSet, choices: Mapping[str, Choice], samples: int
+) -> int:
+    """Bytes of weights of a decision point."""
+    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+    trials = len(dataset.trials)
+    size = 0
+    for task, choice in choices.items():
+        columns = sum(widths[name] for name in choice.features)
+        classes = len(set(dataset.labels(task).tolist()))
+        components = min(choice.components, 2 * classes, trials)
+        size += components * (4 * columns + 8 * trials)
+    return size
+
+
+def _rising(step_s: float, window_s: float) -> list[float]:
+    """Decision points one every `step_s`, up to the window."""
+    points = []
+    point_s = round(max(FIRST_S, step_s), 6)
+    while point_s < window_s:
+        points.append(point_s)
+        point_s = round(max(FIRST_S, step_s) + len(points) * step_s, 6)
+    return [*points, window_s]

@@ -9,7 +9,7 @@ import train
 from edge.recording import Recording, save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
-from train.fitting import _decision_points, _leaks
+from train.fitting import FitOptions, _decision_points, _leaks
 from train.pipeline import Choice
 
 
@@ -115,11 +115,14 @@ def test_a_model_has_the_decision_points_that_keep_it_below_a_megabyte(
         widths=lambda samples: (150,),
         labels=lambda task: labels,
     )
-    choices = {"object": Choice("IV", components, 3, features=("max_force",))}
+    settings = SimpleNamespace(
+        choices={"object": Choice("IV", components, 3, features=("max_force",))},
+        folds=np.zeros(trials),
+        window_s=1.2,
+    )
     notes: list[str] = []
-    assert _decision_points(
-        data, choices, None, 1.2, 40, notes, trials
-    ) == pytest.approx(points)
+    found = _decision_points(data, settings, FitOptions(), notes)
+    assert found == pytest.approx(points)
     assert [note.split(" decision points")[0] for note in notes] == (
         [] if len(points) == 11 else [str(len(points) or "no")]
     )
