@@ -1,5 +1,7 @@
 """The candidates among features, scalings, projections and their numbers."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -78,8 +80,7 @@ class Candidate:
 
 
 def known_products(y: Labels) -> dict[str, tuple[str, str]]:
-    """{product: its factors} as `products`, where every trial with the one has labels
-    of both."""
+    """{product: its factors}, where every trial with the one has labels of both."""
     return {
         task: factors
         for task, factors in products(y).items()
@@ -109,56 +110,149 @@ def candidates(
     they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
     only what carries over to other skins and arms is tried.
     """
-    combinations_tried: Sequence[tuple[str, ...]] = WITH_JOINTS if joints else PLAIN
-    if drawn:
-        combinations_tried = [DRAWN_WITH_JOINTS if joints else DRAWN]
-    if quick:
-        combinations_tried = combinations_tried[:QUICK]
-    if features is not None:
-        combinations_tried = [tuple(features)]
-    shrinkages = (
-        DRAWN_SHRINKAGES if drawn else QUICK_SHRINKAGES if quick else SHRINKAGES
-    )
-    counts = DRAWN_COMPONENTS if drawn else COMPONENTS
+    fixed = Fixed(features, projection, scaling, components, k)
+    mode = Mode.of(drawn=drawn, quick=quick)
     tried = []
-    for sets in combinations_tried:
+    for sets in _combinations(fixed, mode, joints=joints):
         for kind in KINDS if projection is None else (projection,):
-            paper = sets == ("paper",)
-            # By default discriminants are not tried for the paper's few features. A
-            # quick choice tries discriminants alone for the others. So does one for
-            # simulated things, because principal components do not hold back the
-            # coordinates in which simulators differ.
-            untried = kind == "lda" if paper else kind == "pca" and (quick or drawn)
-            if features is None and projection is None and untried:
-                continue
-            thorough = features is not None and kind == "pca"
-            scalings = PAPER_SCALINGS if paper and thorough else ("IV",)
-            neighbours = NEIGHBOURS if thorough else FEW_NEIGHBOURS
-            grid = SearchGrid(
-                projection=kind,
-                features=expand(sets),
-                components=counts if components is None else (components,),
-                shrinkages=shrinkages,
-                most_directions=DRAWN_COMPONENTS[-1] if drawn else None,
-                neighbours=neighbours if k is None else (k,),
-            )
-            pairs = {} if kind == "pca" else known_products(y)
-            grids = [
-                grid,
-                *(replace(grid, targets=pairs[t], tasks=(t,)) for t in pairs),
-            ]
-            together = tuple(
-                t for t in sorted(y) if t not in pairs and (y[t] != "").all()
-            )
-            if kind == "lda" and len(together) > 1 and not drawn:
-                grids.append(replace(grid, targets=together))
-            scaled = [
-                replace(grid, scaling=method)
-                for method in (scalings if scaling is None else (scaling,))
-                for grid in grids
-            ]
-            tried.append(Candidate(tuple(sets), kind, tuple(scaled)))
+            if fixed.asks or mode.tries(kind, sets):
+                grid = _grid(sets, kind, fixed, mode)
+                grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
+                tried.append(Candidate(tuple(sets), kind, grids))
     return tried
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Settings that are not to be chosen; see `candidates`."""
+
+    features: Sequence[str] | None
+    projection: str | None
+    scaling: str | None
+    components: int | None
+    k: int | None
+
+    @property
+    def asks(self) -> bool:
+        """Whether features or a projection are asked for."""
+        return self.features is not None or self.projection is not None
+
+    def thorough(self, kind: str) -> bool:
+        """Whether more numbers are tried, as features are asked for by name."""
+        return self.features is not None and kind == "pca"
+
+
+@dataclass(frozen=True)
+class Mode:
+    """What is tried by default.
+
+    Attributes:
+        combinations, with_joints: feature sets without and with joint angles.
+        shrinkages: of discriminants.
+        components: numbers of coordinates.
+        most_directions: of discriminants; None for all.
+        components_alone: try principal components of other sets than the paper's.
+        together: try the discriminants of all tasks side by side.
+    """
+
+    combinations: Sequence[tuple[str, ...]]
+    with_joints: Sequence[tuple[str, ...]]
+    shrinkages: Sequence[float]
+    components: Sequence[int]
+    most_directions: int | None
+    components_alone: bool
+    together: bool
+
+    @classmethod
+    def of(cls, *, drawn: bool, quick: bool) -> Mode:
+        """The mode of things that a scene drew from kinds, or of a quick choice."""
+        if drawn:
+            return cls(
+                combinations=(DRAWN,),
+                with_joints=(DRAWN_WITH_JOINTS,),
+                shrinkages=DRAWN_SHRINKAGES,
+                components=DRAWN_COMPONENTS,
+                most_directions=DRAWN_COMPONENTS[-1],
+                components_alone=False,
+                together=False,
+            )
+        number = QUICK if quick else None
+        return cls(
+            combinations=PLAIN[:number],
+            with_joints=WITH_JOINTS[:number],
+            shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
+            components=COMPONENTS,
+            most_directions=None,
+            components_alone=not quick,
+            together=True,
+        )
+
+    def tries(self, kind: str, sets: Sequence[str]) -> bool:
+        """Whether a projection of some feature sets is tried by default.
+
+        Discriminants are not, for the paper's few features. A quick choice tries
+        discriminants alone for the others. So does one for simulated things, because
+        principal components do not hold back the coordinates in which simulators
+        differ.
+        """
+        if sets == ("paper",):
+            return kind == "pca"
+        return kind == "lda" or self.components_alone
+
+
+def _combinations(
+    fixed: Fixed, mode: Mode, *, joints: bool
+) -> Sequence[tuple[str, ...]]:
+    """The feature sets that are tried together."""
+    if fixed.features is not None:
+        return [tuple(fixed.features)]
+    return mode.with_joints if joints else mode.combinations
+
+
+def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:
+    """The numbers that are tried for some feature sets and a projection."""
+    neighbours = NEIGHBOURS if fixed.thorough(kind) else FEW_NEIGHBOURS
+    components = mode.components if fixed.components is None else (fixed.components,)
+    return SearchGrid(
+        projection=kind,
+        features=expand(sets),
+        components=tuple(components),
+        shrinkages=tuple(mode.shrinkages),
+        most_directions=mode.most_directions,
+        neighbours=neighbours if fixed.k is None else (fixed.k,),
+    )
+
+
+def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
+    """A grid, and those of discriminants of several tasks side by side."""
+    if grid.projection == "pca":
+        pairs: dict[str, tuple[str, str]] = {}
+    else:
+        pairs = known_products(y)
+    grids = [grid]
+    for task, factors in pairs.items():
+        grids.append(replace(grid, targets=factors, tasks=(task,)))
+    complete = [task for task in sorted(y) if (y[task] != "").all()]
+    together = tuple(task for task in complete if task not in pairs)
+    if grid.projection == "lda" and mode.together and len(together) > 1:
+        grids.append(replace(grid, targets=together))
+    return grids
+
+
+def _scaled(
+    grids: Sequence[SearchGrid], sets: Sequence[str], fixed: Fixed
+) -> tuple[SearchGrid, ...]:
+    """The grids with each method of scaling that is tried."""
+    methods: Sequence[str] = ("IV",)
+    if fixed.scaling is not None:
+        methods = (fixed.scaling,)
+    elif sets == ("paper",) and fixed.thorough(grids[0].projection):
+        methods = PAPER_SCALINGS
+    scaled = []
+    for method in methods:
+        for grid in grids:
+            scaled.append(replace(grid, scaling=method))
+    return tuple(scaled)
 
 
 def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
@@ -188,6 +282,6 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
 
 
 def places_of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
-    """The places of a candidate's own choices."""
+    """Indices of the choices that belong to a candidate."""
     names = {(grid.features, grid.projection) for grid in candidate.grids}
     return np.flatnonzero([(c.features, c.projection) in names for c in choices])

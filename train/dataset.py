@@ -6,7 +6,6 @@ import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -287,96 +286,211 @@ def load_trials(
             touched.
     """
     types = measures.features(tuple(features))
-    raw = data if isinstance(data, Recordings) else read(data, progress=progress)
-    reference = with_thresholds(raw.own[0].layout, threshold, onset)
-    reference = replace(reference, dead=_dead(raw.recordings))
-    needed = any(feature.of_joints for feature in types)
-    wanting = raw.joints and (needed or any(map(moves, types)))
-    every = list(zip(raw.recordings, raw.paths, strict=True))
-    kept = [(r, path) for r, path in every if not wanting or r.joints is not None]
-    bare = tuple(path for r, path in every if wanting and r.joints is None)
-    arms = [arm_of(recording, str(path), arm) for recording, path in kept]
-    kept = [
-        (recording if own is None else recording.for_joints(own.names), path)
-        for (recording, path), own in zip(kept, arms, strict=True)
-    ]
-    moving = any(map(moves, types)) and None not in arms
-    chain = arms[0] if moving else None
-    if chain is not None:
-        for own, (_, path) in zip(arms, kept, strict=True):
-            if own is not None and own.to_dict() != chain.to_dict():
-                raise InputError(
-                    f"{path}: its arm is not that of {kept[0][1]}; train on one arm"
-                )
-    joints = joint_angles(kept) if needed else 0
-    names = tuple(feature.name for feature in types)
-    trials: list[Trial] = []
-    untouched: list[tuple[Path, dict[str, str]]] = []
-    unused: list[Path] = []
-    tracked = {
-        "chain": chain,
+    recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
+    layout = with_thresholds(recordings.own[0].layout, threshold, onset)
+    layout = replace(layout, dead=_dead(recordings.recordings))
+    posed = with_poses(recordings, types, arm)
+    follow = {
+        "chain": posed.chain,
         "horizon_s": horizon_s,
-        "features": names,
-        "joints": joints,
+        "features": tuple(feature.name for feature in types),
+        "joints": posed.joints,
     }
-    work = (delayed(_followed)(*pair, reference, **tracked) for pair in kept)
-    results = Parallel(n_jobs=jobs, return_as="generator")(work)
     shown = bar(
-        results, total=len(kept), desc="following", unit=" trials", disable=not progress
+        Parallel(n_jobs=jobs, return_as="generator")(
+            delayed(_followed)(recording, path, layout, **follow)
+            for recording, path in posed.recordings
+        ),
+        total=len(posed.recordings),
+        desc="following",
+        unit=" trials",
+        disable=not progress,
     )
-    for (recording, path), (touches, labels) in zip(kept, shown, strict=True):
+    touched = collect(posed.recordings, shown, layout)
+    labelled = complete(touched, partial=partial)
+    left_out = {**labelled.lacking, "joint angles": posed.without_joints}
+    return DataSet(
+        trials=labelled.trials,
+        layout=layout,
+        chain=posed.chain,
+        untouched=labelled.untouched,
+        digest=recordings.digest,
+        names=tuple(feature.name for feature in types),
+        joints=posed.joints,
+        tasks=labelled.tasks,
+        left_out={need: paths for need, paths in left_out.items() if paths},
+        unused=touched.unused,
+    )
+
+
+Named = tuple[Recording, Path]
+"""A recording and its file."""
+
+
+@dataclass(frozen=True)
+class Posed:
+    """The recordings that have the joint angles that the features need.
+
+    Attributes:
+        recordings: with their files; the angles are in the arm's order.
+        chain: the arm, where motion is measured in its base's frame.
+        joints: number of joint angles, where a feature is made of them.
+        without_joints: files that are left out, as they have no angles.
+    """
+
+    recordings: list[Named]
+    chain: Chain | None
+    joints: int
+    without_joints: tuple[Path, ...]
+
+
+def with_poses(
+    data: Recordings, types: Sequence[measures.Feature], arm: Chain | None
+) -> Posed:
+    """Leave out recordings without joint angles, where most have them.
+
+    Raises:
+        InputError: the recordings have several arms.
+    """
+    moving = any(map(moves, types))
+    of_joints = any(feature.of_joints for feature in types)
+    needed = data.joints and (of_joints or moving)
+    named: list[Named] = []
+    arms: list[Chain | None] = []
+    without: list[Path] = []
+    for recording, path in zip(data.recordings, data.paths, strict=True):
+        if needed and recording.joints is None:
+            without.append(path)
+            continue
+        chain = arm_of(recording, str(path), arm)
+        arms.append(chain)
+        if chain is not None:
+            recording = recording.for_joints(chain.names)
+        named.append((recording, path))
+    chain = arms[0] if moving and None not in arms else None
+    if chain is not None:
+        require_one_arm(named, arms, chain)
+    joints = joint_angles(named) if of_joints else 0
+    return Posed(named, chain, joints, tuple(without))
+
+
+def require_one_arm(
+    recordings: Sequence[Named], arms: Sequence[Chain | None], chain: Chain
+) -> None:
+    """Refuse recordings of an arm that differs from the first one's.
+
+    Raises:
+        InputError: one does; the sentence names it.
+    """
+    for other, (_, path) in zip(arms, recordings, strict=True):
+        if other is not None and other.to_dict() != chain.to_dict():
+            raise InputError(
+                f"{path}: its arm is not that of {recordings[0][1]}; train on one arm"
+            )
+
+
+@dataclass(frozen=True)
+class Touched:
+    """The contacts of recordings.
+
+    Attributes:
+        trials: one for each contact that has labels.
+        untouched: files without a contact, with their labels.
+        unused: files with more contacts than labels.
+    """
+
+    trials: list[Trial]
+    untouched: list[tuple[Path, dict[str, str]]]
+    unused: tuple[Path, ...]
+
+
+def collect(
+    recordings: Sequence[Named], followed: Iterable[Followed], layout: SkinLayout
+) -> Touched:
+    """The trials of recordings whose contacts were followed.
+
+    Raises:
+        InputError: no recording has a contact.
+    """
+    trials: list[Trial] = []
+    untouched = []
+    unused = []
+    for (recording, path), (touches, labels) in zip(recordings, followed, strict=True):
         if not touches:
             untouched.append((path, recording.labels))
         if len(touches) > len(labels):
             unused.append(path)
-        trials += [
-            Trial(path, recording, own, *touch)
-            for own, touch in zip(labels, touches, strict=False)
-        ]
+        for trial_labels, touch in zip(labels, touches, strict=False):
+            trials.append(Trial(path, recording, trial_labels, *touch))
     if not trials:
         raise InputError(
-            f"no contact in any of {len(kept)} recordings; lower the threshold "
-            f"of {reference.threshold_counts} counts"
+            f"no contact in any of {len(recordings)} recordings; lower the threshold "
+            f"of {layout.threshold_counts} counts"
         )
-    labels = completed([t.labels for t in trials] + [own for _, own in untouched])
+    return Touched(trials, untouched, tuple(unused))
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """Trials with all labels that follow from each other.
+
+    Attributes:
+        trials: those with the labels that are needed.
+        untouched: files without a contact, with their labels.
+        tasks: that the trials share.
+        lacking: {"a label for TASK": files that have none}.
+    """
+
+    trials: tuple[Trial, ...]
+    untouched: tuple[tuple[Path, dict[str, str]], ...]
+    tasks: tuple[str, ...]
+    lacking: dict[str, tuple[Path, ...]]
+
+
+def complete(touched: Touched, *, partial: bool) -> Labelled:
+    """Add the labels that follow from others, and drop what has too few.
+
+    Args:
+        touched: the contacts.
+        partial: keep a trial that has a label for some task, else for each.
+
+    Raises:
+        InputError: no trial has the labels.
+    """
+    paths = [trial.path for trial in touched.trials]
+    labels = [trial.labels for trial in touched.trials]
+    for path, untouched_labels in touched.untouched:
+        paths.append(path)
+        labels.append(untouched_labels)
+    labels = completed(labels)
     tasks = shared_tasks(labels, partial=partial)
-    paths = [t.path for t in trials] + [path for path, _ in untouched]
-    lacking = {
-        f"a label for {task}": tuple(
-            dict.fromkeys(
-                p for p, own in zip(paths, labels, strict=True) if task not in own
-            )
-        )
-        for task in tasks
-    }
+    lacking: dict[str, tuple[Path, ...]] = {}
+    for task in tasks:
+        without = [p for p, own in zip(paths, labels, strict=True) if task not in own]
+        lacking[f"a label for {task}"] = tuple(dict.fromkeys(without))
     enough = any if partial else all
-    usable = [enough(task in own for task in tasks) for own in labels]
-    used = list(compress(zip(paths, labels, strict=True), usable))
-    felt = compress(zip(trials, labels, strict=False), usable)
-    trials = [replace(trial, labels=own) for trial, own in felt]
+    trials: list[Trial] = []
+    untouched = []
+    for number, trial_labels in enumerate(labels):
+        if not enough(task in trial_labels for task in tasks):
+            continue
+        if number < len(touched.trials):
+            trial = touched.trials[number]
+            trials.append(replace(trial, labels=trial_labels))
+        else:
+            untouched.append((paths[number], trial_labels))
     if not trials:
         raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
-    return DataSet(
-        tuple(trials),
-        reference,
-        chain,
-        tuple(used[len(trials) :]),
-        raw.digest,
-        names,
-        joints,
-        tasks,
-        {
-            need: left
-            for need, left in (*lacking.items(), ("joint angles", bare))
-            if left
-        },
-        tuple(unused),
-    )
+    return Labelled(tuple(trials), tuple(untouched), tasks, lacking)
+
+
+Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
+"""The contacts of a recording, and the labels of those that are trials."""
 
 
 def _followed(
     recording: Recording, path: Path, layout: SkinLayout, **tracked: Any
-) -> tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]:
+) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
         tracker = ContactTracker(for_device(layout, recording.layout), **tracked)

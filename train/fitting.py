@@ -363,7 +363,7 @@ def _choose_mixed(
     def settings(trials: DataSet, labels: Labels) -> dict[str, Chosen]:
         return options.choosing(trials, labels, drawn=True).choose(window_s)[0]
 
-    chosen, folds, without, notes = mix(
+    mixed = mix(
         dataset,
         y,
         own,
@@ -374,10 +374,12 @@ def _choose_mixed(
         quick=options.quick,
         jobs=options.processes,
     )
-    y = {task: y[task] for task in chosen}
+    y = {task: y[task] for task in mixed.chosen}
     silent = replace(options, progress=False)
     tried = silent.choosing(dataset, y, drawn=True).tried
-    return Settings(chosen, folds, without, tried, window_s, notes)
+    return Settings(
+        mixed.chosen, mixed.folds, mixed.without, tried, window_s, mixed.notes
+    )
 
 
 def _features(choices: Iterable[Choice]) -> list[str]:

@@ -8,8 +8,10 @@ is how often a trial counts in scaling and projection, in whole numbers. As a ne
 each votes once.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,151 +37,256 @@ ALONE, SIMULATED, ONCE = (0, 1), (1, 0), (1, 1)
 """Weights of the simulated trials and of the owner's."""
 
 
-def mix(
-    dataset: DataSet,
-    y: Labels,
-    own: NDArray[np.bool_],
-    settings: Callable[[DataSet, Labels], dict[str, Chosen]],
-    features: NDArray[np.float64],
-    samples: int,
-    leave_out: str,
-    *,
-    quick: bool = False,
-    jobs: int = 1,
-) -> tuple[dict[str, Chosen], NDArray[np.int64], list[dict[str, Choice]], list[str]]:
-    """Choose the weights of each task.
+Plan = tuple[NDArray[np.int64], list[dict[str, Choice]]]
+"""(n,) the fold of each trial, and [fold]{task: the choice made without it}."""
 
-    Args:
+
+@dataclass(frozen=True)
+class MixResult:
+    """Settings with weights, chosen on the owner's trials.
+
+    Attributes:
+        chosen: {task: its settings}, whose accuracies are those on the owner's trials.
+        folds: (n,) of each of the owner's trials, -1 for simulated ones.
+        without: [fold]{task: the choice made without the fold's trials}.
+        notes: sentences that say how much the simulated trials help.
+    """
+
+    chosen: dict[str, Chosen]
+    folds: NDArray[np.int64]
+    without: list[dict[str, Choice]]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class Mixing:
+    """The trials of a choice of weights.
+
+    Attributes:
         dataset: all trials.
-        y: {task: (n,) labels}.
+        y: {task: (n,) labels} of the tasks that are fitted.
         own: (n,) whether a trial is the owner's.
-        settings: chooses the settings of tasks on some of the trials.
         features: (n, p) of the data set's, at the full window.
         samples: values of a feature.
         leave_out: label whose groups are left out where the owner's trials have several
             of them.
         quick: fewer folds.
         jobs: processes.
+    """
 
-    Returns:
-        {task: its settings, with the weights}, whose accuracies are those on the
-        owner's trials; (n,) the fold of each of the owner's trials, -1 for simulated
-        ones; [fold]{task: the choice made without the fold's trials}; and sentences
-        that say how much the simulated trials help.
+    dataset: DataSet
+    y: Labels
+    own: NDArray[np.bool_]
+    features: NDArray[np.float64]
+    samples: int
+    leave_out: str
+    quick: bool
+    jobs: int
+
+    @property
+    def shared(self) -> list[str]:
+        """The tasks of which simulated trials and the owner's have a common label."""
+        tasks = []
+        for task, labels in self.y.items():
+            common = set(labels[self.own].tolist()) & set(labels[~self.own].tolist())
+            if common - {""}:
+                tasks.append(task)
+        return tasks
+
+    @property
+    def half(self) -> int:
+        """How often the owner's trials count for half of the weight."""
+        return max(round(float((~self.own).sum() / self.own.sum())), 1)
+
+    def labelled(self, task: str) -> int:
+        """Number of the owner's trials that have a label for a task."""
+        return int((self.y[task][self.own] != "").sum())
+
+    def settings(self, choose: Settings) -> dict[str, Chosen]:
+        """The settings of each task, on the simulated trials where they share it."""
+        shared = self.shared
+        rest = [task for task in self.y if task not in shared]
+        chosen: dict[str, Chosen] = {}
+        for tasks, trials in ((shared, ~self.own), (rest, self.own)):
+            if tasks:
+                y = {task: self.y[task][trials] for task in tasks}
+                chosen |= choose(self.dataset.part(trials), y)
+        return chosen
+
+    def grids(self, chosen: Mapping[str, Chosen]) -> list[SearchGrid]:
+        """The settings of each task with each weight that is tried."""
+        tried = dict.fromkeys((ONCE, (1, self.half), ALONE, SIMULATED))
+        shared = self.shared
+        grids = []
+        for task in self.y:
+            for weights in tried if task in shared else (ALONE,):
+                choice = chosen[task].choice
+                grids.append(_grid(task, choice, weights, self.labelled(task)))
+        return grids
+
+    def answers(
+        self, grids: Sequence[SearchGrid], folds: NDArray[np.int64]
+    ) -> AnswerTable:
+        """The answers to the owner's trials, each without its fold (owner's trials,)."""
+        everyone = np.full(len(self.own), -1)
+        everyone[self.own] = folds
+        return evaluate(
+            self.features,
+            self.y,
+            everyone,
+            grids,
+            features=self.dataset.names,
+            widths=self.dataset.widths(self.samples),
+            jobs=self.jobs,
+            own=self.own,
+        )
+
+    def scores(self, grids: Sequence[SearchGrid]) -> Scores:
+        """The answers with single trials, and with entire groups, left out."""
+        labels = {task: y[self.own] for task, y in self.y.items()}
+        count = fold_count(int(self.own.sum()), self.quick)
+        finest = max(labels, key=lambda task: len(set(labels[task].tolist())))
+        by_trial = self.answers(grids, stratified_folds(labels[finest], count))
+        groups = None
+        if self.leave_out != TRIAL:
+            groups = self.dataset.part(self.own).groups(self.leave_out)
+        number = 0 if groups is None else len(set(groups.tolist()))
+        if groups is None or number < FEWEST_GROUPS:
+            return Scores(by_trial, by_trial, 0)
+        by_group = self.answers(grids, group_folds(groups, count))
+        return Scores(by_trial, by_group, number)
+
+    def weight_names(self) -> dict[tuple[int, int], str]:
+        """The weights in words."""
+        return {
+            ONCE: "both",
+            (
+                1,
+                self.half,
+            ): f"both, yours counted {self.half} times (half of the weight)",
+            ALONE: "your own alone",
+            SIMULATED: "simulated alone",
+        }
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Answers to the owner's trials.
+
+    Attributes:
+        by_trial: with single trials left out.
+        by_group: with entire groups left out; `by_trial` without enough groups.
+        groups: number of groups.
+    """
+
+    by_trial: AnswerTable
+    by_group: AnswerTable
+    groups: int
+
+    def weigh(
+        self, task: str, settled: Chosen, mixing: Mixing, plans: Mapping[str, Plan]
+    ) -> Chosen:
+        """The settings of a task with their weights; also enters those of each fold."""
+        leave_out = mixing.leave_out
+        table = self.by_trial if task == leave_out else self.by_group
+        # The first within a standard error of the best, as ten trials hardly tell them
+        # apart; fewer than that choose nothing.
+        rank = np.arange(len(table.choices[task]))
+        rule = rank, (rank[:1] if mixing.labelled(task) < ENOUGH else None)
+        best = table.choices[task][table.chosen(task, *rule)]
+        for left_out, answers in ((leave_out, self.by_group), (TRIAL, self.by_trial)):
+            places = answers.by_fold(task, *rule)
+            for by_task, place in zip(plans[left_out][1], places, strict=True):
+                by_task[task] = answers.choices[task][place]
+        single = table is self.by_trial
+        return replace(
+            settled,
+            choice=best,
+            accuracy=promised(
+                table.nested(task, *rule), groups=0 if single else self.groups
+            ),
+            by_trial=promised(self.by_trial.nested(task, *rule)),
+            left_out=TRIAL if single else leave_out,
+            folds=table.folds,
+        )
+
+    def shares(self, task: str, leave_out: str) -> dict[tuple[int, int], float]:
+        """{weights: share of right answers}."""
+        table = self.by_trial if task == leave_out else self.by_group
+        right = table.held_out(task)[:, table.tested[task]].mean(axis=1)
+        weights = [choice.weights for choice in table.choices[task]]
+        return dict(zip(weights, right, strict=True))
+
+
+Settings = Callable[[DataSet, Labels], dict[str, Chosen]]
+"""Chooses the settings of tasks on some of the trials."""
+
+
+def mix(
+    dataset: DataSet,
+    y: Labels,
+    own: NDArray[np.bool_],
+    choose: Settings,
+    features: NDArray[np.float64],
+    samples: int,
+    leave_out: str,
+    *,
+    quick: bool = False,
+    jobs: int = 1,
+) -> MixResult:
+    """Choose the weights of each task; the arguments are those of `Mixing`.
 
     Raises:
         InputError: the owner's trials are too few, or have no label.
     """
-    labelled = {task: int((labels[own] != "").sum()) for task, labels in y.items()}
-    few = [task for task in y if labelled[task] < FEWEST_OWN]
-    y = {task: labels for task, labels in y.items() if task not in few}
-    if not y:
+    few = [task for task in y if int((y[task][own] != "").sum()) < FEWEST_OWN]
+    fitted = {task: labels for task, labels in y.items() if task not in few}
+    if not fitted:
         raise InputError(
             f"{int(own.sum())} of the trials are no simulated ones; record at least "
-            f"{FEWEST_OWN} "
-            "with a label, or export the simulated ones alone"
+            f"{FEWEST_OWN} with a label, or export the simulated ones alone"
         )
-    shared = [t for t in y if set(y[t][own].tolist()) & set(y[t][~own].tolist()) - {""}]
-    chosen: dict[str, Chosen] = {}
-    for tasks, trials in ((shared, ~own), ([t for t in y if t not in shared], own)):
-        if tasks:
-            chosen |= settings(dataset.part(trials), {t: y[t][trials] for t in tasks})
-    half = max(round((~own).sum() / own.sum()), 1)
-    weights = tuple(dict.fromkeys((ONCE, (1, half), ALONE, SIMULATED)))
-    grids = [
-        _grid(task, chosen[task].choice, each, labelled[task])
-        for task in y
-        for each in (weights if task in shared else (ALONE,))
-    ]
-
-    def answers(folds: NDArray[np.int64]) -> AnswerTable:
-        everyone = np.full(len(own), -1)
-        everyone[own] = folds
-        return evaluate(
-            features,
-            y,
-            everyone,
-            grids,
-            features=dataset.names,
-            widths=dataset.widths(samples),
-            jobs=jobs,
-            own=own,
-        )
-
-    finest = max(y, key=lambda task: len(set(y[task][own].tolist())))
-    count = fold_count(int(own.sum()), quick)
-    by_trial = by_group = answers(stratified_folds(y[finest][own], count))
-    group_count = 0
-    groups = None if leave_out == TRIAL else dataset.part(own).groups(leave_out)
-    if groups is not None and len(set(groups.tolist())) >= FEWEST_GROUPS:
-        by_group, group_count = (
-            answers(group_folds(groups, count)),
-            len(set(groups.tolist())),
-        )
-    plans: dict[str, tuple[NDArray[np.int64], list[dict[str, Choice]]]] = {
-        left_out: (table.folds, [{} for _ in range(int(table.folds.max()) + 1)])
-        for left_out, table in ((leave_out, by_group), (TRIAL, by_trial))
-    }
+    mixing = Mixing(dataset, fitted, own, features, samples, leave_out, quick, jobs)
+    settled = mixing.settings(choose)
+    scores = mixing.scores(mixing.grids(settled))
+    plans: dict[str, Plan] = {}
+    for left_out, table in ((leave_out, scores.by_group), (TRIAL, scores.by_trial)):
+        folds = int(table.folds.max()) + 1
+        plans[left_out] = table.folds, [{} for _ in range(folds)]
     notes = [
         f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated "
-        "ones, on which "
-        "the settings are chosen (the table); the other accuracies are those on your "
-        "own"
+        "ones, on which the settings are chosen (the table); the other accuracies are "
+        "those on your own"
     ]
     if few:
         notes.append(
             f"not fitted, as fewer than {FEWEST_OWN} of your own have it: "
             f"{', '.join(few)}"
         )
-    for task, settled in chosen.items():
-        table = by_trial if task == leave_out else by_group
-        # The first within a standard error of the best, as ten trials hardly tell them
-        # apart; fewer than that choose nothing.
-        rank = np.arange(len(table.choices[task]))
-        rule = rank, (rank[:1] if labelled[task] < ENOUGH else None)
-        best = table.choices[task][table.chosen(task, *rule)]
-        for left_out, each in ((leave_out, by_group), (TRIAL, by_trial)):
-            for by_task, place in zip(
-                plans[left_out][1], each.by_fold(task, *rule), strict=True
-            ):
-                by_task[task] = each.choices[task][place]
-        chosen[task] = replace(
-            settled,
-            choice=best,
-            accuracy=promised(
-                table.nested(task, *rule),
-                groups=0 if table is by_trial else group_count,
-            ),
-            by_trial=promised(by_trial.nested(task, *rule)),
-            left_out=TRIAL if table is by_trial else leave_out,
-            folds=table.folds,
-        )
-        names = {
-            ONCE: "both",
-            (1, half): f"both, yours counted {half} times (half of the weight)",
-            ALONE: "your own alone",
-            SIMULATED: "simulated alone",
-        }
-        answers_of = table.held_out(task)[:, table.tested[task]].mean(axis=1)
-        shares = {
-            c.weights: s for c, s in zip(table.choices[task], answers_of, strict=True)
-        }
-        by_weights = ", ".join(
-            f"{names[each]} {share:.1%}" for each, share in shares.items()
-        )
-        notes.append(f"{task}: {by_weights}; taken: {names[best.weights]}")
-        if task in shared and shares[ALONE] == max(shares.values()):
-            notes.append(
-                f"simulated trials no longer help {task}: export your own alone, which "
-                "also "
-                "chooses the features by them"
-            )
-    form = dataset.names, dataset.widths(samples)
-    return (
-        decided_together(chosen, features, y, plans, *form, own, jobs),
-        *plans[TRIAL],
-        notes,
+    chosen = {}
+    for task in settled:
+        chosen[task] = scores.weigh(task, settled[task], mixing, plans)
+        notes += _sentences(task, chosen[task].choice, scores, mixing)
+    widths = dataset.widths(samples)
+    together = decided_together(
+        chosen, features, fitted, plans, dataset.names, widths, own, jobs
     )
+    folds_of_trials, without = plans[TRIAL]
+    return MixResult(together, folds_of_trials, without, notes)
+
+
+def _sentences(task: str, best: Choice, scores: Scores, mixing: Mixing) -> list[str]:
+    """How much the simulated trials help a task."""
+    names = mixing.weight_names()
+    shares = scores.shares(task, mixing.leave_out)
+    accuracies = [f"{names[weights]} {share:.1%}" for weights, share in shares.items()]
+    sentences = [f"{task}: {', '.join(accuracies)}; taken: {names[best.weights]}"]
+    if task in mixing.shared and shares[ALONE] == max(shares.values()):
+        sentences.append(
+            f"simulated trials no longer help {task}: export your own alone, which "
+            "also chooses the features by them"
+        )
+    return sentences
 
 
 def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:
