@@ -6,6 +6,8 @@ original speed. The exit status is 1 if nothing was saved, or if --joints gave n
 angles.
 """
 
+from __future__ import annotations
+
 import argparse
 import math
 import re
@@ -18,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
 from edge.commands.output import LOG
-from edge.commands.source import reading
+from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable, refusing
 from edge.output.event_writer import Lines
@@ -29,6 +32,7 @@ from edge.recording import Recording, save
 from edge.skin.skin import Skin
 from edge.tools import terminal
 from edge.tools.page import Page
+from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.track import DEBOUNCE, ContactTracker
@@ -115,46 +119,51 @@ class Trials:
 
     def rest(self) -> list[Frame] | None:
         """End the trial that is under way, if any, and return its frames."""
-        frames, self._frames = self._frames, None
+        frames = self._frames
+        self._frames = None
         self._before.clear()
         return frames
 
 
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
-    valid = np.array(
-        [f.valid for f in frames]
-    )  # a skin's frames always say which taxels are
-    dof = next((len(f.joints) for f in frames if f.joints is not None), None)
-    joints = np.array(
-        [np.full(dof or 0, np.nan) if f.joints is None else f.joints for f in frames]
-    )
+    # A skin's frames always say which taxels are valid.
+    valid = np.array([frame.valid for frame in frames])
     return Recording(
-        t=np.array([f.t - frames[0].t for f in frames]),
-        frames=np.array([f.counts for f in frames]),
-        joints=None if dof is None else joints,
+        t=np.array([frame.t - frames[0].t for frame in frames]),
+        frames=np.array([frame.counts for frame in frames]),
+        joints=_angles(frames),
         valid=None if valid.all() else valid,
         meta=meta,
     )
 
 
+def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:
+    """(n, dof) joint angles; None where no frame has any."""
+    dof = next((len(f.joints) for f in frames if f.joints is not None), None)
+    if dof is None:
+        return None
+    angles = np.full((len(frames), dof), np.nan)
+    for row, frame in zip(angles, frames, strict=True):
+        if frame.joints is not None:
+            row[:] = frame.joints
+    return angles
+
+
 def trial_path(out: Path, labels: dict[str, str]) -> Path:
-    """The file for the next trial: `out` itself, or a file with the first free number
-    in `out`.
+    """The file for the next trial: `out`, or the first free number in that folder.
 
     Raises:
         InputError: `out` names a file that exists, or that no folder can hold.
     """
     # A listing of the folder omits names that begin with a dot.
-    stem = (
-        re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")[:LONGEST_STEM]
-        or "trial"
-    )
+    plain = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")
+    stem = plain[:LONGEST_STEM] or "trial"
     with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
         if out.suffix != ".npz":
-            taken = {path.name for path in out.glob(f"{stem}-*.npz")}
+            present = {path.name for path in out.glob(f"{stem}-*.npz")}
             names = (f"{stem}-{number:03}.npz" for number in count(1))
-            return out / next(name for name in names if name not in taken)
+            return out / next(name for name in names if name not in present)
         with suppress(FileNotFoundError):
             out.lstat()
             raise InputError(f"{out}: exists already; choose another name or remove it")
@@ -163,20 +172,9 @@ def trial_path(out: Path, labels: dict[str, str]) -> Path:
 
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
-    labels: dict[str, str] = {}
-    for task, label in arguments.label:
-        labels.setdefault(task, label)
-    folder = None if arguments.out.suffix == ".npz" else arguments.out
     by_key = terminal.is_interactive() and arguments.web is None
-    # Only the page of a folder takes labels.
-    if not labels and (arguments.web is None or folder is None):
-        raise InputError(
-            "give --label TASK=LABEL; a trial without a label teaches nothing"
-        )
-    if len(labels) < len(arguments.label) and not by_key:
-        raise InputError(
-            "--label names a task twice; only in a terminal do keys choose the label"
-        )
+    folder = None if arguments.out.suffix == ".npz" else arguments.out
+    labels = _labels(arguments, folder, by_key)
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
     dof = arguments.dof if arm is None else arm.dof
@@ -197,30 +195,15 @@ def run(arguments: argparse.Namespace) -> int:
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
     ):
-        if arm is not None and arguments.joints is None and live.opened.dof != dof:
-            raise InputError(
-                f"{live.opened.source} gives {live.opened.dof or 'no'} joint angles, "
-                f"but {arguments.arm} has "
-                f"{dof} joints; name another source with --joints"
-            )
-        names = None if arm is None else arm.names
-        if arguments.joints is None and live.opened.playback is not None:
-            names = live.opened.playback.recording.joint_names
-        skin = live.skin
-        meta = {
-            "skin": skin.layout.to_dict(),
-            "skin_name": skin.file.name,
-            "source": live.opened.source,
-            "rate_hz": skin.file.reading.rate_hz,
-        }
-        if arm is not None:
-            meta["arm"] = arm.to_dict()
+        names = _joint_names(arguments, live.opened, arm)
+        meta = _metadata(live.opened, arm)
         recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
-        trials = Trials(skin, arguments.length)
-        LOG.info("waiting for a contact" + (KEYS if by_key else ""))
         choices = arguments.label if by_key else []
+        LOG.info("waiting for a contact" + (KEYS if by_key else ""))
         for digit, (task, label) in zip(DIGITS, choices, strict=False):
             LOG.info(f"  {digit}  {task}={label}")
+        most = arguments.trials if folder else 1
+        trials = Trials(live.skin, arguments.length)
         for frame, faults in live.frames():
             lines.write(faults)
             pressed = typed()
@@ -228,18 +211,79 @@ def run(arguments: argparse.Namespace) -> int:
                 recorder.press(key, choices)
             live.show(frame, faults)
             recorder.save(trials.push(frame), complete=True)
-            if len(recorder.paths) == (arguments.trials if folder else 1):
+            if len(recorder.paths) == most:
                 break
-        else:
+        if len(recorder.paths) != most:
             recorder.save(trials.rest(), complete=False)
+    return _status(arguments, recorder, live.skin)
+
+
+def _labels(
+    arguments: argparse.Namespace, folder: Path | None, by_key: bool
+) -> dict[str, str]:
+    """{task: label} of the first trial.
+
+    Raises:
+        InputError: there is none, and none can be given later; or a task has two.
+    """
+    labels: dict[str, str] = {}
+    for task, label in arguments.label:
+        labels.setdefault(task, label)
+    # Only the page of a folder takes labels.
+    if not labels and (arguments.web is None or folder is None):
+        raise InputError(
+            "give --label TASK=LABEL; a trial without a label teaches nothing"
+        )
+    if len(labels) < len(arguments.label) and not by_key:
+        raise InputError(
+            "--label names a task twice; only in a terminal do keys choose the label"
+        )
+    return labels
+
+
+def _joint_names(
+    arguments: argparse.Namespace, opened: Opened, arm: Chain | None
+) -> Sequence[str] | None:
+    """The names of the joints; None if they are unknown.
+
+    Raises:
+        InputError: the source lacks the arm's angles.
+    """
+    if arguments.joints is not None:
+        return None if arm is None else arm.names
+    if arm is not None and opened.dof != arm.dof:
+        raise InputError(
+            f"{opened.source} gives {opened.dof or 'no'} joint angles, but "
+            f"{arguments.arm} has {arm.dof} joints; name another source with --joints"
+        )
+    if opened.playback is not None:
+        return opened.playback.recording.joint_names
+    return None if arm is None else arm.names
+
+
+def _metadata(opened: Opened, arm: Chain | None) -> dict[str, Any]:
+    """The metadata that all trials share."""
+    file = opened.skin.file
+    meta = {
+        "skin": opened.skin.layout.to_dict(),
+        "skin_name": file.name,
+        "source": opened.source,
+        "rate_hz": file.reading.rate_hz,
+    }
+    return meta if arm is None else {**meta, "arm": arm.to_dict()}
+
+
+def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:
+    """The exit status, with a message where nothing was saved as it should be."""
     if not recorder.paths:
         silent = int((skin.invalid_for > 0).sum())
         where = f"; taxels without a valid value: {silent}" if silent else ""
         LOG.warning(f"no contact was saved{where}")
-    elif arguments.joints is not None and not recorder.any_joints:
+        return 1
+    if arguments.joints is not None and not recorder.any_joints:
         LOG.error("--joints gave no angles at the times of the frames")
         return 1
-    return 0 if recorder.paths else 1
+    return 0
 
 
 @dataclass
@@ -268,15 +312,12 @@ class Recorder:
     any_joints: bool = False
 
     def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
-        """Take a key: the number of a label holds it from now on, d deletes the last
-        trial."""
+        """Take a key: a number chooses its label, d deletes the last trial."""
         if key in DIGITS[: len(choices)]:
             task, label = choices[DIGITS.index(key)]
             self.labels = {**self.labels, task: label}
-            LOG.info(
-                "next: "
-                + ", ".join(f"{task}={label}" for task, label in self.labels.items())
-            )
+            texts = [f"{task}={label}" for task, label in self.labels.items()]
+            LOG.info(f"next: {', '.join(texts)}")
         elif key in ("d", "D") and self.paths:
             path = self.paths.pop()
             path.unlink(missing_ok=True)
