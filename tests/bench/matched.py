@@ -107,11 +107,13 @@ def main() -> None:
         mine = measured(*ours(thing, fixed))
         for quantity, allowed in ALLOWED.items():
             still = quantity == "motion, mm" and peer[quantity] <= 1.0
-            difference = 100 * (mine[quantity] / peer[quantity] - 1)
             row = {"touch": name, "quantity": quantity}
             row["MuJoCo"] = f"{peer[quantity]:.3g}"
             row["ours"] = f"{mine[quantity]:.3g}"
-            row["difference"] = "-" if still else f"{difference:+.0f} %"
+            row["difference"] = "-"
+            if not still:
+                ratio = mine[quantity] / peer[quantity]
+                row["difference"] = f"{100 * (ratio - 1):+.0f} %"
             row["allowed"] = f"{allowed} %"
             rows.append(row)
     tables.write("matched", [rows])
