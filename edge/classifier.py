@@ -373,8 +373,8 @@ class Classifier:
         novelty = self.model.info.novelty
         if novelty is None:
             return 1.0
-        distance = float(decisions[novelty.task].distances[0])
-        return novelty.rate(pending.decision_point, distance)
+        score = decisions[novelty.task].novelty
+        return novelty.rate(pending.decision_point, score)
 
 
 def _milliseconds_since(began: float) -> float:

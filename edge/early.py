@@ -11,8 +11,8 @@ from edge.model.agreement import product_label
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN, check_rate
-from edge.model.stopping import StoppingRule, margin
-from edge.policy import Policy, Question
+from edge.model.stopping import StoppingRule
+from edge.policy import Policy, Question, rounded
 
 
 def policies(model: Model, error: float) -> Mapping[str, Policy]:
@@ -55,23 +55,25 @@ class Early:
 
         An unknown contact waits for the full window.
         """
-        evidence = self._evidence(question)
         rule = self._rule
-        sure = rule is not None and self._stopping.sure(rule, evidence)
+        sure = rule is not None and self._sure(rule, question)
         last = self._full if rule is None or question.unknown else rule.last
         if question.decision_point < last and (question.unknown or not sure):
             return None
-        confidence = self._stopping.confidence(question.decision_point, evidence)
-        return self._answered(question, confidence, sure)
+        return self._answered(question, question.decision.confidence, sure)
 
-    def _evidence(self, question: Question) -> float:
-        distances = question.decision.label_distances
-        if distances is None:
+    def _sure(self, rule: StoppingRule, question: Question) -> bool:
+        decision = question.decision
+        if decision.label_distances is None or self._info.novelty is None:
             raise InputError(f"the model gives no distances of {self._task}'s labels")
-        label = self._info.tasks[self._task].labels.index(question.decision.label)
-        return margin(distances.tolist(), label)
+        label = self._info.tasks[self._task].labels.index(decision.label)
+        excess = self._info.novelty.excess(question.decision_point, decision.novelty)
+        distances = decision.label_distances.tolist()
+        return self._stopping.sure(rule, distances, label, excess)
 
-    def _answered(self, question: Question, confidence: float, sure: bool) -> Decided:
+    def _answered(
+        self, question: Question, confidence: float | None, sure: bool
+    ) -> Decided:
         """The answer of a rule, or of the full window without one."""
         nameless = question.unknown and self._names_unknown()
         rule = self._rule
@@ -81,7 +83,7 @@ class Early:
         if nameless:
             answer = replace(answer, label=UNKNOWN)
             confidence = 1.0 - self._novelty(question)
-        answer = replace(answer, confidence=round(confidence, 6))
+        answer = replace(answer, confidence=rounded(confidence))
         if rule is None:
             return answer
         stopped_by = "confidence" if sure else "window"
@@ -96,8 +98,7 @@ class Early:
         novelty = self._info.novelty
         if novelty is None:
             return 1.0
-        distance = float(question.decision.distances[0])
-        return novelty.rate(question.decision_point, distance)
+        return novelty.rate(question.decision_point, question.decision.novelty)
 
 
 class Product(Early):
@@ -115,7 +116,7 @@ class Product(Early):
             decided = question.decided[factor]
             labels = self._info.tasks[factor].labels
             indices[factor] = labels.index(str(decided.label))
-            confidence *= decided.confidence
+            confidence *= decided.confidence or 0.0
             sure = sure and decided.stopped_by == "confidence"
         label = task.labels[product_label(task.factors, indices)]
         decision = question.decision._replace(label=label)

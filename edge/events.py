@@ -43,8 +43,8 @@ class Decided:
         task: the question.
         label: its answer; "unknown" if no trained label fits, None if the features are
             too large to be compared with the training rows.
-        confidence: the label's share of the votes, 0 to 1; with an error rate, the
-            calibrated probability that the label is right.
+        confidence: the calibrated probability that the label is right, 0 to 1; None
+            of a model without calibration.
         window_s: seconds from onset on which the decision is based.
         onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
@@ -66,7 +66,7 @@ class Decided:
 
     task: str
     label: str | None
-    confidence: float
+    confidence: float | None
     window_s: float
     onset_s: float
     latency_ms: float

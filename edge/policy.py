@@ -27,6 +27,11 @@ def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
     return tuple(flag for flag, holds in doubts.items() if holds)
 
 
+def rounded(confidence: float | None) -> float | None:
+    """A confidence in millionths."""
+    return None if confidence is None else round(confidence, 6)
+
+
 @dataclass(frozen=True)
 class Question:
     """What a policy is asked: a task of a contact at a decision point.
@@ -56,7 +61,7 @@ class Question:
         return replace(
             self.blank,
             label=decision.label,
-            confidence=decision.confidence,
+            confidence=rounded(decision.confidence),
             flags=(*self.blank.flags, *flags_of({**shared_doubts, **doubts})),
             nearest=tuple(map(info.trial, decision.neighbours.tolist())),
             decision=decision,

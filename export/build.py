@@ -79,6 +79,19 @@ class Builder:
         stored = self.by_decision_point(small, np.float32, name)
         return self.node("Cast", [stored], to=TensorProto.DOUBLE)
 
+    def stored(self, values: Sequence[Any], dtype: Any, name: str = "") -> str:
+        """As `by_decision_point`, of whole numbers that are stored in a smaller
+        type."""
+        small = [np.asarray(value).astype(dtype) for value in values]
+        stored = self.by_decision_point(small, dtype, name)
+        return self.node("Cast", [stored], to=TensorProto.DOUBLE)
+
+    def shifted(self, operator: str, inputs: list[str], shifts: Sequence[int]) -> str:
+        """Name of an operator's whole result, divided by 2^shift and rounded."""
+        parts = self.by_decision_point([2.0**-shift for shift in shifts])
+        product = self.node(operator, inputs)
+        return self.node("Round", [self.node("Mul", [product, parts])])
+
     def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
         """Name of some columns of x (n, width); of x itself where they are all."""
         if len(columns) == width:

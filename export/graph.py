@@ -21,8 +21,9 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
-from edge.tools.teaching import label_tables
+from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
+from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
 from train.pipeline import ContactClassifier
 from train.stopping import SequentialClassifier
 
@@ -124,7 +125,8 @@ def _decision_points(
 def _convert(scope: Any, operator: Any, container: Any) -> None:
     model: ContactClassifier | SequentialClassifier = operator.raw_operator
     points = _decision_points(model)
-    last, early = points[-1], isinstance(model, SequentialClassifier)
+    last = points[-1]
+    early = isinstance(model, SequentialClassifier)
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
@@ -141,6 +143,8 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     off = [off for _, off in projected.values()]
     off_most = off[0] if len(off) == 1 else build.node("Max", off)
     build.node("Squeeze", [off_most, build.ints(1)], names["out_of_range"])
+    if isinstance(model, SequentialClassifier):
+        _novelty(build, x, model.space_, names["novelty"])
     for task, choice in model.choices.items():
         space = last.spaces_[task]
         grids = [point.projections_[space].grid_ for point in points]
@@ -185,6 +189,39 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
             build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
 
 
+def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
+    """Nodes that score how unlike all training trials features (n, p) are; see
+    `train.novelty`."""
+    points = space.points
+    means = build.by_decision_point_small([p.mean for p in points])
+    centred = build.node("Sub", [x, means])
+    gains = build.by_decision_point_small([p.gain for p in points])
+    rounded = build.node("Round", [build.node("Mul", [centred, gains])])
+    steps, _ = build.clipped(rounded, [CLIP * 2.0**STEP_BITS] * len(points))
+    weights = build.stored([space.weights], np.int16)
+    z = build.shifted("MatMul", [steps, weights], [space.shift] * len(points))
+    squares = build.node("ReduceSumSquare", [steps, build.ints(1)], keepdims=1)
+    inside = build.node("ReduceSumSquare", [z, build.ints(1)], keepdims=1)
+    outside = build.node("Sub", [squares, inside])
+    outside = build.node("Max", [outside, build.constant(1.0)])
+    whitening = build.by_decision_point_small([p.whitening for p in points])
+    y = build.shifted("MatMul", [z, whitening], [p.shift for p in points])
+    y, _ = build.clipped(y, [FARTHEST] * len(points))
+    # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
+    columns = build.stored([-2.0 * p.rows.T for p in points], np.int16, NOVELTY_COLUMNS)
+    lengths = build.by_decision_point(
+        [(p.rows**2).sum(axis=1) for p in points], name=NOVELTY_LENGTHS
+    )
+    length = build.node("ReduceSumSquare", [y, build.ints(1)], keepdims=1)
+    distances = build.node("Gemm", [y, columns, lengths])
+    nearest, _ = build.nodes("TopK", [distances, build.ints(1)], ["", ""], largest=0)
+    root = build.node("Sqrt", [build.node("Add", [nearest, length])])
+    product = build.node("Mul", [build.node("Sqrt", [outside]), root])
+    units = build.by_decision_point([p.unit for p in points])
+    scaled = build.node("Mul", [product, units])
+    build.node("Squeeze", [scaled, build.ints(1)], output)
+
+
 def _label_distances(
     build: Builder, task: str, squares: str, labels: NDArray[np.int64], classes: int
 ) -> str:
@@ -220,6 +257,8 @@ def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str,
         if isinstance(model, SequentialClassifier) or model.products_:
             outputs.append((f"{task}_label_distances", DoubleTensorType([None, None])))
     outputs.append(("out_of_range", DoubleTensorType([None])))
+    if isinstance(model, SequentialClassifier):
+        outputs.append(("novelty", DoubleTensorType([None])))
     return outputs
 
 

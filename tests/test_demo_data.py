@@ -37,4 +37,5 @@ def test_the_committed_golden_outputs_are_met(edge):
     status, checks, _ = edge("verify", "--model", demo.MODEL, "--golden", GOLDEN)
     assert status == 0
     assert {check["name"] for check in checks} >= {"series counts", "object_neighbours"}
-    assert min(check["rows"] for check in checks) >= len(demo.recordings())
+    rows = [check["rows"] for check in checks if "decision" not in check["name"]]
+    assert min(rows) >= len(demo.recordings())

@@ -15,7 +15,6 @@ OPTIONAL = (
     "edge/early.py",
     "edge/model/agreement.py",
     "edge/model/graph.py",
-    "edge/model/stopping.py",
     "edge/output/touch_map.py",
     "edge/recording.py",
     "edge/touch/joint_stream.py",

@@ -21,6 +21,7 @@ from train.evaluate import (
     Result,
     choose,
     evaluate,
+    finest,
     fits,
     group_folds,
     stratified_folds,
@@ -141,8 +142,8 @@ class Choosing:
         self._dataset, self._y, self.tried, self._samples = dataset, y, tried, samples
         self._jobs, self._progress, self._leave_out = jobs, progress, leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        finest = max(y, key=lambda task: len(set(y[task].tolist())))
-        self._folds = stratified_folds(y[finest], fold_count(len(y[finest]), quick))
+        labels = y[finest(y)]
+        self._folds = stratified_folds(labels, fold_count(len(labels), quick))
         kinds = (
             kinds_of([t.recording for t in dataset.trials])
             if leave_out == LEAVE_OUT

@@ -94,6 +94,11 @@ class Promise(Result):
         return wilson(self.right / self.variance, self.total / self.variance)
 
 
+def finest(y: Labels) -> str:
+    """The task with most labels, or the first of several by name."""
+    return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
+
+
 def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int64]:
     """(n,) folds in which each class is spread evenly; the same for the same labels."""
     order = np.random.default_rng(SEED).permutation(len(y))

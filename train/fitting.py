@@ -20,6 +20,7 @@ from train.dataset import DataSet, Recordings, load_trials, read
 from train.evaluate import Labels
 from train.feature_sets import expand
 from train.mix import mix
+from train.novelty import MOST_COMPONENTS
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
 
@@ -30,9 +31,10 @@ at the same error (cody18, household)."""
 FIRST_S = 0.2
 """The first decision point."""
 MOST_TRIALS = 2000
-"""With more trials calibration takes minutes, so decision points must be asked for."""
-LARGEST_BYTES = 950_000
-"""Bytes of weights with which a model stays below 1 MB."""
+"""With more trials early decisions take minutes to calibrate, so their decision points
+must be asked for."""
+LARGEST_BYTES = 1_150_000
+"""Bytes of weights with which a model stays below 1.2 MB."""
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
 more than this share of the remainder."""
@@ -480,27 +482,39 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
 def _decision_points(
     dataset: DataSet, settings: Settings, options: FitOptions, notes: list[str]
 ) -> tuple[float, ...]:
-    """The decision points asked for, or the usual ones where they can be calibrated."""
+    """The decision points asked for, or the usual ones; none without calibration."""
     if options.decision_points_s is not None:
+        if not options.decision_points_s:
+            notes.append(
+                "decisions carry no confidence, as the model has no decision points"
+            )
         return tuple(options.decision_points_s)
     tested = int((settings.folds >= 0).sum())
-    if not FEWEST <= tested <= MOST_TRIALS:
+    if tested < FEWEST:
         notes.append(
-            f"no decision points before the full window: {tested} trials are not the "
-            f"{FEWEST} to {MOST_TRIALS} that are calibrated by default"
+            "decisions carry no confidence and none is early: calibration needs at "
+            f"least {FEWEST} trials, not {tested}"
         )
         return ()
+    if tested > MOST_TRIALS:
+        notes.append(
+            f"no decision points before the full window: {tested} trials are more than "
+            f"the {MOST_TRIALS} for which they are made by default; --decision-points "
+            "asks for them"
+        )
+        return (settings.window_s,)
     bytes_a_point = _bytes_a_point(dataset, settings.choices, options.samples)
+    most_bytes = LARGEST_BYTES - _bytes_of_novelty(dataset, options.samples)
     points: list[float] = []
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
         step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
         points = _rising(step_s, settings.window_s)
-        if len(points) * bytes_a_point <= LARGEST_BYTES:
+        if len(points) * bytes_a_point <= most_bytes:
             if every_s > STEPS_S[0]:
                 notes.append(
                     f"{len(points)} decision points, one every {step_s:g} s, so that "
-                    "the model stays below 1 MB; --decision-points asks for more"
+                    "the model stays below 1.2 MB; --decision-points asks for more"
                 )
             return tuple(points)
     megabytes = len(points) * bytes_a_point / 1e6
@@ -508,7 +522,7 @@ def _decision_points(
         "no decision points before the full window: they would make the model about "
         f"{megabytes:.1f} MB; --decision-points asks for them"
     )
-    return ()
+    return (settings.window_s,)
 
 
 def _bytes_a_point(
@@ -523,7 +537,13 @@ def _bytes_a_point(
         classes = len(set(dataset.labels(task).tolist()))
         components = min(choice.components, 2 * classes, trials)
         size += components * (4 * columns + 8 * trials)
-    return size
+    every_column = sum(widths.values())
+    return size + 8 * every_column + 2 * MOST_COMPONENTS * trials
+
+
+def _bytes_of_novelty(dataset: DataSet, samples: int) -> int:
+    """Bytes of the weights that score novelty at all decision points."""
+    return 2 * MOST_COMPONENTS * sum(dataset.widths(samples))
 
 
 def _rising(step_s: float, window_s: float) -> list[float]:

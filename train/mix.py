@@ -26,7 +26,14 @@ from train.choose import (
     promised,
 )
 from train.dataset import DataSet
-from train.evaluate import AnswerTable, Labels, evaluate, group_folds, stratified_folds
+from train.evaluate import (
+    AnswerTable,
+    Labels,
+    evaluate,
+    finest,
+    group_folds,
+    stratified_folds,
+)
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid
@@ -145,8 +152,7 @@ class Mixing:
         """The answers with single trials, and with entire groups, left out."""
         labels = {task: y[self.own] for task, y in self.y.items()}
         count = fold_count(int(self.own.sum()), self.quick)
-        finest = max(labels, key=lambda task: len(set(labels[task].tolist())))
-        by_trial = self.answers(grids, stratified_folds(labels[finest], count))
+        by_trial = self.answers(grids, stratified_folds(labels[finest(labels)], count))
         groups = None
         if self.leave_out != TRIAL:
             groups = self.dataset.part(self.own).groups(self.leave_out)

@@ -187,12 +187,10 @@ class Decided(NamedTuple):
         labels: (m,) indices.
         distances: (m, classes) of the nearest answer with each label, see
             `label_distances`, `ContactClassifier.slopes_` and `edge.model.agreement`.
-        nearest: (m,) distance of the nearest trial.
     """
 
     labels: NDArray[np.int64]
     distances: NDArray[np.float64]
-    nearest: NDArray[np.float64]
 
 
 class ContactClassifier:
@@ -386,21 +384,18 @@ class ContactClassifier:
     def decide(self, X: NDArray[np.float64]) -> dict[str, Decided]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
         graph's votes."""
-        labels, distances, nearest = {}, {}, {}
+        labels = {}
+        distances = {}
         for task, known in self.labels_.items():
             squares = self.squares(task, X)
             labels[task] = vote(known[self.nearest(task, squares)])
             to_labels = label_distances(squares, known, len(self.classes_[task]))
             distances[task] = to_labels * self.slopes_[task]
-            nearest[task] = np.sqrt(squares.min(axis=1))
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
             distances |= nearest_answers
-        return {
-            task: Decided(labels[task], distances[task], nearest[task])
-            for task in labels
-        }
+        return {task: Decided(labels[task], distances[task]) for task in labels}
 
 
 def columns_of(

@@ -26,6 +26,7 @@ labels then names nothing, so an `unknown` for a trained object is an error of i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -38,6 +39,8 @@ from edge.errors import InputError
 from edge.model.novelty import NOVELTY_RATE, Novelty
 from edge.model.stopping import Stopping, margin
 from edge.touch.features import FEATURES
+from train.evaluate import finest, stratified_folds
+from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
 from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
@@ -46,38 +49,44 @@ from train.threads import single_thread
 FEWEST = 20
 """Trials that calibration needs."""
 PULL = 0.5
-"""Weight of the prior of a logistic regression, a slope of 1 a standard deviation."""
+"""Weight of the prior of a margin's slope, 1 a standard deviation, and of the
+intercept's, 0."""
+DOUBT = 1.0
+"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
+DOUBT_PULL = 10.0
+"""Weight of this prior for an excess of a standard deviation. It is heavy because few
+held-out trials are as novel as what a robot may meet."""
+LEAST_DOUBT = 0.5
+"""The odds fall at least by the root of the novelty, for the same reason."""
 LEAST_SLOPE = 1e-3
 """Smallest slope a standard deviation: a larger margin never makes a label less
 likely."""
-NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
 
 
-Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64], NDArray[np.float64]]]
-"""{task: labels, margins and nearest distances, (decision points, m) each}."""
+Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64]]]
+"""{task: labels and margins, (decision points, m) each}."""
 
 
 def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answers:
     """What models, one for each decision point, answer to vectors (points, m, p)."""
     points = [_answers(model, x) for model, x in zip(models, X, strict=True)]
-    by_task = {
-        task: zip(*(point[task] for point in points), strict=True) for task in points[0]
-    }
-    return {
-        task: (np.array(labels), np.array(margins), np.array(distances))
-        for task, (labels, margins, distances) in by_task.items()
-    }
+    by_task = {}
+    for task in points[0]:
+        labels = np.array([point[task][0] for point in points])
+        margins = np.array([point[task][1] for point in points])
+        by_task[task] = labels, margins
+    return by_task
 
 
 def _answers(
     model: ContactClassifier, x: NDArray[np.float64]
 ) -> dict[str, tuple[Any, ...]]:
-    """{task: labels, margins and nearest distances} of vectors (m, p)."""
+    """{task: labels and margins} of vectors (m, p)."""
     answered = {}
-    for task, (labels, distances, nearest) in model.decide(x).items():
+    for task, (labels, distances) in model.decide(x).items():
         pairs = zip(distances.tolist(), labels, strict=True)
         margins = [margin(to_labels, int(label)) for to_labels, label in pairs]
-        answered[task] = model.classes_[task][labels], margins, nearest
+        answered[task] = model.classes_[task][labels], margins
     return answered
 
 
@@ -126,25 +135,65 @@ def _fold(
         return answers(models, X[:, left_out])
 
 
-def logistic(
-    margins: NDArray[np.float64], right: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Slope (above 0) and intercept of P(right) as a logistic function of margins of
-    any shape."""
-    margins, right = margins.ravel(), right.ravel()
-    middle, spread = float(margins.mean()), float(margins.std()) or 1.0
-    columns = np.stack([(margins - middle) / spread, np.ones_like(margins)], axis=1)
-    solution = prior = np.array([1.0, 0.0])
+@dataclass(frozen=True)
+class Curve:
+    """The probability that a label is right.
+
+    It is the logistic function of slope * margin + intercept - doubt * excess, where the
+    excess is the part of the novelty above that of half of the trials (`excess_of`).
+    """
+
+    slope: float
+    intercept: float
+    doubt: float
+
+    @classmethod
+    def of(
+        cls,
+        margins: NDArray[np.float64],
+        excess: NDArray[np.float64],
+        right: NDArray[np.bool_],
+    ) -> Curve:
+        """The most likely curve for some answers; arrays of one shape."""
+        columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
+        middle = columns.mean(axis=0)
+        spread = columns.std(axis=0)
+        # The spread of equal values is the rounding of their mean.
+        spread[spread <= 1e-12 * np.abs(middle)] = 1.0
+        ones = np.ones((len(columns), 1))
+        scaled = np.hstack([(columns - middle) / spread, ones])
+        prior = np.array([1.0, DOUBT * spread[1], 0.0])
+        solution = _logistic(scaled, right.ravel(), prior)
+        slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
+        intercept = float(solution[2] - slopes @ middle)
+        return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
+
+    def probabilities(
+        self, margins: NDArray[np.float64], excess: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """That labels with these margins are right, in the shape of the margins."""
+        logits = self.slope * margins + self.intercept - self.doubt * excess
+        return np.asarray(expit(logits))
+
+
+def _logistic(
+    columns: NDArray[np.float64],
+    right: NDArray[np.bool_],
+    prior: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(3,) weights of columns (m, 3) for the log odds of being right."""
+    solution = prior
+    pull = np.array([PULL, DOUBT_PULL, PULL])
 
     def loss(parameters: NDArray[np.float64]) -> float:
         logits = columns @ parameters
         log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
-        return float(log_loss + PULL / 2 * np.square(parameters - prior).sum())
+        return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
 
     for _ in range(500):
         p = expit(columns @ solution)
-        gradient = columns.T @ (p - right) + PULL * (solution - prior)
-        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + PULL * np.eye(2)
+        gradient = columns.T @ (p - right) + pull * (solution - prior)
+        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
         step = np.linalg.solve(hessian, gradient)
         # Far from the optimum, whole steps may go back and forth for ever. Near it,
         # they converge, and rounding hides what the loss gains.
@@ -153,40 +202,21 @@ def logistic(
         solution = solution - step
         if np.abs(step).max() < 1e-10:
             break
-    slope = max(float(solution[0]), LEAST_SLOPE) / spread
-    return slope, float(solution[1]) - slope * middle
+    return solution
 
 
-def confidences(
-    slopes: Sequence[float], intercepts: Sequence[float], margins: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(points, m) probabilities that labels with these margins (points, m) are
-    right."""
-    return np.asarray(
-        expit(np.array(slopes)[:, None] * margins + np.array(intercepts)[:, None])
-    )
+def excess_of(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(points, n) by how much the logarithm of the novelty (points, n) is above that of
+    half of the trials; 0 below."""
+    typical = np.array([row[0] for row in novelty.limits])[:, None]
+    ratios = np.maximum(np.nan_to_num(scores), typical) / typical
+    return np.asarray(np.log(ratios))
 
 
-def novelty(task: str, distances: NDArray[np.float64]) -> Novelty:
-    """Limits of the distances (points, n) of held-out trials to the nearest training
-    trial."""
-    limits = [
-        [float(np.quantile(row, 1.0 - rate)) for rate in NOVELTY_RATES]
-        for row in distances
-    ]
-    return Novelty(task, NOVELTY_RATES, tuple(map(tuple, limits)))
-
-
-def unlike(novelty: Novelty, distances: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(points, n) whether contacts are unknown, from their nearest distances (points,
-    n)."""
+def unlike(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(points, n) whether contacts are unknown, from their novelty (points, n)."""
     limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
-    return np.asarray(distances > limits[:, None])
-
-
-def finest(y: Mapping[str, NDArray[np.str_]]) -> str:
-    """The task with most labels, or the first of several by name."""
-    return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
+    return np.asarray(scores > limits[:, None])
 
 
 class SequentialClassifier:
@@ -204,10 +234,13 @@ class SequentialClassifier:
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
         columns_: the columns of the vectors that these take, rising.
+        types_: names and widths of their features.
         right_: {task: (decision points, n) whether the labels named without a trial are
             right}.
+        unknown_: (decision points, n) whether trials are unlike all others.
         stopping_: {task: Stopping}.
-        novelty_: Novelty.
+        space_: in which novelty is scored.
+        novelty_: its limits.
     """
 
     def __init__(
@@ -248,43 +281,76 @@ class SequentialClassifier:
         if n < FEWEST:
             raise InputError(
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
-                "export "
-                "without decision points"
+                "export without decision points"
             )
+        self._fit_points(X, y, own)
+        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
+        self._fit_novelty(X, y, folds)
+        form = self.features, self.widths
+        by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
+        right = {}
+        margins = {}
+        for task in self.choices:
+            right[task] = np.zeros(X.shape[:2], dtype=bool)
+            margins[task] = np.zeros(X.shape[:2])
+            for k, answers_of in enumerate(by_fold):
+                labels, sure = answers_of[task]
+                right[task][:, folds == k] = labels == y[task][folds == k]
+                margins[task][:, folds == k] = sure
+        self.right_ = right
+        self._certify(margins, self.unknown_, folds, tested)
+        return self
+
+    def _fit_points(
+        self,
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        own: NDArray[np.bool_] | None,
+    ) -> None:
+        """Fit the classifier of each decision point."""
         kept = _taken(self.choices.values(), self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(kept, self.features, widths)
-        types = types_of(kept, self.features, widths)
-        model = partial(ContactClassifier, self.choices, *types)
-        with single_thread():
-            self.decision_points_ = [
-                model().fit(x, y, own) for x in X[..., self.columns_]
-            ]
+        self.types_ = types_of(kept, self.features, widths)
         self.n_features_in_ = len(self.columns_)
-        form = self.features, self.widths
-        by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
+        self.decision_points_ = []
+        with single_thread():
+            for x in X[..., self.columns_]:
+                classifier = ContactClassifier(self.choices, *self.types_)
+                self.decision_points_.append(classifier.fit(x, y, own))
+
+    def _fit_novelty(
+        self,
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        folds: NDArray[np.int64],
+    ) -> None:
+        """Fit the space of novelty, and set its limits by held-out trials."""
         most = finest({task: y[task] for task in self.choices})
-        nearest, unknown = np.empty(X.shape[:2]), np.zeros(X.shape[:2], dtype=bool)
-        self.right_ = right = {
-            task: np.zeros(X.shape[:2], dtype=bool) for task in self.choices
-        }
-        margins = {task: np.empty(X.shape[:2]) for task in self.choices}
-        for k, answers_of in enumerate(by_fold):
-            nearest[:, folds == k] = answers_of[most][2]
-            for task, (named, sure, _) in answers_of.items():
-                right[task][:, folds == k] = named == y[task][folds == k]
-                margins[task][:, folds == k] = sure
-        for k in range(len(by_fold)):
-            others = (folds >= 0) & (folds != k) & (y[most] != "")
-            limits = novelty(most, nearest[:, others])
-            unknown[:, folds == k] = unlike(limits, nearest[:, folds == k])
-        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
-        self.novelty_ = novelty(most, nearest[:, tested[most]])
-        scores = {
-            task: cross_fitted(margins[task], right[task], folds, tested[task])
-            for task in self.choices
-        }
-        courses = self._courses(scores, right, unknown, tested)
+        kept = np.ascontiguousarray(X[..., self.columns_])
+        _, widths = self.types_
+        with single_thread():
+            self.space_ = NoveltySpace.of(kept, y[most], widths)
+        novelty_folds = np.where(folds >= 0, stratified_folds(y[most], FOLDS), -1)
+        scores = held_out_scores(kept, y[most], novelty_folds, widths, self.jobs)
+        self.novelty_ = limits_of(most, scores[:, folds >= 0])
+        self._excess = excess_of(self.novelty_, scores)
+        self.unknown_ = unlike(self.novelty_, scores)
+
+    def _certify(
+        self,
+        margins: Mapping[str, NDArray[np.float64]],
+        unknown: NDArray[np.bool_],
+        folds: NDArray[np.int64],
+        tested: Mapping[str, NDArray[np.bool_]],
+    ) -> None:
+        """Set the stopping rules and curves of each task."""
+        excess = self._excess
+        scores = {}
+        for task, right in self.right_.items():
+            answered = margins[task], excess, right
+            scores[task] = cross_fitted(*answered, folds, tested[task])
+        courses = self._courses(scores, self.right_, unknown, tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -292,22 +358,26 @@ class SequentialClassifier:
                 rules[factor] = following(
                     rules[factor], rules[task], courses[factor], seconds
                 )
+        full, _ = candidates(len(seconds))
         self.stopping_ = {}
         for task, tests in tested.items():
-            known = margins[task][:, tests], right[task][:, tests]
-            _, wrong = courses[task].under(candidates(len(seconds))[0])
-            n, errors = len(wrong), int(wrong.sum())
-            slopes, intercepts = zip(*map(logistic, *known), strict=True)
+            evidence = margins[task][:, tests], excess[:, tests]
+            right = self.right_[task][:, tests]
+            together = Curve.of(*evidence, right)
+            curves = [Curve.of(*point) for point in zip(*evidence, right, strict=True)]
+            _, wrong = courses[task].under(full)
             self.stopping_[task] = Stopping(
-                slopes,
-                intercepts,
-                *logistic(*known),
-                tuple(rules[task]),
-                n,
-                errors,
-                RISK,
+                slopes=tuple(curve.slope for curve in curves),
+                intercepts=tuple(curve.intercept for curve in curves),
+                doubts=tuple(curve.doubt for curve in curves),
+                slope=together.slope,
+                intercept=together.intercept,
+                doubt=together.doubt,
+                rules=tuple(rules[task]),
+                trials=len(wrong),
+                wrong=int(wrong.sum()),
+                risk=RISK,
             )
-        return self
 
     @property
     def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
@@ -328,17 +398,28 @@ class SequentialClassifier:
         """
         with single_thread():
             answered = answers(self.decision_points_, X)
-        confidence, scores = {}, {}
-        for task, (_, margins, _) in answered.items():
+        scores = self.space_.scores(X)
+        excess = excess_of(self.novelty_, scores)
+        right = {}
+        confidence = {}
+        together = {}
+        for task, (labels, margins) in answered.items():
             stopping = self.stopping_[task]
-            confidence[task] = confidences(
-                stopping.slopes, stopping.intercepts, margins
-            )
-            scores[task] = confidences([stopping.slope], [stopping.intercept], margins)
-        right = {task: labels == y[task] for task, (labels, *_) in answered.items()}
-        unknown = unlike(self.novelty_, answered[self.novelty_.task][2])
+            right[task] = labels == y[task]
+            pooled = Curve(stopping.slope, stopping.intercept, stopping.doubt)
+            together[task] = pooled.probabilities(margins, excess)
+            confidence[task] = np.empty(margins.shape)
+            for point in range(len(margins)):
+                curve = Curve(
+                    stopping.slopes[point],
+                    stopping.intercepts[point],
+                    stopping.doubts[point],
+                )
+                evidence = margins[point], excess[point]
+                confidence[task][point] = curve.probabilities(*evidence)
+        unknown = unlike(self.novelty_, scores)
         tested = {task: y[task] != "" for task in right}
-        return right, confidence, self._courses(scores, right, unknown, tested)
+        return right, confidence, self._courses(together, right, unknown, tested)
 
     def _courses(
         self,
@@ -373,15 +454,18 @@ def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
 
 def cross_fitted(
     margins: NDArray[np.float64],
+    excess: NDArray[np.float64],
     right: NDArray[np.bool_],
     folds: NDArray[np.int64],
     tested: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """(points, n) confidences for rules, each fold's by the curve of the other folds'
     tested."""
-    out = np.zeros(right.shape)
+    confidences = np.zeros(right.shape)
     for fold in range(int(folds.max()) + 1):
-        own, others = folds == fold, tested & (folds != fold)
-        slope, intercept = logistic(margins[:, others], right[:, others])
-        out[:, own] = confidences([slope], [intercept], margins[:, own])
-    return out
+        left_out = folds == fold
+        others = tested & ~left_out
+        curve = Curve.of(margins[:, others], excess[:, others], right[:, others])
+        evidence = margins[:, left_out], excess[:, left_out]
+        confidences[:, left_out] = curve.probabilities(*evidence)
+    return confidences

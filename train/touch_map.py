@@ -29,7 +29,8 @@ class Touch:
         onset_s: seconds on the run's clock.
         position: (x, y, z) in the map's frame.
         labels: {task: label}, None where the model could not tell.
-        confidence: {task: share of the votes}.
+        confidence: {task: calibrated probability that the label is right}; 0 where
+            the model has no calibration.
     """
 
     contact: int
@@ -46,7 +47,7 @@ def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
             str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"]))
         )
     x, y, z = map(float, entry["place"])
-    onset_s, confidence = float(entry["onset_s"]), float(entry["confidence"])
+    onset_s, confidence = float(entry["onset_s"]), float(entry["confidence"] or 0.0)
     if not all(map(math.isfinite, (x, y, z, onset_s, confidence))):
         raise ValueError("not finite")
     task, label = (

@@ -107,8 +107,9 @@ def decision_text(line: Mapping[str, Any]) -> str:
     time = line["onset_s"] + line["window_s"]
     number = _contact(line)
     contact = number and f"{number}:"
-    confidence = f"{bar(line['confidence'])} {line['confidence']:4.0%}"
-    text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16} {confidence}"
+    text = f"{time:8.3f} s {contact} {line['task']:<10} {label:<16}"
+    if line["confidence"] is not None:
+        text += f" {bar(line['confidence'])} {line['confidence']:4.0%}"
     return f"{text}  ({'; '.join(notes)})" if notes else text
 
 

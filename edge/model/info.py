@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
-FORMAT = 6
+FORMAT = 7
 OPTIONAL = (
     "decision_points_s stopping novelty joints kernels name trials taught".split()
 )

@@ -29,7 +29,9 @@ class Decision(NamedTuple):
     Attributes:
         label: the answer. A task that is decided together with others (see
             `edge.model.agreement`) may have another label than most votes.
-        confidence: the label's share of the votes, 0 to 1.
+        confidence: the calibrated probability that the label is right, 0 to 1; None
+            of a model without calibration.
+        votes: the label's share of the votes, 0 to 1.
         scores: (labels,) share of the votes of each label.
         distances: (k,) of the neighbours, nearest first, in the space of the
             projection.
@@ -42,16 +44,20 @@ class Decision(NamedTuple):
             agree.
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.projection.Grid`.
+        novelty: how unlike all training trials the features are (see
+            `edge.model.novelty`), of a model with decision points.
     """
 
     label: str
-    confidence: float
+    confidence: float | None
+    votes: float
     scores: NDArray[np.float64]
     distances: NDArray[np.float64]
     neighbours: NDArray[np.int64]
     tie: bool
     label_distances: NDArray[np.float64] | None = None
     out_of_range: bool = False
+    novelty: float = 0.0
 
 
 class Model:
@@ -219,6 +225,9 @@ class Model:
         distances = {task: answers.get(f"{task}_label_distances") for task in tasks}
         if self.info.products:
             self._agree(labels, distances)
+        last = len(self.decision_points_s) - 1
+        point = last if decision_point is None else decision_point
+        novelty = float(answers.get("novelty", 0.0))
         decisions: dict[str, Decision] = {}
         for task, entry in tasks.items():
             index = int(labels[task])
@@ -230,15 +239,34 @@ class Model:
                 )
             decisions[task] = Decision(
                 label=entry.labels[index],
-                confidence=shares[index],
+                confidence=self._confidence(
+                    task, point, distances[task], index, novelty
+                ),
+                votes=shares[index],
                 scores=scores,
                 distances=answers[f"{task}_distances"],
                 neighbours=answers[f"{task}_neighbours"],
                 tie=shares.count(max(shares)) > 1,
                 label_distances=distances[task],
                 out_of_range=bool(answers["out_of_range"] > 0.0),
+                novelty=novelty,
             )
         return decisions
+
+    def _confidence(
+        self,
+        task: str,
+        decision_point: int,
+        distances: NDArray[np.float64] | None,
+        label: int,
+        novelty: float,
+    ) -> float | None:
+        """The calibrated probability that a label is right; None uncalibrated."""
+        stopping = self.info.stopping.get(task)
+        if stopping is None or self.info.novelty is None or distances is None:
+            return None
+        excess = self.info.novelty.excess(decision_point, novelty)
+        return stopping.confidence(decision_point, distances.tolist(), label, excess)
 
     def _agree(self, labels: dict[str, Any], distances: dict[str, Any]) -> None:
         """Give products and their factors the nearest answer in which they agree."""
@@ -274,6 +302,8 @@ def _outputs(info: ModelInfo) -> dict[str, tuple[str, list[int]]]:
     """{output: its type, and its shape for one vector} of a graph with this
     metadata."""
     outputs: dict[str, tuple[str, list[int]]] = {"out_of_range": ("tensor(double)", [])}
+    if info.decision_points_s:
+        outputs["novelty"] = "tensor(double)", []
     for task, entry in info.tasks.items():
         outputs |= {
             f"{task}_label": ("tensor(int64)", []),

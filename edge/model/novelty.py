@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from edge.config import ConfigTable
@@ -28,25 +29,31 @@ def check_rate(value: float, name: str) -> None:
 class Novelty:
     """When a contact is unlike everything in training.
 
-    The distance to the nearest training trial is taken in the space of the task with
-    most labels: of all spaces, it distinguishes objects best.
+    The graph scores every contact in a space of its own (`train.novelty`).
 
     Attributes:
-        task: whose space it is. It names no label for an unknown contact: a new object
+        task: with most labels. It names no label for an unknown contact: a new object
             can still be called soft or movable.
-        rates: shares of trained contacts that lie farther than the limits, falling.
-        limits: (decision points, rates) distances.
+        rates: shares of trained contacts that score higher than the limits, falling
+            from one half.
+        limits: (decision points, rates) of the score.
     """
 
     task: str
     rates: tuple[float, ...]
     limits: tuple[tuple[float, ...], ...]
 
-    def rate(self, decision_point: int, distance: float) -> float:
-        """The smallest novelty rate at which the distance counts as unknown; 1 if it
-        never does."""
+    def rate(self, decision_point: int, score: float) -> float:
+        """The smallest novelty rate at which a score counts as unknown; 1 if it never
+        does."""
         limits = zip(self.rates, self.limits[decision_point], strict=True)
-        return min((rate for rate, limit in limits if distance > limit), default=1.0)
+        return min((rate for rate, limit in limits if score > limit), default=1.0)
+
+    def excess(self, decision_point: int, score: float) -> float:
+        """The logarithm of a score over that of half of the trained contacts; 0 below
+        it."""
+        typical = self.limits[decision_point][0]
+        return math.log(score / typical) if score > typical > 0.0 else 0.0
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Novelty:

@@ -41,11 +41,12 @@ TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
 
 UNUSUAL = "functions, inner graphs or sparse tensors"
 
-TYPES = {1: "<f4", 7: "<i8", 9: "|b1", 11: "<f8"}
+TYPES = {1: "<f4", 5: "<i2", 7: "<i8", 9: "|b1", 11: "<f8"}
 """{type of a TensorProto: its numbers}."""
 
 TENSORS = {
     1: "tensor(float)",
+    5: "tensor(int16)",
     7: "tensor(int64)",
     9: "tensor(bool)",
     11: "tensor(double)",

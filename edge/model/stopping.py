@@ -67,11 +67,12 @@ class Stopping:
     """The calibration of one task's early decisions, which `train.stopping` makes.
 
     Attributes:
-        slopes, intercepts: of each decision point: the probability that the label is
-            right is the logistic function of slope * `margin` + intercept.
-        slope, intercept: the same of all decision points together, for the rules. A
-            point's own curve seldom rises high early, so with it the rules would wait
-            on clear contacts too.
+        slopes, intercepts, doubts: of each decision point: the probability that the
+            label is right is the logistic function of slope * `margin` + intercept -
+            doubt * `Novelty.excess`.
+        slope, intercept, doubt: the same of all decision points together, for the
+            rules. A point's own curve seldom rises high early, so with it the rules
+            would wait on clear contacts too.
         rules: in the order of rising error. Mean times fall along them, except from a
             factor's own rules to those that it shares with its product (see
             `edge.model.agreement`).
@@ -82,8 +83,10 @@ class Stopping:
 
     slopes: tuple[float, ...]
     intercepts: tuple[float, ...]
+    doubts: tuple[float, ...]
     slope: float
     intercept: float
+    doubt: float
     rules: tuple[StoppingRule, ...]
     trials: int
     wrong: int
@@ -94,15 +97,27 @@ class Stopping:
         """The smallest error rate that is certified."""
         return self.rules[0].error
 
-    def confidence(self, decision_point: int, evidence: float) -> float:
-        """Probability, 0 to 1, that a label with this `margin` is right."""
-        return _logistic(
-            self.slopes[decision_point] * evidence + self.intercepts[decision_point]
-        )
+    def confidence(
+        self, decision_point: int, distances: Sequence[float], label: int, excess: float
+    ) -> float:
+        """Probability, 0 to 1, that a label is right.
 
-    def sure(self, rule: StoppingRule, evidence: float) -> bool:
-        """Whether a label with this `margin` is sure enough for a rule."""
-        return _logistic(self.slope * evidence + self.intercept) >= rule.confidence
+        Args:
+            decision_point: its index.
+            distances: (labels,) of `edge.model.Decision.label_distances`.
+            label: its index.
+            excess: the contact's `Novelty.excess`.
+        """
+        log_odds = self.slopes[decision_point] * margin(distances, label)
+        log_odds += self.intercepts[decision_point]
+        return _logistic(log_odds - self.doubts[decision_point] * excess)
+
+    def sure(
+        self, rule: StoppingRule, distances: Sequence[float], label: int, excess: float
+    ) -> bool:
+        """Whether a label is sure enough for a rule; see `confidence`."""
+        log_odds = self.slope * margin(distances, label) + self.intercept
+        return _logistic(log_odds - self.doubt * excess) >= rule.confidence
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; or None."""
@@ -143,8 +158,10 @@ class Stopping:
         return cls(
             slopes=table.numbers("slopes", points, low=0.0, open_low=True),
             intercepts=table.numbers("intercepts", points),
+            doubts=table.numbers("doubts", points, low=0.0),
             slope=table.number("slope", low=0.0, open_low=True),
             intercept=table.number("intercept"),
+            doubt=table.number("doubt", low=0.0),
             rules=tuple(
                 StoppingRule(
                     error=rule.number("error", low=0.0, high=1.0, open_low=True),

@@ -74,6 +74,7 @@ def explanations(
             "task": task,
             "label": decision.label,
             "confidence": decision.confidence,
+            "votes": decision.votes,
             "nearest": list(map(trial, why.voters)),
             "rival": None if why.rival is None else trial(why.rival),
             "pulls": why.pulls,
@@ -84,7 +85,7 @@ def explanations(
 def text(line: dict[str, Any], info: ModelInfo) -> str:
     """An explanation for a person."""
     label, nearest, rival = line["label"], line["nearest"], line["rival"]
-    votes = round(line["confidence"] * len(nearest))
+    votes = round(line["votes"] * len(nearest))
     lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
     lines += [
         "  The nearest training trials, each with its distance:",

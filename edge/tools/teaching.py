@@ -20,8 +20,12 @@ from edge.files import parsing
 from edge.model.graph import Graph, coordinates_of
 from edge.model.info import METADATA_KEY, ModelInfo, Task
 from edge.model.model import Model
+from edge.model.onnx_file import Node
 from edge.tools.rewriting import rewritten
 
+NOVELTY_COLUMNS = "columns of novelty"
+NOVELTY_LENGTHS = "lengths of novelty"
+"""Constants in which a graph that scores novelty holds the training trials."""
 NEAREST_OF_LABEL = 3
 LABEL_SHARE = 20
 JOINED = ("category", "softness", "mobility")
@@ -179,6 +183,8 @@ def taught(
             further = _rows(graph, task, z, indices)
             further |= _votes(model, graph, entry, task, further)
             changed |= further
+        if NOVELTY_COLUMNS in graph.constants:
+            changed |= _novelty_rows(graph, vectors)
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
     trials = tuple(printable(Path(name).stem) for name in names)
     after = replace(
@@ -228,11 +234,45 @@ def label_indices(
     return np.array([index.get(trial.get(task, ""), -1) for trial in labels])
 
 
+def _novelty_rows(
+    graph: Graph, vectors: NDArray[np.float64]
+) -> dict[str, NDArray[Any]]:
+    """The constants of the novelty's rows with further ones.
+
+    A trial beyond the reach of the stored type is placed at its edge.
+    """
+    (product,) = (
+        node
+        for node in graph.makers.values()
+        if node.operator == "Gemm" and NOVELTY_LENGTHS in _sources(graph, node)
+    )
+    y = _values(graph, product.inputs[0], vectors)
+    limits = np.iinfo(graph.constants[NOVELTY_COLUMNS].dtype)
+    columns = np.clip(-2.0 * y.swapaxes(1, 2), limits.min + 1, limits.max - 1)
+    lengths = (0.25 * columns**2).sum(axis=1)
+    return _extended(graph, {NOVELTY_COLUMNS: columns, NOVELTY_LENGTHS: lengths})
+
+
+def _sources(graph: Graph, node: Node) -> set[str]:
+    """The constants of a product, taken by decision point or not."""
+    sources = set(node.inputs)
+    for name in node.inputs:
+        if name in graph.makers:
+            sources.update(graph.makers[name].inputs)
+    return sources
+
+
 def coordinates(
     graph: Graph, task: str, vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(points, m, components) whole coordinates of vectors (points, m, width)."""
-    name = coordinates_of(graph, task)
+    return _values(graph, coordinates_of(graph, task), vectors)
+
+
+def _values(
+    graph: Graph, name: str, vectors: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(points, m, ...) a value of the graph for vectors (points, m, width)."""
     points = []
     for point, x in enumerate(vectors):
         inputs = {"features": x, "decision_point": np.array([point])}
@@ -254,10 +294,18 @@ def _rows(
         f"lengths of {task}": lengths,
         f"labels of {task}": indices,
     }
+    return _extended(graph, further)
+
+
+def _extended(
+    graph: Graph, further: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Constants with further values along their last axis."""
     changed = {}
     for name, values in further.items():
         former = graph.constants[name]
-        shaped = values.reshape(*former.shape[:-1], len(indices)).astype(former.dtype)
+        shape = *former.shape[:-1], values.shape[-1]
+        shaped = values.reshape(shape).astype(former.dtype)
         changed[name] = np.concatenate([former, shaped], axis=-1)
     return changed
 

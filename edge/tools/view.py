@@ -55,7 +55,9 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
 
 def decision_text(event: Decided) -> str:
     """A decision as text."""
-    text = f"{printable(str(event.label))} ({event.confidence:.0%})"
+    text = printable(str(event.label))
+    if event.confidence is not None:
+        text += f" ({event.confidence:.0%})"
     return f"{text} [{', '.join(event.flags)}]" if event.flags else text
 
 

@@ -45,10 +45,9 @@ from edge.model.stopping import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
 from tests.bench import tables
 from train.dataset import read
-from train.evaluate import stratified_folds
+from train.evaluate import finest, stratified_folds
 from train.feature_sets import expand
 from train.rules import NEVER, THRESHOLDS, Course
-from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, compare_stopping

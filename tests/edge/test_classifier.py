@@ -120,7 +120,7 @@ def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(
     assert decided.label == "soft-fixed"
     assert decided.onset_s == 0.2
     assert decided.window_s == 1.2
-    assert decided.confidence == 1.0
+    assert decided.confidence is None  # not calibrated
     assert decided.flags == ("as_trained",)
     assert decided.decision.label == decided.label
 

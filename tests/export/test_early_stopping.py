@@ -294,6 +294,12 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
         point.projections_ = {
             own: point.projections_[own] for own in point.spaces_.values()
         }
+    space = sequential.space_
+    constants = []
+    for k, constant in enumerate(space.points):
+        rows = np.clip(space.coordinates(k, more[k]), -16383, 16383)
+        constants.append(replace(constant, rows=np.vstack([constant.rows, rows])))
+    sequential.space_ = replace(space, points=tuple(constants))
     (tmp_path / "taught.onnx").write_bytes(data)
     model = Model(tmp_path / "taught.onnx")
     described = replace(before.info, rows=48, tasks=model.info.tasks)
@@ -318,3 +324,21 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
         InputError, match=r"taught 3 trials after its error rates were certified"
     ):
         stopping_rules(model, 0.2)
+
+
+def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):
+    rng = np.random.default_rng(4)
+    width = early.info.samples * len(FEATURES)
+    X = rng.normal(size=(3, 60, width))
+    labels = np.repeat(["a", "b", "c"], 20)
+    choices = {"t": Choice("none", 4, 3)}
+    path = tmp_path / "model.onnx"
+    sequential, _ = fitted_model(path, early.info, choices, X, {"t": labels})
+    vectors = rng.normal(size=(9, width)) * 10.0 ** np.arange(-2, 7)[:, None]
+    scores = sequential.space_.scores(np.stack([vectors] * 3))
+    assert scores.min() > 0.0
+    for engine in ("onnxruntime", "numpy"):
+        loaded = Model(path, engine)
+        for point, expected in enumerate(scores.tolist()):
+            seen = [float(loaded.run(v[None], point)["novelty"][0]) for v in vectors]
+            assert seen == expected

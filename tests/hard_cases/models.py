@@ -55,7 +55,16 @@ def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
         for task, choice in fitted.choices.items()
     }
     rows = len(next(iter(fitted.labels_.values())))
-    return replace(shipped().info, tasks=tasks, samples=samples, rows=rows, trials=())
+    return replace(
+        shipped().info,
+        tasks=tasks,
+        samples=samples,
+        rows=rows,
+        trials=(),
+        decision_points_s=(),
+        stopping={},
+        novelty=None,
+    )
 
 
 def labels_for(X: Array, classes: int = 5, seed: int = 0) -> NDArray[np.str_]:

@@ -3,21 +3,33 @@ task."""
 
 import numpy as np
 import pytest
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from edge.errors import InputError
 from edge.model.novelty import NOVELTY_RATE
 from train.evaluate import stratified_folds
 from train.pipeline import Choice
-from train.stopping import SequentialClassifier, answers, confidences, logistic, unlike
+from train.stopping import (
+    DOUBT,
+    LEAST_DOUBT,
+    Curve,
+    SequentialClassifier,
+    answers,
+    excess_of,
+    unlike,
+)
 
 
-class TestLogistic:
+class TestCurve:
     def test_finds_the_curve_that_drew_the_outcomes(self):
         rng = np.random.default_rng(0)
-        margins = rng.normal(scale=2.0, size=20_000)
-        right = rng.random(len(margins)) < 1 / (1 + np.exp(-(0.5 * margins + 1.0)))
-        assert logistic(margins, right) == pytest.approx((0.5, 1.0), abs=0.05)
+        margins = rng.normal(scale=2.0, size=40_000)
+        excess = rng.exponential(0.5, size=len(margins))
+        chance = expit(0.5 * margins + 1.0 - 0.8 * excess)
+        curve = Curve.of(margins, excess, rng.random(len(margins)) < chance)
+        assert curve.slope == pytest.approx(0.5, abs=0.05)
+        assert curve.intercept == pytest.approx(1.0, abs=0.05)
+        assert curve.doubt == pytest.approx(0.8, abs=0.08)
 
     @pytest.mark.parametrize(
         "margins", [np.full(50, 25.0), np.append(np.linspace(0, 1, 30), 40)]
@@ -26,28 +38,42 @@ class TestLogistic:
     def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
         self, margins, right
     ):
-        slope, intercept = logistic(margins, np.full(len(margins), right))
+        outcomes = np.full(len(margins), right)
+        curve = Curve.of(margins, np.zeros(len(margins)), outcomes)
         mean, spread = margins.mean(), margins.std() or 1.0
-        errors = expit(slope * margins + intercept) - right
+        errors = expit(curve.slope * margins + curve.intercept) - right
         assert errors @ (margins - mean) == pytest.approx(
-            0.5 * spread * (1.0 - slope * spread)
+            0.5 * spread * (1.0 - curve.slope * spread)
         )
-        assert errors.sum() == pytest.approx(-0.5 * (intercept + slope * mean))
+        assert errors.sum() == pytest.approx(
+            -0.5 * (curve.intercept + curve.slope * mean)
+        )
 
     def test_a_larger_margin_never_speaks_against_a_label(self):
         margins = np.arange(100.0)
-        slope, _ = logistic(margins, margins < 50)
-        assert 0.0 < slope < 1e-3
+        curve = Curve.of(margins, np.zeros(100), margins < 50)
+        assert 0.0 < curve.slope < 1e-3
+
+    def test_novelty_never_speaks_for_a_label(self):
+        excess = np.linspace(0.0, 1.0, 400)
+        curve = Curve.of(np.zeros(400), excess, excess > 0.5)
+        assert curve.doubt == LEAST_DOUBT
+
+    def test_without_novel_trials_the_odds_fall_as_assumed(self):
+        rng = np.random.default_rng(3)
+        excess = np.full(50, 0.2)
+        curve = Curve.of(rng.normal(size=50), excess, rng.random(50) < 0.8)
+        assert curve.doubt == pytest.approx(DOUBT)
 
     def test_the_unit_of_the_distances_does_not_matter(self):
         rng = np.random.default_rng(2)
         margins, right = rng.normal(size=60), rng.random(60) < 0.8
-        in_metres, in_microns = (
-            confidences([a], [b], size * margins[None])
-            for size in (1.0, 1e-6)
-            for a, b in [logistic(size * margins, right)]
+        excess = np.zeros(60)
+        in_metres = Curve.of(margins, excess, right)
+        in_microns = Curve.of(1e-6 * margins, excess, right)
+        assert in_metres.probabilities(margins, excess) == pytest.approx(
+            in_microns.probabilities(1e-6 * margins, excess)
         )
-        assert in_metres == pytest.approx(in_microns)
 
 
 SECONDS = np.array([0.4, 0.8, 1.2])
@@ -76,18 +102,20 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
     assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
-    named, _, _ = answers(model.decision_points_, new)["t"]
+    named, _ = answers(model.decision_points_, new)["t"]
     assert (named[1:] == truth).all()
 
 
 def test_rules_ask_for_the_same_margin_at_every_decision_point():
     X, labels = touches(60)
     model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
-    _, margins, _ = answers(model.decision_points_, X)["t"]
+    _, margins = answers(model.decision_points_, X)["t"]
+    excess = excess_of(model.novelty_, model.space_.scores(X))
     *_, courses = model.judged(X, {"t": labels})
-    assert (
-        np.diff(courses["t"].confidences[0].ravel()[margins.argsort(axis=None)]) >= 0.0
-    ).all()
+    log_odds = logit(courses["t"].confidences[0])
+    stopping = model.stopping_["t"]
+    expected = stopping.slope * margins + stopping.intercept - stopping.doubt * excess
+    assert log_odds == pytest.approx(expected)
 
 
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
@@ -106,22 +134,20 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
     model = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
     assert (np.array(model.novelty_.limits) > 0.0).all()
-    assert (answers(model.decision_points_, X)["t"][2] == 0.0).all()
+    assert (model.space_.scores(X) == 0.0).all()
 
 
 def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
-    """A fold lies far from the others: of the many labels it is wrong, of the two it is
-    not."""
     X, labels = touches(200)
-    far = stratified_folds(labels) == 0
-    X[:, far, 5] = 500.0 * (1 + np.arange(far.sum()))
     each = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
     model = calibrated(choices, X, {"kind": labels, "thing": each})
     assert model.novelty_.task == "thing"
-    right = {task: own[-1] for task, own in model.right_.items()}
+    unknown = model.unknown_[-1]
+    right = {task: answers[-1] for task, answers in model.right_.items()}
+    assert 0 < (unknown & right["thing"]).sum() < 10
     assert model.stopping_["kind"].wrong == int((~right["kind"]).sum())
-    assert model.stopping_["thing"].wrong == int((~right["thing"] | far).sum())
+    assert model.stopping_["thing"].wrong == int((~right["thing"] | unknown).sum())
 
 
 def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
@@ -146,9 +172,7 @@ def test_what_no_task_takes_is_there_for_the_folds_alone():
     assert model.columns_.tolist() == list(range(6, 12))
     assert model.n_features_in_ == 6
     assert model.right_["t"][-1].all()
-    assert (
-        answers(model.decision_points_, X[..., model.columns_])["t"][2] == 0.0
-    ).all()
+    assert (model.space_.scores(X[..., model.columns_]) == 0.0).all()
 
 
 def test_too_few_trials_are_refused():

@@ -107,7 +107,9 @@ def _draw(
             axis.grid(alpha=0.25)
         column[3].set_xlabel("seconds from onset")
         if decided is not None:
-            share = f"{decided.confidence:.0%} after {decided.window_s:g} s"
+            share = f"after {decided.window_s:g} s"
+            if decided.confidence is not None:
+                share = f"{decided.confidence:.0%} {share}"
             column[3].text(
                 0.5,
                 -0.45,

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from train.evaluate import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.stopping import finest
 from train.tradeoff.choices import WINDOWS_S, unseen
 from train.tradeoff.early import FOLDS, Certified, StoppingComparison
 from train.tradeoff.measured import Measured

@@ -13,12 +13,11 @@ from edge.recording import Recording
 from edge.touch.features import WINDOW_S
 from train.choose import Chosen
 from train.dataset import DataSet, Recordings
-from train.evaluate import stratified_folds
+from train.evaluate import finest, stratified_folds
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
 from train.report.work import Workers
-from train.stopping import finest
 from train.tradeoff.board import ESTIMATED, estimated_s
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from edge.model.stopping import StoppingRule
 from train.choose import TRIAL
 from train.dataset import DataSet
-from train.evaluate import Promise, Result, stratified_folds
+from train.evaluate import Promise, Result, finest, stratified_folds
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates
-from train.stopping import finest
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5

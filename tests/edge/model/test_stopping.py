@@ -37,7 +37,7 @@ class TestMargin:
 def stopping(**changes):
     ways = ((0.10, 1.2, 2.0, 2), (0.15, 0.8, 0.9, 2), (0.25, 0.4, 0.6, 2))
     rules = tuple(StoppingRule(*way) for way in ways)
-    curves = (1.0, 1.0, 2.0), (0.0, 0.0, -1.0), 0.5, 0.0
+    curves = (1.0, 1.0, 2.0), (0.0, 0.0, -1.0), (0.0, 1.0, 2.0), 0.5, 0.0, 1.0
     return replace(Stopping(*curves, rules, trials=140, wrong=7, risk=0.1), **changes)
 
 
@@ -53,16 +53,30 @@ def test_the_fastest_rule_that_is_certified_is_taken():
 def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
     _, at_nine_tenths, _ = stopping().rules
     needed = 2.0 * math.log(9.0)
-    assert stopping().sure(at_nine_tenths, needed + 1e-9)
-    assert not stopping().sure(at_nine_tenths, needed - 1e-9)
+    assert stopping().sure(at_nine_tenths, [0.0, needed + 1e-9], 0, excess=0.0)
+    assert not stopping().sure(at_nine_tenths, [0.0, needed - 1e-9], 0, excess=0.0)
+
+
+def test_a_novel_contact_needs_a_larger_margin():
+    _, at_nine_tenths, _ = stopping().rules
+    needed = 2.0 * (math.log(9.0) + 0.7)
+    assert stopping().sure(at_nine_tenths, [0.0, needed + 1e-9], 0, excess=0.7)
+    assert not stopping().sure(at_nine_tenths, [0.0, needed - 1e-9], 0, excess=0.7)
 
 
 @pytest.mark.parametrize(
     ("point", "evidence", "odds"),
-    [(0, 1.0, math.e), (2, -1.0, math.exp(-3)), (0, 1e300, 1e300), (0, -math.inf, 0.0)],
+    [(0, 1.0, math.e), (2, -1.0, math.exp(-3)), (0, 1e300, 1e300)],
 )
 def test_confidence_is_the_logistic_function_of_the_margin(point, evidence, odds):
-    assert stopping().confidence(point, evidence) == pytest.approx(odds / (1 + odds))
+    confidence = stopping().confidence(point, [0.0, evidence], 0, excess=0.0)
+    assert confidence == pytest.approx(odds / (1 + odds))
+
+
+@pytest.mark.parametrize(("point", "odds"), [(0, 1.0), (1, math.exp(-0.5))])
+def test_novelty_lowers_the_log_odds_by_the_doubt(point, odds):
+    confidence = stopping().confidence(point, [0.0, 0.0], 0, excess=0.5)
+    assert confidence == pytest.approx(odds / (1 + odds))
 
 
 def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():

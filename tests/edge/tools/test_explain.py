@@ -55,6 +55,7 @@ def test_a_change_is_a_sentence(mean, unit, sentence):
         "task": "t",
         "label": "hard",
         "confidence": 1.0,
+        "votes": 1.0,
         "nearest": [],
         "rival": None,
     }

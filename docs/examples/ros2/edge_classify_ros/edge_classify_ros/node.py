@@ -110,7 +110,7 @@ class ClassifyNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         message.header.frame_id = self._frame_id
         message.results = [
-            ObjectHypothesis(class_id=event.label, score=event.confidence)
+            ObjectHypothesis(class_id=event.label, score=event.confidence or 0.0)
         ]
         self._tasks[event.task].publish(message)
 
