@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from edge.errors import OutOfRange
-from edge.events import Decided, Event, Onset, Release
+from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, check_rate
 from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 GAP_SHARE = 0.25
 """A step between two frames of more than this share of the window is a gap: the samples
 in it are interpolated from its ends."""
+LATE = "late"
+"""Flag of a decision on a contact that began before it could be seen."""
+ASIDE_S = 0.5
+"""Taxels are named as set aside after so long, as a touch under way soon shows."""
 GAP_S = 0.1
 """A step of at most this time is no gap, however short the window."""
 
@@ -80,7 +84,8 @@ class Classifier:
 
     Flags of a decision: `unknown` (the contact is unlike everything in training; only a
     model with decision points can tell), `tie` (another label had as many votes),
-    `short` (the stream ended inside the window; the last values were held), `gap`
+    `short` (the stream ended inside the window; the last values were held), `late` (the
+    contact began before the first frame), `gap`
     (frames are missing in much of the window, see `GAP_SHARE`, or its times are not in
     seconds), `missing_taxels` (taxels could not be read), `missing_pose` (joint angles
     were absent in part of the window), `skin_motion` (motion was measured on the skin,
@@ -141,6 +146,10 @@ class Classifier:
         """The numbers of the contacts under way."""
         self._begun = 0
         self._end_s: float | None = None
+        self._aside = b""
+        """The mask of the taxels that the last event named as set aside."""
+        self._aside_s = -math.inf
+        """When that mask was last the tracker's."""
         self._missing_taxels = False
         self._strongest = 0
 
@@ -162,20 +171,45 @@ class Classifier:
         self._end_s = frame.t
         if self._begun == 0:
             self._note_untouched(frame)
-        for contact in self.tracker.push(frame):
+        contacts = self.tracker.push(frame)
+        aside = self._set_aside(frame)
+        if aside is not None:
+            events.append(aside)
+        return events + self._follow(contacts, frame.t, began)
+
+    def _follow(
+        self, contacts: Iterable[Contact], t: float, began: float
+    ) -> list[Event]:
+        """The events of contacts up to a time."""
+        events: list[Event] = []
+        for contact in contacts:
             if contact not in self._numbers:
                 events.append(self._begin(contact))
             if contact.ended:
                 number = self._numbers.pop(contact)
-                events.append(Release(contact.onset_s, frame.t, self._named(number)))
+                events.append(Release(contact.onset_s, t, self._named(number)))
         points_s = self.model.decision_points_s
         for pending in list(self._pending):
-            age_s = frame.t - pending.contact.onset_s
+            age_s = t - pending.contact.onset_s
             while pending.tasks and age_s >= points_s[pending.decision_point]:
                 events += self._decide(pending, began)
             if not pending.tasks:
                 self._pending.remove(pending)
         return events
+
+    def _set_aside(self, frame: Frame) -> Aside | None:
+        """The event of taxels that have been set aside or taken back for a while."""
+        aside = self.tracker.still.aside
+        bits = b"" if aside is None else aside.tobytes()
+        if bits == self._aside or self._aside_s == -math.inf:
+            self._aside_s = frame.t
+            return None
+        if frame.t - self._aside_s < ASIDE_S:
+            return None
+        self._aside = bits
+        self._aside_s = frame.t
+        taxels = np.argwhere(np.zeros((0, 2)) if aside is None else aside)
+        return Aside(frame.t, tuple((row, col) for row, col in taxels.tolist()))
 
     def _note_untouched(self, frame: Frame) -> None:
         """Note how near a frame came to a contact, while there has been none."""
@@ -202,9 +236,12 @@ class Classifier:
         label for it are decided.
         """
         began = time.perf_counter()
-        if self._begun == 0 and self._end_s is not None:
-            return list(self._untouched(self._end_s, began))
         events: list[Event] = []
+        if self._begun == 0 and self._end_s is not None:
+            contacts = self.tracker.finish()
+            if not contacts:
+                return list(self._untouched(self._end_s, began))
+            events = self._follow(contacts, self._end_s, began)
         for pending in self._pending:
             pending.decision_point = len(self.model.decision_points_s) - 1
             events += self._decide(pending, began, short=True)
@@ -325,6 +362,7 @@ class Classifier:
             **doubts,
             "missing_taxels": contact.missing_taxels,
             "missing_pose": contact.missing_pose,
+            LATE: contact.late,
             "skin_motion": contact.chain is None and self.model.info.chain is not None,
         }
         return Decided(

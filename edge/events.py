@@ -121,10 +121,33 @@ class Release:
         return {**_line("release", self), "release_s": round(self.release_s, 6)}
 
 
-Event = Onset | Decided | Release
+@dataclass(frozen=True)
+class Aside:
+    """Taxels are above the threshold without a touch, and are not followed.
+
+    >>> import edge
+    >>> from edge.events import Aside
+    >>> Aside(2.5, ((3, 5),)).to_dict()
+    {'event': 'aside', 't': 2.5, 'taxels': [[3, 5]]}
+
+    Attributes:
+        t: when this was certain.
+        taxels: (row, column) of each; empty once all are followed again.
+    """
+
+    t: float
+    taxels: tuple[tuple[int, int], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The event as a JSON object."""
+        taxels = [list(place) for place in self.taxels]
+        return {"event": "aside", "t": round(self.t, 6), "taxels": taxels}
 
 
-def _line(name: str, event: Event) -> dict[str, Any]:
+Event = Aside | Onset | Decided | Release
+
+
+def _line(name: str, event: Onset | Decided | Release) -> dict[str, Any]:
     """The keys that the lines of all events have."""
     contact = {} if event.contact is None else {"contact": event.contact}
     return {"event": name, **contact, "onset_s": round(event.onset_s, 6)}

@@ -23,6 +23,7 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, wid
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout, for_device
+from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 from train.arms import arm_of, joint_angles
 from train.feature_sets import moves, unit
@@ -493,7 +494,7 @@ def _followed(
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
-        tracker = ContactTracker(for_device(layout, recording.layout), **tracked)
+        tracker = WatchfulTracker(for_device(layout, recording.layout), **tracked)
         touches = contacts(recording, tracker)
         return touches, labels_of(recording, len(touches))
     except InputError as error:
@@ -507,6 +508,8 @@ def contacts(
     followed: dict[int, Contact] = {}
     for frame in frames:
         followed |= {id(contact): contact for contact in tracker.push(frame)}
+    if not followed:
+        followed = {id(contact): contact for contact in tracker.finish()}
     return [(contact.onset_s, contact.series()) for contact in followed.values()]
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
+from edge.touch.still import WatchfulTracker
 from edge.touch.thresholds import MARGIN, above, noise
-from edge.touch.track import ContactTracker
 from train.dataset import DataSet, contacts, with_thresholds
 from train.labels import NO_CONTACT
 
@@ -49,7 +49,7 @@ def count_contacts(
     layout = with_thresholds(recordings[0].layout, threshold, onset)
     counts = []
     for recording in recordings:
-        tracker = ContactTracker(for_device(layout, recording.layout), horizon_s=0.1)
+        tracker = WatchfulTracker(for_device(layout, recording.layout), horizon_s=0.1)
         counts.append(len(contacts(recording, tracker)))
     return len(np.flatnonzero(counts)), sum(counts)
 

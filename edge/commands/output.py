@@ -16,6 +16,8 @@ LOG = logging.getLogger("edge.commands")
 BAR = 10
 """Width in characters of a bar that shows a share."""
 LONGEST_LINE = 80
+MOST_PLACES = 6
+"""Taxels that a line names."""
 
 
 class Output:
@@ -138,6 +140,15 @@ def _taxels(line: Mapping[str, Any]) -> str:
     return f"{line['t']:8.3f} s  {silent}: {line['invalid']}"
 
 
+def _aside(line: Mapping[str, Any]) -> str:
+    taxels = line["taxels"]
+    if not taxels:
+        return f"{line['t']:8.3f} s  all taxels are followed again"
+    places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
+    more = " ..." if len(taxels) > MOST_PLACES else ""
+    return f"{line['t']:8.3f} s  set aside as still: taxels {places}{more}"
+
+
 def _end(line: Mapping[str, Any]) -> str:
     text = f"{line['frames']} frames"
     period = line["period_ms"]
@@ -174,6 +185,7 @@ TEXTS: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "chip": _chip,
     "bus": _bus,
     "taxels": _taxels,
+    "aside": _aside,
     "end": _end,
     "saved": _saved,
     "unknown_touches": _unknown_touches,

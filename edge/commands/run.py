@@ -13,9 +13,9 @@ from typing import Any
 
 from edge.classifier import Classifier
 from edge.commands.options import add_engine, add_error, add_reading, check_error
-from edge.commands.output import LOG
+from edge.commands.output import LOG, MOST_PLACES, counted
 from edge.commands.source import reading
-from edge.events import Decided, Event
+from edge.events import Aside, Decided, Event
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter
@@ -90,6 +90,18 @@ class UnknownTouches:
         return {"event": "unknown_touches", "unknown": count, "touches": touches}
 
 
+def warn_of_still_taxels(events: Sequence[Event]) -> None:
+    """Say on stderr which taxels are set aside."""
+    for event in events:
+        if isinstance(event, Aside) and event.taxels:
+            places = ", ".join(map(str, event.taxels[:MOST_PLACES]))
+            LOG.warning(
+                f"{counted(len(event.taxels), 'taxel')} above the threshold without a "
+                f"touch, at (row, column) {places}: set aside until they fall or change. "
+                "Take away what leans on the skin, or calibrate it again"
+            )
+
+
 def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
     """The last event: the loop's periods and the number of lines that were lost."""
     periods = {}
@@ -131,6 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
                 frames += 1
                 notifier.alive()
                 decided = classifier.push(frame)
+                warn_of_still_taxels(decided)
                 notice = unknown_touches.push(decided)
                 if notice is not None:
                     faults.append(notice)

@@ -18,7 +18,7 @@ from edge.touch import measures
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker
+from edge.touch.still import WatchfulTracker
 
 if TYPE_CHECKING:
     from edge.model.stopping import Stopping
@@ -144,7 +144,7 @@ class ModelInfo:
 
     def tracker(
         self, layout: SkinLayout, *, max_contacts: int = 1, motion_on_skin: bool = False
-    ) -> ContactTracker:
+    ) -> WatchfulTracker:
         """A new tracker for a skin, with the model's rules and features.
 
         The last two arguments are those of `ContactTracker`.
@@ -152,7 +152,7 @@ class ModelInfo:
         Raises:
             InputError: the skin is not the one that the model was made for.
         """
-        return ContactTracker(
+        return WatchfulTracker(
             for_device(self.layout, layout),
             self.debounce,
             chain=self.chain,

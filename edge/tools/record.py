@@ -35,7 +35,8 @@ from edge.tools.page import Page
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.track import DEBOUNCE, ContactTracker
+from edge.touch.still import WatchfulTracker
+from edge.touch.track import DEBOUNCE
 
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes,
@@ -94,7 +95,7 @@ class Trials:
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
-        self._tracker = ContactTracker(skin.layout, horizon_s=0.0)
+        self._tracker = WatchfulTracker(skin.layout, horizon_s=0.0)
         self._length = length_s
         self._before: deque[Frame] = deque(
             maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE

@@ -112,6 +112,7 @@ class Contact:
         chain: the arm that its motion is measured with; None where it is measured on
             the skin.
         ended: no more frames will come.
+        late: it began before the first frame, or was set aside before.
         missing_taxels: a frame lacked taxels that are not known to be dead.
         missing_pose: a frame came without the joint angles that a feature needs.
         region: the region when it was last seen.
@@ -129,6 +130,7 @@ class Contact:
         self.layout = measurer.layout
         self.chain = chain
         self.ended = False
+        self.late = False
         self.missing_taxels = False
         self.missing_pose = False
         self.joints: NDArray[np.float64] | None = None

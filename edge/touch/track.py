@@ -6,6 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from edge.errors import InputError
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
@@ -109,12 +112,22 @@ class ContactTracker:
                 time or joint angle is not finite.
         """
         self._check(frame)
-        active = ActiveTaxels(
+        return self._advance(frame, self._active(frame, frame.valid))
+
+    def finish(self) -> list[Contact]:
+        """The contacts that only the end of the stream confirms."""
+        return []
+
+    def _active(self, frame: Frame, valid: NDArray[np.bool_] | None) -> ActiveTaxels:
+        return ActiveTaxels(
             frame.counts,
             self.layout.threshold_counts,
-            valid=frame.valid,
+            valid=valid,
             wraps=self.layout.wraps,
         )
+
+    def _advance(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
+        """Take in a frame by its active taxels; the contacts that it belongs to."""
         regions = self._regions(active)
         self.region = regions[0] if regions else None
         shares = self._shares(regions)
@@ -229,4 +242,6 @@ def first_contact(
             first.ended or frame.t - first.onset_s >= tracker.horizon_s
         ):
             break
+    if first is None:
+        first = next(iter(tracker.finish()), None)
     return None if first is None else (first.onset_s, first.series())

@@ -9,7 +9,7 @@ import pytest
 
 from edge.classifier import Classifier
 from edge.errors import InputError
-from edge.events import Decided, Onset, Release
+from edge.events import Aside, Decided, Onset, Release
 from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from tests.conftest import in_a_row
@@ -228,3 +228,34 @@ def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm)
     ):
         model.require_joints(3, "here")
     model.require_joints(5, "here")
+
+
+def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):
+    recording = make_touch(seed=3)
+    frames = recording.frames.copy()
+    frames[:, 0, 23] = 500
+    events = list(Classifier(model).classify(replace(recording, frames=frames)))
+    (aside,) = (event for event in events if isinstance(event, Aside))
+    assert aside.taxels == ((0, 23),)
+    (onset,) = (event for event in events if isinstance(event, Onset))
+    assert onset.onset_s == 0.2
+    decided = [event for event in events if isinstance(event, Decided)]
+    assert len(decided) == 2
+    assert not any("late" in event.flags for event in decided)
+
+
+def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_touch):
+    recording = make_touch(seed=3)
+    first = int(np.searchsorted(recording.t, 0.35))
+    cut = replace(
+        recording,
+        t=recording.t[first:],
+        frames=recording.frames[first:],
+        joints=recording.joints[first:],
+    )
+    events = Classifier(model).classify(cut)
+    decided = [event for event in events if isinstance(event, Decided)]
+    assert len(decided) == 2
+    for event in decided:
+        assert event.onset_s == cut.t[0]
+        assert "late" in event.flags

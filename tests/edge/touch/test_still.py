@@ -1,0 +1,169 @@
+"""What is above the threshold without a touch is set aside, and followed once it is
+touched."""
+
+import numpy as np
+import pytest
+
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.still import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
+
+LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
+PERIOD_S = 0.01
+
+
+def frames(seconds, touches=(), stuck=None):
+    """Frames of touches (begin, end) on the middle of the skin, and the stuck counts by
+    taxel."""
+    stuck = stuck or {}
+    for i in range(round(seconds / PERIOD_S)):
+        t = i * PERIOD_S
+        counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+        for begin, end in touches:
+            if begin <= t < end:
+                counts[3:5, 3:5] = 100 + round(200 * min(t - begin, 1.0))
+        for place, (since, count) in stuck.items():
+            if t >= since:
+                counts[place] += count
+        yield Frame(t, counts)
+
+
+def onsets(stream, horizon_s=1.0):
+    """(onset, late) of the contacts of a stream."""
+    tracker = WatchfulTracker(LAYOUT, horizon_s=horizon_s)
+    contacts = {}
+    for frame in stream:
+        for contact in tracker.push(frame):
+            contacts[contact] = None
+    for contact in tracker.finish():
+        contacts[contact] = None
+    return [(round(contact.onset_s, 3), contact.late) for contact in contacts]
+
+
+TOUCHES = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
+ALL_THREE = [(1.0, False), (3.0, False), (5.0, False)]
+
+
+@pytest.mark.parametrize("count", [50, 100, 2000])
+def test_a_taxel_that_is_stuck_from_the_start_hides_no_touch(count):
+    stream = frames(8.0, TOUCHES, {(0, 7): (0.0, count)})
+    assert onsets(stream) == ALL_THREE
+
+
+def test_a_stuck_taxel_below_a_touch_hides_none_that_follows():
+    stream = frames(8.0, TOUCHES, {(3, 3): (0.0, 100)})
+    assert onsets(stream) == ALL_THREE
+
+
+def test_a_taxel_that_sticks_later_is_set_aside_after_a_while():
+    touches = ((0.5, 0.9), (6.0, 7.0), (8.0, 9.0))
+    stream = frames(10.0, touches, {(0, 7): (2.0, 500)})
+    assert onsets(stream) == [(0.5, False), (2.0, False), (6.0, False), (8.0, False)]
+
+
+def test_a_touch_under_way_is_late_and_followed_from_the_first_frame():
+    stream = [f for f in frames(4.0, ((1.0, 3.0),)) if f.t >= 1.2]
+    assert onsets(stream) == [(1.2, True)]
+
+
+def test_a_touch_under_way_that_grows_is_followed_from_the_first_frame():
+    def growing():
+        for i in range(100):
+            counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+            counts[3, : 1 + i // 10] = 100
+            yield Frame(i * PERIOD_S, counts)
+
+    assert onsets(growing()) == [(0.0, True)]
+
+
+def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
+    assert onsets(frames(3.0, stuck={(2, 2): (0.0, 100)})) == [(0.0, True)]
+
+
+def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
+    tracker = WatchfulTracker(LAYOUT, horizon_s=1.0)
+    for frame in frames(3.0, stuck={(2, 2): (0.0, 100)}):
+        assert tracker.push(frame) == []
+    (contact,) = tracker.finish()
+    assert contact.series().t[-1] == pytest.approx(1.0)
+    assert set(contact.series().peak) == {100}
+
+
+def test_a_touch_held_for_the_whole_window_is_not_set_aside_before_its_end():
+    def held():
+        for i in range(600):
+            counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+            counts[3, 3] = 100 * (i >= 20)
+            yield Frame(i * PERIOD_S, counts)
+
+    tracker = WatchfulTracker(LAYOUT, horizon_s=4.0)
+    ended = None
+    for frame in held():
+        for contact in tracker.push(frame):
+            ended = frame.t if contact.ended else ended
+    assert ended is not None
+    assert 4.2 < ended < 4.2 + 1.0 + LAYOUT.release_s + 2 * CHECK_S
+
+
+def test_gaps_are_no_stillness():
+    tracker = WatchfulTracker(LAYOUT, horizon_s=1.0)
+    contacts = []
+    for t, count in ((0.0, 0), (1.0, 100), (11.0, 100), (21.0, 100)):
+        counts = np.full(LAYOUT.shape, count, dtype=np.uint16)
+        contacts = tracker.push(Frame(t, counts))
+    assert [contact.onset_s for contact in contacts] == [1.0]
+
+
+def push(still, t, counts):
+    active = counts > LAYOUT.threshold_counts
+    still.push(Frame(t, counts), active, bool(active.any()))
+
+
+@pytest.mark.parametrize(
+    ("change", "touched"), [(40, False), (41, True), (-40, False), (-41, True)]
+)
+def test_a_change_above_the_threshold_is_a_touch(change, touched):
+    still = StillTaxels(LAYOUT, 1.0)
+    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+    counts[1, 1] = 120
+    push(still, 0.0, counts)
+    assert still.aside is not None
+    counts[1, 1] = 120 + change
+    push(still, 1.0, counts)
+    assert still.touched is touched
+
+
+def test_a_change_below_a_quarter_of_a_high_count_is_no_touch():
+    still = StillTaxels(LAYOUT, 1.0)
+    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+    counts[1, 1] = 4000
+    push(still, 0.0, counts)
+    counts[1, 1] = 4999
+    push(still, 1.0, counts)
+    assert not still.touched
+    counts[1, 1] = 5001
+    push(still, 1.1, counts)
+    assert still.touched
+
+
+def test_noise_of_half_the_threshold_is_still():
+    rng = np.random.default_rng(0)
+    still = StillTaxels(LAYOUT, 1.0)
+    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+    push(still, 0.0, counts)
+    for i in range(1, round((STILL_S + 4 * CHECK_S) / PERIOD_S)):
+        counts[2, 2] = 200 + rng.integers(-10, 11)
+        push(still, i * PERIOD_S, counts)
+    assert still.aside is not None
+    assert np.argwhere(still.aside).tolist() == [[2, 2]]
+
+
+def test_a_quiet_taxel_is_taken_back():
+    still = StillTaxels(LAYOUT, 1.0)
+    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+    counts[1, 1] = 50
+    push(still, 0.0, counts)
+    counts[1, 1] = 30
+    push(still, EARLY_S, counts)
+    assert still.aside is None
+    assert not still.touched
