@@ -390,6 +390,10 @@ def require_one_arm(
             )
 
 
+class Untouched(InputError):
+    """No recording has a contact at the thresholds."""
+
+
 @dataclass(frozen=True)
 class Touched:
     """The contacts of recordings.
@@ -411,7 +415,7 @@ def collect(
     """The trials of recordings whose contacts were followed.
 
     Raises:
-        InputError: no recording has a contact.
+        Untouched: no recording has a contact.
     """
     trials: list[Trial] = []
     untouched = []
@@ -424,7 +428,7 @@ def collect(
         for trial_labels, touch in zip(labels, touches, strict=False):
             trials.append(Trial(path, recording, trial_labels, *touch))
     if not trials:
-        raise InputError(
+        raise Untouched(
             f"no contact in any of {len(recordings)} recordings; lower the threshold "
             f"of {layout.threshold_counts} counts"
         )

@@ -16,7 +16,7 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, candidates
 from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
-from train.dataset import DataSet, Recordings, load_trials, read
+from train.dataset import DataSet, Recordings, Untouched, load_trials, read
 from train.evaluate import Labels
 from train.feature_sets import expand
 from train.mix import mix
@@ -299,13 +299,25 @@ def _with_thresholds(
     fixed = threshold is not None or onset is not None
     skin = recordings.own[0].meta.get("skin", {})
     if not fixed and "threshold_counts" not in skin:
-        threshold, onset = thresholds.proposed(recordings.own)
+        proposal = thresholds.proposed(recordings.own)
+        threshold = proposal.threshold
+        onset = proposal.onset
         notes.append(
             "warning: the skin was saved without thresholds; a threshold of "
-            f"{threshold} and an onset of {onset} counts come from the noise before "
-            "contact"
+            f"{threshold} and an onset of {onset} counts come from {proposal.source}"
         )
-    dataset = by(threshold, onset)
+    try:
+        dataset = by(threshold, onset)
+    except Untouched:
+        if fixed:
+            raise
+        proposal = thresholds.proposed(recordings.own)
+        dataset = by(proposal.threshold, proposal.onset)
+        notes.append(
+            "warning: no recording has a contact at its own thresholds; a threshold of "
+            f"{proposal.threshold} and an onset of {proposal.onset} counts come from "
+            f"{proposal.source}"
+        )
     if fixed or any("simulation" in r.meta for r in recordings.recordings):
         return dataset
 
@@ -449,7 +461,9 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
     if 2 * untouched.sum() < len(untouched):
         mend = "record from before the touch"
         recordings = [t.recording for t in dataset.trials]
-        low, high = thresholds.proposed(recordings)
+        proposal = thresholds.proposed(recordings)
+        low = proposal.threshold
+        high = proposal.onset
         felt, _ = thresholds.count_contacts(recordings, low, high)
         if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
             mend += (

@@ -2,13 +2,14 @@
 missed."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.still import WatchfulTracker
-from edge.touch.thresholds import MARGIN, above, noise
+from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from train.dataset import DataSet, contacts, with_thresholds
 from train.labels import NO_CONTACT
 
@@ -17,29 +18,82 @@ MARGINS = (MARGIN, 1.0)
 other."""
 MISSED_SHARE = 0.02
 """Of the touches, which a proposal may miss."""
+FELT_SHARE = 0.5
+"""Of the recordings labelled with a touch; fewer contacts mean that the noise was none."""
+BEGUN_RATIO, BEGUN_SHARE = 3.0, 0.2
+"""A recording begins in contact if a count of its first frames is above three times the
+median taxel, and above a fifth of its highest count."""
+QUIETEST = 0.2
 LOWER = (0.5, 0.25, 0.0)
 """Parts of the recorded thresholds that are tried where touches are missed."""
 FEWEST_GAINED = 1.5
 """Recordings that lower thresholds must decide right more often."""
 
 
-def proposed(recordings: Sequence[Recording]) -> tuple[int, int]:
-    """Threshold and onset in counts, from the noise before contact.
+@dataclass(frozen=True)
+class Proposal:
+    """Thresholds that suit the noise of some recordings.
 
-    The noise is the 90th percentile over the recordings of
-    `edge.touch.thresholds.noise`, so that a few recordings that begin in contact do not
-    raise it. The threshold is twice the noise, or as high as the noise where that
-    misses more of the recordings labelled with a touch.
+    Attributes:
+        threshold, onset: in counts.
+        source: where they come from, as the end of a sentence.
     """
-    largest = [noise(recording.t, recording.frames) for recording in recordings]
-    pairs = [above(float(np.quantile(largest, 0.9)), margin) for margin in MARGINS]
+
+    threshold: int
+    onset: int
+    source: str
+
+
+def proposed(recordings: Sequence[Recording]) -> Proposal:
+    """Thresholds from the noise before contact.
+
+    The noise is the 90th percentile of `edge.touch.thresholds.noise` over the
+    recordings that do not begin in contact. The threshold is twice the noise, or as
+    high as the noise where that misses more of the recordings labelled with a touch.
+    Where no recording has an untouched part, the threshold is the level of the quietest
+    taxels, or 0 where that misses touches.
+    """
     labelled = [
         r for r in recordings if r.labels and NO_CONTACT not in r.labels.values()
     ]
-    if not labelled:
-        return pairs[0]
-    high, low = (count_contacts(labelled, *pair)[0] for pair in pairs)
-    return pairs[high < (1.0 - MISSED_SHARE) * low]
+    untouched = [r for r in recordings if not begins_in_contact(r)]
+    begun = len(recordings) - len(untouched)
+    if untouched:
+        levels = [noise(recording.t, recording.frames) for recording in untouched]
+        level = float(np.quantile(levels, 0.9))
+        source = "the noise before contact"
+        if begun:
+            source += f" ({begun} of {len(recordings)} begin in contact and give none)"
+        pairs = [above(level, margin) for margin in MARGINS]
+        if not labelled:
+            return Proposal(*pairs[0], source)
+        high, low = (count_contacts(labelled, *pair)[0] for pair in pairs)
+        if low >= FELT_SHARE * len(labelled):
+            best = pairs[high < (1.0 - MISSED_SHARE) * low]
+            return Proposal(*best, source)
+    level = float(np.median([_quietest(recording) for recording in recordings]))
+    pair = above(level, 1.0)
+    felt, _ = count_contacts(labelled or recordings, *pair)
+    if felt >= (1.0 - MISSED_SHARE) * len(labelled or recordings):
+        source = "the quietest taxels, as no recording has a part without contact"
+        return Proposal(*pair, source)
+    source = "nothing to go by: no recording has a part without contact"
+    return Proposal(0, 0, source)
+
+
+def begins_in_contact(recording: Recording) -> bool:
+    """Whether the first frames stand out, from most taxels and against the rest of the
+    recording."""
+    start = recording.frames[recording.t < recording.t[0] + QUIET_S]
+    by_taxel = start.max(axis=0)
+    highest = int(by_taxel.max(initial=0))
+    stands_out = highest > BEGUN_RATIO * float(np.median(by_taxel))
+    return stands_out and highest > BEGUN_SHARE * int(recording.frames.max())
+
+
+def _quietest(recording: Recording) -> float:
+    """The level below which the quietest fifth of the taxels stay half of the time."""
+    return float(np.quantile(np.median(recording.frames, axis=0), QUIETEST))
 
 
 def count_contacts(

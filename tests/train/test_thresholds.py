@@ -32,17 +32,57 @@ def weaker(recording, share, **skin):
 
 def test_the_proposal_lies_above_the_noise_and_finds_every_contact(make_touch):
     trials = [noisy(make_touch(seed=seed), seed) for seed in range(6)]
-    threshold, onset = proposed(trials)
-    assert 70 <= threshold <= 80
-    assert onset == round(1.5 * threshold)
-    assert count_contacts(trials, threshold, onset) == (6, 6)
+    proposal = proposed(trials)
+    assert 70 <= proposal.threshold <= 80
+    assert proposal.onset == round(1.5 * proposal.threshold)
+    assert count_contacts(trials, proposal.threshold, proposal.onset) == (6, 6)
+    assert proposal.source == "the noise before contact"
     assert count_contacts(trials, 60000, 60000) == (0, 0)
 
 
-def test_a_few_recordings_that_begin_in_contact_do_not_raise_it(make_touch):
-    trials = [noisy(make_touch(seed=seed), seed) for seed in range(12)]
-    begun = [noisy(make_touch(seed=99, lead_s=0.0), 99)]
-    assert proposed(trials + begun)[0] <= 80
+def labelled(recording):
+    meta = {**recording.meta, "labels": {"object": "box"}}
+    return replace(recording, meta=meta)
+
+
+def begun(make_touch, seed):
+    """A touch whose recording begins in its middle."""
+    touch = labelled(noisy(make_touch(seed=seed), seed))
+    first = len(touch.t) // 2
+    return replace(
+        touch,
+        t=touch.t[first:],
+        frames=touch.frames[first:],
+        joints=touch.joints[first:],
+    )
+
+
+def test_recordings_that_begin_in_contact_give_no_noise_and_are_counted(make_touch):
+    quiet = [labelled(noisy(make_touch(seed=seed), seed)) for seed in range(12)]
+    late = [begun(make_touch, seed) for seed in range(20, 28)]
+    proposal = proposed(quiet + late)
+    assert 70 <= proposal.threshold <= 80
+    assert "8 of 20 begin in contact and give none" in proposal.source
+
+
+def test_without_an_untouched_part_the_quietest_taxels_give_the_threshold(make_touch):
+    late = [begun(make_touch, seed) for seed in range(8)]
+    proposal = proposed(late)
+    assert 10 <= proposal.threshold <= 40
+    assert "no recording has a part without contact" in proposal.source
+    assert count_contacts(late, proposal.threshold, proposal.onset)[0] == 8
+
+
+def test_where_every_taxel_is_pressed_throughout_the_threshold_is_0(make_touch):
+    rng = np.random.default_rng(0)
+    pressed = []
+    for seed in range(6):
+        touch = labelled(make_touch(seed=seed))
+        frames = rng.integers(900, 1000, touch.frames.shape).astype(np.uint16)
+        pressed.append(replace(touch, frames=frames))
+    proposal = proposed(pressed)
+    assert count_contacts(pressed, proposal.threshold, proposal.onset)[0] == 6
+    assert "no recording has a part without contact" in proposal.source
 
 
 def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
@@ -53,9 +93,11 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
         trials.append(
             noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed)
         )
-    assert proposed(trials) == (40, 60)  # the touch peaks at 70
+    weak = proposed(trials)
+    assert weak.threshold == 40
+    assert weak.onset == 60  # the touch peaks at 70
     strong = [noisy(make_touch(seed=seed), seed) for seed in range(4)]
-    assert proposed(strong) == (80, 120)
+    assert proposed(strong).threshold == 80
 
 
 def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
@@ -64,7 +106,9 @@ def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
     touch = make_touch(seed=0, lead_s=0.0)
     slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
     slow.frames[0] = 3
-    assert proposed([replace(slow, meta={"skin": slow.meta["skin"]})]) == (6, 9)
+    proposal = proposed([replace(slow, meta={"skin": slow.meta["skin"]})])
+    assert proposal.threshold == 6
+    assert proposal.onset == 9
 
 
 def saved(folder, make_touch, **skin):
@@ -93,3 +137,12 @@ def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp
     fitted = train.fit(data, **GIVEN)
     assert "warning: the skin was saved without thresholds" in fitted.notes[0]
     assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)
+
+
+def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
+    make_touch, tmp_path
+):
+    folder = saved(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
+    fitted = train.fit(folder, **GIVEN)
+    assert len(fitted.dataset.trials) == 20
+    assert any("no recording has a contact at its own" in note for note in fitted.notes)

@@ -92,17 +92,18 @@ def run(arguments: argparse.Namespace) -> int:
 def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
     """Save trials with the thresholds that their noise suggests; returns a report."""
     recordings = [recording for _, recording in trials]
-    threshold, onset = proposed(recordings)
+    proposal = proposed(recordings)
+    threshold = proposal.threshold
+    onset = proposal.onset
     for path, recording in trials:
         skin = {"threshold_counts": threshold, "onset_counts": onset}
         meta = {**recording.meta, "skin": {**recording.meta.get("skin", {}), **skin}}
         save(path, replace(recording, meta=meta))
     touched, _ = count_contacts(recordings, threshold, onset)
     return (
-        f"threshold {threshold} and onset {onset} counts, from the noise before "
-        f"contact: {touched} "
-        f"of {len(trials)} have a contact; `python -m train thresholds` compares other "
-        "thresholds"
+        f"threshold {threshold} and onset {onset} counts, from "
+        f"{proposal.source}: {touched} of {len(trials)} have a contact; "
+        "`python -m train thresholds` compares other thresholds"
     )
 
 

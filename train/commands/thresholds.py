@@ -23,7 +23,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the proposal, and the contacts that it and other thresholds give."""
     recordings = read(arguments.data, progress=True).recordings
-    threshold, onset = proposed(recordings)
+    proposal = proposed(recordings)
+    threshold = proposal.threshold
+    onset = proposal.onset
     recorded = recordings[0].layout
     rows = [
         ("recorded", recorded.threshold_counts, recorded.onset),
@@ -41,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  "
             f"{total:>8}"
         )
+    print(f"proposed from {proposal.source}")
     print(f"use: --threshold {threshold} --onset {onset}")
     hidden = max(counts.values())[0] - counts["proposed"][0]
     if hidden:
