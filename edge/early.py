@@ -23,24 +23,41 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
     """
     chosen: dict[str, Policy] = {}
     for task, rule in stopping_rules(model, error).items():
-        kind = Product if task in model.info.products else Early
-        chosen[task] = kind(model.info, task, rule, error)
+        if rule is None:
+            chosen[task] = Uncertified(model.info)
+        else:
+            kind = Product if task in model.info.products else Early
+            chosen[task] = kind(model.info, task, rule, error)
     return chosen
+
+
+class Uncertified:
+    """Decide at the end of the window, as without an error rate, and say so."""
+
+    def __init__(self, info: ModelInfo) -> None:
+        self._info = info
+        self._full = len(info.decision_points_s) - 1
+
+    def answer(self, question: Question) -> Decided | None:
+        """The model's answer at the last decision point."""
+        if question.decision_point < self._full:
+            return None
+        doubts = {"tie": question.decision.tie, "uncertified": True}
+        return question.answer(self._info, doubts)
 
 
 class Early:
     """Decide at the first decision point that is sure enough, or at the rule's last."""
 
     def __init__(
-        self, info: ModelInfo, task: str, rule: StoppingRule | None, error: float
+        self, info: ModelInfo, task: str, rule: StoppingRule, error: float
     ) -> None:
         """Follow a rule.
 
         Args:
             info: the model's metadata.
             task: that is decided.
-            rule: certified for the error rate; None where none is, and the full window
-                decides.
+            rule: certified for the error rate.
             error: the error rate.
         """
         self._info = info
@@ -56,8 +73,8 @@ class Early:
         An unknown contact waits for the full window.
         """
         rule = self._rule
-        sure = rule is not None and self._sure(rule, question)
-        last = self._full if rule is None or question.unknown else rule.last
+        sure = self._sure(rule, question)
+        last = self._full if question.unknown else rule.last
         if question.decision_point < last and (question.unknown or not sure):
             return None
         return self._answered(question, question.decision.confidence, sure)
@@ -74,18 +91,14 @@ class Early:
     def _answered(
         self, question: Question, confidence: float | None, sure: bool
     ) -> Decided:
-        """The answer of a rule, or of the full window without one."""
+        """The answer of the rule."""
         nameless = question.unknown and self._names_unknown()
-        rule = self._rule
-        forced = rule is not None and not rule.fixed and not sure
-        doubts = {"unsure": forced and not nameless, "uncertified": rule is None}
-        answer = question.answer(self._info, doubts)
+        forced = not self._rule.fixed and not sure
+        answer = question.answer(self._info, {"unsure": forced and not nameless})
         if nameless:
             answer = replace(answer, label=UNKNOWN)
             confidence = 1.0 - self._novelty(question)
         answer = replace(answer, confidence=rounded(confidence))
-        if rule is None:
-            return answer
         stopped_by = "confidence" if sure else "window"
         return replace(answer, error=self._error, stopped_by=stopped_by)
 

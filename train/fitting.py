@@ -41,6 +41,11 @@ more than this share of the remainder."""
 FEWEST_TRIALS = 3
 LONG_TOUCHES = 2.0
 """Longer windows are tried where half of the touches last so many windows."""
+LONG_SHARE = 0.9
+"""Share of the touches that may end before the longest window."""
+LONGEST_WINDOW_S = 60.0
+LAST_RATIO = 1.2
+"""The longest window is tried where it is so much longer than the one before it."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +196,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         scaling: one of `train.scaling.SCALINGS`.
         components: principal components.
         k: neighbours.
-        window_s: seconds from onset. Where None it is `WINDOW_S`, or two, four or eight
-            times that where touches last so long and accuracy rises enough
+        window_s: seconds from onset. Where None it is `WINDOW_S`, or twice that and so
+            on where touches last so long and accuracy rises enough
             (`Choosing.window`).
         samples: values of a feature.
         tasks: keys of the labels; all that the recordings share where None.
@@ -437,13 +442,20 @@ def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
-    """The windows to try for touches that last so many seconds each."""
-    median = float(np.median(seconds))
-    if median < LONG_TOUCHES * WINDOW_S:
+    """The windows to try for touches that last so many seconds each.
+
+    They reach the time that a tenth of the touches last; of shorter ones the last
+    values are held.
+    """
+    if float(np.median(seconds)) < LONG_TOUCHES * WINDOW_S:
         return (WINDOW_S,)
-    return tuple(
-        WINDOW_S * times for times in (1, 2, 4, 8) if WINDOW_S * times <= median
-    )
+    longest_s = min(float(np.quantile(seconds, LONG_SHARE)), LONGEST_WINDOW_S)
+    windows = [WINDOW_S]
+    while 2.0 * windows[-1] <= longest_s:
+        windows.append(2.0 * windows[-1])
+    if longest_s >= LAST_RATIO * windows[-1]:
+        windows.append(round(longest_s, 1))
+    return tuple(windows)
 
 
 def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:

@@ -133,6 +133,22 @@ def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch,
     assert flags == {"category": False, "object": True}
 
 
+@pytest.mark.parametrize("seed", range(50, 56))
+def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
+    early, make_touch, monkeypatch, error, seed
+):
+    stopping = early.info.stopping["object"]
+    never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
+    monkeypatch.setitem(early.info.stopping, "object", never)
+    touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
+    uncertified = decided(early, touch, error)["object"]
+    plain = decided(early, touch, None)["object"]
+    assert uncertified.label == plain.label
+    assert uncertified.confidence == plain.confidence
+    assert uncertified.window_s == plain.window_s
+    assert {*uncertified.flags} == {*plain.flags, "uncertified"}
+
+
 def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is_like(
     early, make_touch, monkeypatch
 ):

@@ -9,7 +9,7 @@ import train
 from edge.recording import Recording, save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
-from train.fitting import FitOptions, _decision_points, _leaks
+from train.fitting import FitOptions, _decision_points, _leaks, _windows
 from train.pipeline import Choice
 
 
@@ -148,3 +148,18 @@ def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are
     )
     frames[:, 1:] = 50  # and grows
     assert "or take --threshold 18 --onset 27, by which it begins later" in warning(0.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "windows"),
+    [
+        ([1.0] * 10, (1.2,)),
+        ([2.5] * 10, (1.2, 2.4)),
+        ([12.0] * 10, (1.2, 2.4, 4.8, 9.6, 12.0)),
+        ([3.0] * 8 + [10.0] * 2, (1.2, 2.4, 4.8, 9.6)),
+        ([1.0] * 6 + [10.0] * 4, (1.2,)),
+        ([1e4] * 10, (1.2, 2.4, 4.8, 9.6, 19.2, 38.4, 60.0)),
+    ],
+)
+def test_windows_reach_as_far_as_a_tenth_of_the_touches(seconds, windows):
+    assert _windows(seconds) == pytest.approx(windows)
