@@ -25,3 +25,11 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
             **options,
         }
     return tqdm(iterable, **options)
+
+
+def say(text: str) -> None:
+    """Print a line on stdout, above a progress bar."""
+    if sys.stderr.isatty():
+        tqdm.write(text, file=sys.stdout)
+    else:
+        print(text, flush=True)

@@ -6,8 +6,12 @@ format, see train/importers/__init__.py.
 """
 
 import argparse
+import hashlib
+import logging
 import os
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,10 +21,12 @@ import numpy as np
 from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError
 from edge.recording import Recording, save
+from edge.touch.arm import Chain
 from train.importers import names
 from train.progress import bar
-from train.thresholds import count_contacts, proposed
+from train.thresholds import count_felt, proposed
 
+LOG = logging.getLogger(__name__)
 ZERO_FRAMES = 3
 
 
@@ -60,9 +66,51 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.file = arguments.file.resolve()
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
-    trials = importer.trials(arguments.file, arm, *options)
+    with counted_warnings():
+        return write(importer.trials(arguments.file, arm, *options), arm, arguments)
+
+
+class Counted(logging.Handler):
+    """Keeps the first of the warnings that recordings give, and counts them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first = ""
+        self.count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take in a warning."""
+        self.first = self.first or record.getMessage()
+        self.count += 1
+
+
+@contextmanager
+def counted_warnings() -> Iterator[None]:
+    """Print the first of many recordings' warnings, and how many there were."""
+    logger = logging.getLogger("edge.recording")
+    counted = Counted()
+    logger.addHandler(counted)
+    logger.propagate = False
+    try:
+        yield
+    finally:
+        logger.propagate = True
+        logger.removeHandler(counted)
+        if counted.count:
+            more = counted.count - 1
+            others = f" ({more} more recordings are like it)" if more else ""
+            LOG.warning(f"{counted.first}{others}")
+
+
+def write(
+    trials: Iterator[tuple[str, Recording]],
+    arm: Chain | None,
+    arguments: argparse.Namespace,
+) -> int:
+    """Write the recordings of an importer; the exit status."""
     without_threshold: list[tuple[Path, Recording]] = []
     paths: set[Path] = set()
+    frames: dict[str, list[str]] = {}
     for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(
@@ -80,13 +128,24 @@ def run(arguments: argparse.Namespace) -> int:
             )
         paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
+        digest = hashlib.sha256(recording.frames.tobytes()).hexdigest()
+        frames.setdefault(digest, []).append(name)
         if "threshold_counts" in recording.meta["skin"]:
             save(path, recording)
         else:
             without_threshold.append((path, recording))
     report = [set_thresholds(without_threshold)] if without_threshold else []
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
-    return 0
+    alike = [names for names in frames.values() if len(names) > 1]
+    if alike:
+        print(
+            f"warning: {sum(map(len, alike))} trials have the frames of others, such as "
+            f"{' and '.join(alike[0][:2])}; keep one of each, or accuracies are too high"
+        )
+    skipped = getattr(arguments, "skipped", [])
+    for sentence in skipped:
+        print(f"left out: {sentence}", file=sys.stderr)
+    return 1 if skipped else 0
 
 
 def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
@@ -99,7 +158,7 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
         skin = {"threshold_counts": threshold, "onset_counts": onset}
         meta = {**recording.meta, "skin": {**recording.meta.get("skin", {}), **skin}}
         save(path, replace(recording, meta=meta))
-    touched, _ = count_contacts(recordings, threshold, onset)
+    touched = count_felt(recordings, onset)
     return (
         f"threshold {threshold} and onset {onset} counts, from "
         f"{proposal.source}: {touched} of {len(trials)} have a contact; "

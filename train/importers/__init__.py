@@ -12,8 +12,11 @@ user names, for formats with joint angles. A format with options of its own also
 
 import pkgutil
 
+SHARED = {"arrays", "columns", "reading", "topics"}
+"""Modules that the formats share."""
+
 
 def names() -> list[str]:
     """The formats that can be imported."""
     modules = {module.name for module in pkgutil.iter_modules(__path__)}
-    return sorted(modules - {"topics"})
+    return sorted(modules - SHARED)

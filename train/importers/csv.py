@@ -1,148 +1,168 @@
-"""Tables of values: a file for each trial, or one long table; text, .npy or .mat.
+"""Tables of values: a file for each trial, or one long table; text, arrays or Parquet.
 
 A folder holds a file for each trial: a row a frame, a column a taxel, and if you like
-columns of time and joint angles. The label is the name of the folder that the file lies
-in, or else its own name without the number at the end; `labels.csv`, with the column
-`trial` and one for each task, replaces it. A single file with a column `trial` holds
-all trials. It has such rows, or the columns `taxel` and `value` with a row for each
-value; its columns of text are labels. COLS are names or numbers from 1, such as
-`1-9,force`. `skin.json` in the folder is the `skin` of the recordings. With `--frames`,
-a folder holds a folder for each trial, with a file for each frame: a line a row.
+columns of time and joint angles. Taxels are the columns whose names share a stem with
+running numbers (s1 to s16, taxel_0_3), all columns of a file without a header, or those
+that --taxels names; what was taken and what was left out is printed. The label is the
+name of the folder that the file lies in, or else its own name without the number at the
+end; `labels.csv`, with the column `trial` and one for each task, replaces it. A single
+file with a column `trial` holds all trials. It has such rows, or the columns `taxel`
+and `value` with a row for each value; its columns of text are labels. COLS are names,
+ranges or numbers from 1, such as `s1-s9,force` or `3-5`. `skin.json` in the folder is
+the `skin` of the recordings. With `--frames`, a folder holds a folder for each trial,
+with a file for each frame: a line a row. A file that cannot be used is named and left
+out.
 """
 
 import argparse
-import csv
-import io
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
 from edge.commands.options import within
 from edge.config import ConfigTable, read_json, shown
 from edge.errors import InputError
-from edge.files import parsing, read_bytes
+from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
+from train.importers import arrays
+from train.importers.columns import (
+    UNITS,
+    Meaning,
+    Wishes,
+    meaning,
+    times_of,
+)
+from train.importers.reading import (
+    PACKED,
+    TEXTS,
+    Table,
+    is_text,
+    numbers_of,
+    read_frame,
+    read_parquet,
+    read_text,
+    suffix_of,
+)
+from train.progress import say
 
 LABELS = "labels.csv"
-SUFFIXES = (".csv", ".tsv", ".txt", ".npy", ".mat")
-EMPTY = "holds no values; leave it out or save it again"
-LARGEST_BYTES, LARGEST = 1 << 28, 1e100
+SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 FASTEST_HZ = 1e6
 """A higher frame rate must be a mistake."""
-TIMES = ("t", "time", "time_s", "timestamp", "seconds")
-"""Names of a column of times."""
 START = 3
 """Frames at the start of a trial, whose median may be the rest value."""
+MOST_COUNTS = 65535
+PART = 1 << 16
+"""Frames that are converted at a time."""
+DECIMALS = 6
+"""Most decimals that signed values keep."""
+LARGEST_SHAPE = 4096
+NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
+"""Names of folders that only count trials."""
+SPARSEST = 64
+"""Cells for each value of a long table; more would be nearly empty."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
-    rate, scale = within(float, 1e-3, FASTEST_HZ), within(float, 1e-12, 1e12)
-    for name, form, text in (
-        (
-            "--rate",
-            {"type": rate, "metavar": "HZ"},
-            "frames a second, if no column is the time",
-        ),
-        (
-            "--frames",
-            {"action": "store_true"},
-            "a folder is a trial, and a file in it a frame, "
-            "named by its time in seconds, or by its number if --rate is given",
-        ),
-        (
-            "--time",
-            {"metavar": "COL"},
-            f"the time in seconds (default: {', '.join(TIMES)})",
-        ),
-        ("--taxels", {"metavar": "COLS"}, "the taxels (default: all other columns)"),
-        ("--joints", {"metavar": "COLS"}, "joint angles in radians"),
-        ("--degrees", {"action": "store_true"}, "joint angles are in degrees"),
-        (
-            "--shape",
-            {"metavar": "ROWSxCOLS"},
-            "of the skin (default: skin.json's, or one row)",
-        ),
-        (
-            "--falls",
-            {"action": "store_true"},
-            "values fall under pressure: subtract them from "
-            "those at rest, which are those of the trial with the quietest start",
-        ),
-        (
-            "--scale",
-            {"type": scale, "default": 1.0},
-            "counts in a unit of values with fractions",
-        ),
-        (
-            "--task",
-            {"default": "object"},
-            "the task of these labels (default: %(default)s)",
-        ),
-    ):
-        parser.add_argument(name, help=text, **form)
+    rate = within(float, 1e-3, FASTEST_HZ)
+    scale = within(float, 1e-12, 1e12)
+    add = parser.add_argument
+    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
+    add(
+        "--frames",
+        action="store_true",
+        help="a folder is a trial, and a file in it a frame, named by its time in "
+        "seconds, or by its number if --rate is given",
+    )
+    add(
+        "--trials",
+        action="store_true",
+        help="a file of arrays holds several trials: cells, structures, or a first axis",
+    )
+    add("--time", metavar="COL", help="the time (default: a column of such a name)")
+    add(
+        "--time-unit",
+        choices=UNITS,
+        help="unit of the times (default: by name or steps, where they leave no doubt)",
+    )
+    add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
+    add("--joints", metavar="COLS", help="joint angles in radians")
+    add("--degrees", action="store_true", help="joint angles are in degrees")
+    add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
+    add(
+        "--shape",
+        metavar="ROWSxCOLS",
+        help="of the skin (default: skin.json's, the columns' numbers, or one row)",
+    )
+    add(
+        "--falls",
+        action="store_true",
+        help="values fall under pressure: subtract them from those at rest, which are "
+        "those of the trial with the quietest start",
+    )
+    add(
+        "--signed",
+        action="store_true",
+        help="values rise and fall: count how far they are from those at rest",
+    )
+    add(
+        "--scale",
+        type=scale,
+        default=1.0,
+        help="counts in a unit of values with fractions",
+    )
+    add(
+        "--task",
+        default="object",
+        help="the task of these labels (default: %(default)s)",
+    )
+    add("--strict", action="store_true", help="stop at the first file that is unusable")
 
 
 @dataclass(frozen=True)
-class _Table:
-    """Named columns of texts or numbers, (n, columns), and the skin's shape where it is
-    known.
+class Source:
+    """A trial before its columns are understood.
 
-    Texts are objects: where numpy converts texts of its own type, it swallows Ctrl-C.
+    Attributes:
+        name: of the trial.
+        labels: {task: label}.
+        label: where the label comes from.
+        table: its values.
+        names: of all columns of the file, as they stand.
     """
 
-    path: Path
+    name: str
+    labels: dict[str, str]
+    label: str
+    table: Table
     names: list[str]
-    values: NDArray[Any]
-    shape: tuple[int, ...] = ()
 
-    def columns(self, wanted: str) -> list[int]:
-        """The places of a list of names and numbers; `q` also stands for q.1, q.2,
-        ..."""
-        places: list[int] = []
-        for term in wanted.split(","):
-            named = [
-                i for i, name in enumerate(self.names) if name.split(".")[0] == term
-            ]
-            if not named and (ends := re.fullmatch(r"(\d+)(?:-(\d+))?", term)):
-                named = list(range(len(self.names)))[
-                    int(ends[1]) - 1 : int(ends[2] or ends[1])
-                ]
-            if not named:
-                raise InputError(
-                    f"{self.path}: has no column {term}; it has {shown(self.names)}"
-                )
-            places += named
-        return places
 
-    def numbers(self, places: list[int]) -> NDArray[np.float64]:
-        """(n, places) values; NaN in place of those that are beyond measure."""
-        texts = self.values[:, places]
-        try:
-            values = texts.astype(np.float64)
-        except ValueError:
-            cells = zip(
-                np.tile(places, len(texts)).tolist(),
-                texts.ravel().tolist(),
-                strict=True,
-            )
-            place, text = next(cell for cell in cells if not _is_number(cell[1]))
-            problem = f"{shown(text)} in column {self.names[place]} is no number"
-            raise InputError(f"{self.path}: {problem}") from None
-        return np.where(np.abs(values) < LARGEST, values, np.nan)
+@dataclass(frozen=True)
+class Measured:
+    """The numbers of a trial.
 
-    def time(self, named: str | None = None) -> list[int]:
-        """The column of times, or none."""
-        known = [i for i, name in enumerate(self.names) if name.lower() in TIMES][:1]
-        return self.columns(named) if named else known
+    Attributes:
+        source: where they come from.
+        t: (n,) seconds.
+        values: (n, taxels); NaN where one is missing.
+        joints: (n, dof) radians, or None.
+        meaning: of the columns.
+    """
+
+    source: Source
+    t: NDArray[np.float64]
+    values: NDArray[np.float64]
+    joints: NDArray[np.float64] | None
+    meaning: Meaning
 
 
 def trials(
@@ -150,275 +170,488 @@ def trials(
 ) -> Iterator[tuple[str, Recording]]:
     """One recording for each file of a folder, or for each trial of a long table.
 
+    Prints what was taken. Files that cannot be used are appended to `options.skipped`.
+
     Raises:
-        InputError: a file cannot be read, a column is missing, or values are no counts.
+        InputError: no file can be used, or one cannot with `--strict`.
     """
+    options.skipped = []
     folder = path if path.is_dir() else path.parent
-    read = _framed if options.frames else _tables
-    named = list(read(path, folder, options))
-    if not named:
+    measured = list(_understood(_collected(path, folder, options), options))
+    if not measured:
+        if options.skipped:
+            raise InputError(options.skipped[0] + _more(options.skipped))
         kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: holds no {kind}; give a folder of trials")
-    beside = _labels(folder / LABELS, [name for name, _, _ in named])
+    beside = _labels(folder / LABELS, [m.source.name for m in measured], options)
     file = folder / "skin.json"
     skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
-    measured = [_measured(table, options) for _, _, table in named]
-    first, width = named[0][2].path, measured[0][1].shape[1]
-    for (_, _, table), (_, values, _) in zip(named, measured, strict=True):
-        if values.shape[1] != width:
-            few = f"{values.shape[1]} taxels, and {first} {width}"
-            raise InputError(f"{table.path}: has {few}; name them by --taxels")
-    starts = [np.median(values[:START], axis=0) for _, values, _ in measured]
-    at_rest = max(starts, key=np.nansum) if options.falls else 0.0
-    for (name, labels, table), (t, values, joints) in zip(named, measured, strict=True):
-        shape = _shape(options.shape, table, skin, width)
-        counts = (
-            np.clip(at_rest - values, 0.0, None) if options.falls else values
-        ) * options.scale
-        valid = np.isfinite(counts)
-        counts[~valid] = 0.0
-        frames = np.rint(counts).clip(0.0, 65535.0).astype(np.uint16)
-        if np.abs(frames - counts).max() > (0.5 if options.scale != 1.0 else 0.0):
-            raise InputError(
-                f"{table.path}: {counts.min():g} to {counts.max():g} are no counts "
-                "(whole numbers "
-                "from 0 to 65535); see --falls, --scale and --taxels"
-            )
-        meta: dict[str, Any] = {
-            "labels": {**labels, **beside.get(name, {})},
-            "source": path.name,
-        }
-        meta |= {
-            "skin": {**skin.raw, "rows": shape[0], "cols": shape[1]},
-            "trial": name,
-        }
-        if joints is not None:
+    first = measured[0]
+    shape = _shape(options.shape, first, skin)
+    _announce(first, shape, beside is not None)
+    rest = _rest(measured, options)
+    missing = 0
+    imported = 0
+    for trial in measured:
+        try:
+            recording = _recording(trial, rest, shape, skin, options)
+        except InputError as error:
+            _skip(options, error)
+            continue
+        imported += 1
+        missing += int(np.isnan(trial.values).sum())
+        labels = trial.source.labels
+        if beside is not None:
+            labels = {
+                **_others(labels, options.task),
+                **beside.get(trial.source.name, {}),
+            }
+        meta = {**recording.meta, "labels": labels, "source": path.name}
+        if trial.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
-        seen = None if valid.all() else valid.reshape(-1, *shape)
-        yield name, Recording(t - t[0], frames.reshape(-1, *shape), joints, seen, meta)
+        yield trial.source.name, _with_meta(recording, meta)
+    if not imported:
+        raise InputError(options.skipped[0] + _more(options.skipped))
+    if missing:
+        say(f"{missing} values are missing; these taxels are not valid in their frames")
 
 
-Named = Iterator[tuple[str, dict[str, str], _Table]]
-"""The name, labels and values of each trial."""
+def _others(labels: dict[str, str], task: str) -> dict[str, str]:
+    """Labels without that of the file's own name, which labels.csv replaces."""
+    return {name: label for name, label in labels.items() if name != task}
 
 
-def _tables(path: Path, folder: Path, options: argparse.Namespace) -> Named:
+def _with_meta(recording: Recording, meta: dict[str, Any]) -> Recording:
+    return Recording(
+        recording.t, recording.frames, recording.joints, recording.valid, meta
+    )
+
+
+def _more(skipped: Sequence[str]) -> str:
+    rest = len(skipped) - 1
+    return f"; {rest} more cannot be used either" if rest else ""
+
+
+def _skip(options: argparse.Namespace, error: InputError) -> None:
+    if options.strict:
+        raise error
+    options.skipped.append(str(error))
+
+
+def _announce(first: Measured, shape: tuple[int, ...], beside: bool) -> None:
+    """Print what was taken, once for all files."""
+    label = LABELS if beside else first.source.label
+    text = first.meaning.text(label, shape)
+    form = first.source.table.form
+    say("; ".join([text, *form]))
+
+
+def _collected(
+    path: Path, folder: Path, options: argparse.Namespace
+) -> Iterator[Source]:
     """The trials of the file, or of the files in the folder."""
+    if options.frames:
+        yield from _framed(path, folder, options)
+        return
     for file in _files(folder.rglob("*")) if path.is_dir() else [path]:
-        table = _table(file)
-        if "trial" in table.names:
-            with parsing(str(file), "a table of trials"):
-                yield from _trials_in(table)
-        else:
-            yield (
-                *_called(file.relative_to(folder).with_suffix(""), options.task),
-                table,
-            )
+        try:
+            yield from _of_file(file, folder, options)
+        except InputError as error:
+            _skip(options, error)
 
 
-def _framed(path: Path, folder: Path, options: argparse.Namespace) -> Named:
+def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
+    """The trials in a file."""
+    name, labels, label = _called(_stem(file.relative_to(folder)), options.task)
+    suffix = suffix_of(file)
+    if suffix in arrays.SUFFIXES:
+        stored = arrays.read_arrays(file)
+        axis = None if options.axis is None else options.axis - 1
+        used = _used(stored, options)
+        if options.trials:
+            for of_trial in arrays.trials_of(file, stored, options.task):
+                trial_name, trial_labels, trial_arrays = of_trial
+                table = arrays.table_of(file, trial_arrays, axis, used)
+                every = {**labels, **trial_labels}
+                yield Source(trial_name, every, "the arrays", table, table.names)
+            return
+        table = arrays.table_of(file, stored, axis, used)
+    else:
+        table = read_parquet(file) if suffix == ".parquet" else read_text(file)
+    if "trial" in table.names:
+        with parsing(str(file), "a table of trials"):
+            yield from _trials_in(table)
+    else:
+        yield Source(name, labels, label, table, table.names)
+
+
+def _used(stored: Iterable[str], options: argparse.Namespace) -> set[str]:
+    """The arrays that the options name."""
+    words = [options.taxels, options.joints, options.time]
+    terms = {term for word in words if word for term in word.split(",")}
+    return terms & set(stored) if options.taxels else set()
+
+
+def _framed(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
     """The trials of a folder that has a folder for each, with a file for each frame."""
     for inside in sorted(place for place in path.rglob("*") if place.is_dir()):
-        if files := _files(inside.glob("*")):
-            table = _stacked(inside, files, timed=options.rate is None)
-            yield *_called(inside.relative_to(folder), options.task), table
+        files = _files(inside.glob("*"))
+        if files:
+            name, labels, label = _called(inside.relative_to(folder), options.task)
+            try:
+                table = _stacked(inside, files, timed=options.rate is None)
+            except InputError as error:
+                _skip(options, error)
+                continue
+            yield Source(name, labels, label, table, table.names)
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
     """The tables among paths, in the order of their names."""
-    return sorted(p for p in paths if p.suffix.lower() in SUFFIXES and p.name != LABELS)
+    return sorted(p for p in paths if suffix_of(p) in SUFFIXES and p.name != LABELS)
 
 
-def _called(place: Path, task: str) -> tuple[str, dict[str, str]]:
-    """The name and label of the trial at a place in the folder."""
-    label = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
-    return "_".join(place.parts), {task: place.parent.name or label}
+def _stem(place: Path) -> Path:
+    """A file's place without its suffixes."""
+    bare = place.with_suffix("")
+    return bare.with_suffix("") if place.suffix.lower() in PACKED else bare
 
 
-def _labels(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
-    """{trial: its labels} of a labels.csv; empty without one."""
+def _called(place: Path, task: str) -> tuple[str, dict[str, str], str]:
+    """The name and label of the trial at a place in the folder, and where the label
+    comes from."""
+    folders = [part for part in place.parts[:-1] if not NUMBERED.fullmatch(part)]
+    own = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
+    name = "_".join(place.parts)
+    if folders:
+        return name, {task: folders[-1]}, "the folder's name"
+    return name, {task: own}, "the file's name"
+
+
+def _labels(
+    path: Path, trials: list[str], options: argparse.Namespace
+) -> dict[str, dict[str, str]] | None:
+    """{trial: its labels} of a labels.csv; None without one."""
     if not path.is_file():
-        return {}
-    with parsing(str(path), "a table of labels"):
-        head, *rows = _rows(path, read_bytes(path))
-    if "trial" not in head or not any(
-        row[head.index("trial")] in trials for row in rows
-    ):
+        return None
+    table = read_text(path)
+    data = table.data.astype(str).where(table.data.notna(), "")
+    rows = [] if "trial" not in table.names else data["trial"].tolist()
+    if not set(rows) & set(trials):
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    return {
-        row[head.index("trial")]: {
-            task: label
-            for task, label in zip(head, row, strict=True)
-            if task != "trial" and label
-        }
-        for row in rows
-    }
-
-
-def _table(path: Path) -> _Table:
-    """The table in a file."""
-    with parsing(str(path), "a table", "; save it as text"):
-        data = read_bytes(path, LARGEST_BYTES)
-        if path.suffix.lower() in (".npy", ".mat"):
-            return _of_arrays(path, data)
-        rows = _rows(path, data)
-    if all(map(_is_number, rows[0])):
-        return _Table(
-            path, [str(i + 1) for i in range(len(rows[0]))], np.array(rows, object)
-        )
-    if len(rows) == 1:
-        raise InputError(f"{path}: {EMPTY}")
-    return _Table(path, [cell.strip() for cell in rows[0]], np.array(rows[1:], object))
-
-
-def _rows(path: Path, data: bytes) -> list[list[str]]:
-    """The cells of a text, row by row; tabs, semicolons, commas or blanks are between
-    them."""
-    lines = [line for line in data.decode("utf-8-sig").splitlines() if line.strip()]
-    marks = [mark for mark in "\t;," if mark in lines[0]] if lines else []
-    rows = (
-        list(csv.reader(lines, delimiter=marks[0]))
-        if marks
-        else [x.split() for x in lines]
-    )
-    if not rows:
-        raise InputError(f"{path}: {EMPTY}")
-    width = len(rows[0])
-    for number, row in enumerate(rows, 1):
-        if len(row) != width:
-            values = f"{len(row)} value{'s' * (len(row) != 1)}"
-            raise InputError(
-                f"{path}: row {number} has {values}, and the first row {width}"
+    for row in rows:
+        if row not in trials:
+            options.skipped.append(f"{path}: {row} names no file")
+    for trial in trials:
+        if trial not in rows:
+            options.skipped.append(
+                f"{path}: has no row for {trial}, which has no label"
             )
-    return rows
+    tasks = [name for name in table.names if name != "trial"]
+    labels = {}
+    for trial, row in zip(rows, data[tasks].to_dict("records"), strict=True):
+        labels[trial] = {str(task): label for task, label in row.items() if label}
+    return labels
 
 
-def _of_arrays(path: Path, data: bytes) -> _Table:
-    """The table of the arrays in an .npy or .mat file, a row for each entry of their
-    first axis."""
-    file = io.BytesIO(data)
-    stored = (
-        {"": np.lib.format.read_array(file)}
-        if path.suffix.lower() == ".npy"
-        else loadmat(file)
-    )
-    arrays = {
-        key: np.atleast_1d(array)
-        for key, array in stored.items()
-        if isinstance(array, np.ndarray) and array.dtype.kind in "iuf" and array.size
-    }
-    if not arrays:
-        raise InputError(f"{path}: {EMPTY}")
-    n, shape = len(max(arrays.values(), key=np.size)), ()
-    names: list[str] = []
-    blocks: list[NDArray[Any]] = []
-    for key, array in arrays.items():
-        shape = array.shape[1:] if array.ndim == 3 else shape
-        if array.size % n == 0:
-            blocks.append(array.reshape(n, -1))
-            columns = range(1, blocks[-1].shape[1] + 1)
-            names += (
-                [f"{key}.{i}".strip(".") for i in columns]
-                if len(columns) > 1
-                else [key]
-            )
-    return _Table(path, names, np.hstack(blocks), shape)
-
-
-def _stacked(folder: Path, files: list[Path], *, timed: bool) -> _Table:
+def _stacked(folder: Path, files: list[Path], *, timed: bool) -> Table:
     """The frames of a trial, a row for each; `timed` if their files are named by their
     times."""
-    tables = [_table(file) for file in files]
-    frames = [table.numbers(list(range(len(table.names)))) for table in tables]
+    frames = [_frame(file) for file in files]
     shape = frames[0].shape
     for file, frame in zip(files, frames, strict=True):
         if frame.shape != shape:
             sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
             raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
     values = np.array(frames).reshape(len(files), -1)
-    names = [str(i + 1) for i in range(values.shape[1])]
-    if not timed:
-        return _Table(folder, names, values, shape)
-    with parsing(
-        str(folder), "a folder of files that are named by their times", "; give --rate"
-    ):
-        t = np.array([float(file.stem) for file in files])
-        if not np.isfinite(t).all():
-            raise ValueError("a time is not finite")
-    order = np.argsort(t, kind="stable")
-    return _Table(folder, ["t", *names], np.column_stack([t, values])[order], shape)
+    data = pd.DataFrame(values, columns=[str(i + 1) for i in range(values.shape[1])])
+    if timed:
+        with parsing(
+            str(folder),
+            "a folder of files that are named by their times",
+            "; give --rate",
+        ):
+            t = np.array([float(_stem(Path(file.name)).name) for file in files])
+            if not np.isfinite(t).all():
+                raise ValueError("a time is not finite")
+        data.insert(0, "time_s", t)
+        data = data.sort_values("time_s", kind="stable", ignore_index=True)
+    return Table(folder, data, False, shape)
 
 
-def _is_number(text: str) -> bool:
-    with suppress(ValueError):
-        float(text)
-        return True
-    return False
+def _frame(file: Path) -> NDArray[np.float64]:
+    """(rows, columns) of the numbers in a file."""
+    if suffix_of(file) == ".npy":
+        return np.atleast_2d(arrays.read_arrays(file)[""]).astype(np.float64)
+    return read_frame(file)
 
 
-def _trials_in(table: _Table) -> Named:
+def _trials_in(table: Table) -> Iterator[Source]:
     """The trials of a long table."""
-    names, values = table.names, table.values
-    trial = values[:, names.index("trial")].astype(str)
-    texts = [
-        i
-        for i, name in enumerate(names)
-        if not _is_number(values[0, i]) and name != "trial"
-    ]
-    kept = [i for i, name in enumerate(names) if name != "trial" and i not in texts]
-    for trial_name in dict.fromkeys(trial.tolist()):
-        rows = values[trial == trial_name]
-        rows_of_trial = _Table(table.path, [names[i] for i in kept], rows[:, kept])
-        labels = {names[i]: str(rows[0, i]) for i in texts}
-        yield (
-            trial_name,
-            labels,
-            _pivoted(rows_of_trial) if "taxel" in names else rows_of_trial,
-        )
+    texts = [name for name in table.names if name != "trial" and is_text(table, name)]
+    dates = [name for name in texts if _is_time(table, name)]
+    values = [name for name in texts if name in dates or name == "taxel"]
+    labels = [name for name in texts if name not in values]
+    label = f"columns {', '.join(labels)}" if labels else "none"
+    kept = [n for n in table.names if n != "trial" and n not in labels]
+    for trial, rows in table.data.groupby("trial", sort=False):
+        of_trial = {}
+        for name in labels:
+            found = rows[name].unique()
+            if len(found) > 1:
+                raise InputError(
+                    f"{table.path}: {name} changes within trial {trial}, from "
+                    f"{shown(str(found[0]))} to {shown(str(found[1]))}"
+                )
+            of_trial[name] = str(found[0])
+        data = rows[kept].reset_index(drop=True)
+        part = Table(table.path, data, table.named, table.shape, table.form)
+        if "taxel" in table.names:
+            part = _pivoted(part, str(trial))
+        yield Source(str(trial), of_trial, label, part, table.names)
 
 
-def _pivoted(table: _Table) -> _Table:
+def _is_time(table: Table, name: str) -> bool:
+    first = Table(table.path, table.data[[name]].iloc[:1])
+    try:
+        return meaning(first, [name], Wishes(taxels=name)).time == name
+    except InputError:
+        return False
+
+
+def _pivoted(table: Table, trial: str) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
-    places = [*table.time(), *table.columns("taxel,value")]
-    if len(places) != 3:
-        raise InputError(f"{table.path}: has no column of times; name it t")
-    t, taxel, value = table.numbers(places).T
-    times, row = np.unique(t, return_inverse=True)
-    taxels, column = np.unique(taxel, return_inverse=True)
-    values = np.full((len(times), 1 + len(taxels)), np.nan)
-    values[:, 0], values[row, 1 + column] = times, value
-    return _Table(table.path, ["t", *(f"{name:g}" for name in taxels)], values)
-
-
-def _measured(
-    table: _Table, options: argparse.Namespace
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
-    """Times (n,), values (n, taxels) and joint angles of a trial."""
-    time = table.time(options.time)
-    angles = table.columns(options.joints) if options.joints else []
-    others = [i for i in range(len(table.names)) if i not in (*time, *angles)]
-    values = table.numbers(table.columns(options.taxels) if options.taxels else others)
-    if not time and options.rate is None:
+    others = [name for name in table.names if name not in ("taxel", "value")]
+    if "value" not in table.names or not others:
         raise InputError(
-            f"{table.path}: no column is a time; give --rate HZ or --time COL"
+            f"{table.path}: needs the columns value and a time beside taxel"
         )
-    t = table.numbers(time)[:, 0] if time else np.arange(len(values)) / options.rate
-    joints = table.numbers(angles) * (np.pi / 180.0 if options.degrees else 1.0)
-    return t, values, joints if angles else None
+    time = others[0]
+    data = table.data
+    again = data.duplicated([time, "taxel"])
+    if again.any():
+        row = data[again].iloc[0]
+        raise InputError(
+            f"{table.path}: trial {trial} has two values of taxel {row['taxel']} at "
+            f"time {row[time]}"
+        )
+    cells = data[time].nunique() * data["taxel"].nunique()
+    if cells > SPARSEST * len(data):
+        raise InputError(
+            f"{table.path}: the {len(data)} values of trial {trial} would fill "
+            f"{len(data) / cells:.1%} of a table; the taxels need times in common"
+        )
+    wide = data.pivot(index=time, columns="taxel", values="value").reset_index()
+    names = sorted((n for n in wide.columns if n != time), key=_natural)
+    wide = wide[[time, *names]]
+    wide.columns = [time, *(_plain(name) for name in names)]
+    return Table(table.path, wide, False, (), table.form)
 
 
-def _shape(
-    given: str | None, table: _Table, skin: ConfigTable, taxels: int
-) -> tuple[int, ...]:
+def _plain(name: Any) -> str:
+    return f"{name:g}" if isinstance(name, float) else str(name)
+
+
+def _natural(name: Any) -> list[Any]:
+    """A key that sorts s2 before s10."""
+    parts = re.split(r"(\d+)", _plain(name))
+    return [int(part) if part.isdigit() else part for part in parts]
+
+
+def _understood(
+    sources: Iterable[Source], options: argparse.Namespace
+) -> Iterator[Measured]:
+    """The numbers of the trials whose columns are those of the first."""
+    wishes = Wishes(
+        options.time, options.taxels, options.joints, options.time_unit, options.rate
+    )
+    first: Measured | None = None
+    for source in sources:
+        try:
+            trial = _measured(source, wishes, options)
+            if first is None:
+                first = trial
+            else:
+                _compare(trial, first)
+        except InputError as error:
+            _skip(options, error)
+            continue
+        yield trial
+
+
+def _compare(trial: Measured, first: Measured) -> None:
+    """Refuse a trial with other columns than the first."""
+    path = trial.source.table.path
+    known = first.source.table.path
+    if len(trial.meaning.taxels) != len(first.meaning.taxels):
+        few = f"{len(trial.meaning.taxels)} taxels, and {known} "
+        raise InputError(
+            f"{path}: has {few}{len(first.meaning.taxels)}; name them by --taxels"
+        )
+    if trial.meaning.taxels != first.meaning.taxels:
+        raise InputError(
+            f"{path}: its taxels are {shown(list(trial.meaning.taxels))}, and those of "
+            f"{known} {shown(list(first.meaning.taxels))}"
+        )
+    if trial.meaning.unit != first.meaning.unit:
+        raise InputError(
+            f"{path}: its time seems to be in {trial.meaning.unit}, and that of {known} "
+            f"in {first.meaning.unit}; give --time-unit"
+        )
+
+
+def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Measured:
+    """The numbers of a trial."""
+    table = source.table
+    if table.shape and not wishes.taxels:
+        wishes = _all_of_the_array(table, wishes)
+    taken = meaning(table, source.names if table.named else table.names, wishes)
+    values = np.column_stack([numbers_of(table, name) for name in taken.taxels])
+    values[~np.isfinite(values)] = np.nan
+    if np.isnan(values).all():
+        raise InputError(f"{table.path}: none of its values is a finite number")
+    if taken.time is None:
+        assert options.rate is not None
+        t = np.arange(len(values)) / options.rate
+    else:
+        t = times_of(table, taken)
+    joints = None
+    if taken.joints:
+        angles = [numbers_of(table, name) for name in taken.joints]
+        joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
+    head = replace(table, data=table.data.iloc[:0])
+    return Measured(replace(source, table=head), t, values, joints, taken)
+
+
+def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
+    """The user's wishes, with the array of rows and columns for the taxels."""
+    size = int(np.prod(table.shape))
+    stems: dict[str, list[str]] = {}
+    for name in table.names:
+        stems.setdefault(name.rpartition(".")[0], []).append(name)
+    fitting = [names for names in stems.values() if len(names) == size]
+    if len(fitting) != 1:
+        return wishes
+    taxels = ",".join(fitting[0])
+    return Wishes(wishes.time, taxels, wishes.joints, wishes.unit, wishes.rate)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """How values become counts.
+
+    Attributes:
+        values: (taxels,) at rest; None where they are counts as they stand.
+        sign: of the pressure; 0 where both directions count.
+        scale: counts a unit of value.
+    """
+
+    values: NDArray[np.float64] | None
+    sign: int
+    scale: float
+
+    def counts(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values as counts, not rounded."""
+        if self.values is None:
+            return values * self.scale
+        deviations = values - self.values
+        if self.sign:
+            deviations = np.maximum(self.sign * deviations, 0.0)
+        return np.abs(deviations) * self.scale
+
+
+def _rest(measured: Sequence[Measured], options: argparse.Namespace) -> Rest:
+    """The values at rest, and the scale that keeps all digits of signed ones."""
+    if options.falls and options.signed:
+        raise InputError("--falls and --signed exclude each other; give one")
+    if not (options.falls or options.signed):
+        return Rest(None, 1, options.scale)
+    starts = np.array([np.median(trial.values[:START], axis=0) for trial in measured])
+    if options.falls:
+        return Rest(max(starts, key=np.nansum), -1, options.scale)
+    middle = np.nanmedian(starts, axis=0)
+    unrest = np.nansum(np.abs(starts - middle), axis=1)
+    values = starts[int(unrest.argmin())]
+    largest = max(float(np.nanmax(np.abs(m.values - values))) for m in measured)
+    scale = options.scale
+    if scale == 1.0 and largest > 0.0:
+        scale = _finest([m.values - values for m in measured], largest)
+    return Rest(values, 0, scale)
+
+
+def _finest(deviations: Sequence[NDArray[np.float64]], largest: float) -> float:
+    """The counts a unit that make all deviations whole, or else use all counts."""
+    for decimals in range(DECIMALS + 1):
+        scale = 10.0**decimals
+        if scale * largest > MOST_COUNTS:
+            break
+        wholes = [np.abs(d * scale - np.rint(d * scale)) for d in deviations]
+        if all(float(np.nanmax(whole)) < 1e-6 * max(scale, 1.0) for whole in wholes):
+            return scale
+    return MOST_COUNTS / largest
+
+
+def _recording(
+    trial: Measured,
+    rest: Rest,
+    shape: tuple[int, ...],
+    skin: ConfigTable,
+    options: argparse.Namespace,
+) -> Recording:
+    """The recording of a trial, without labels."""
+    path = trial.source.table.path
+    meta: dict[str, Any] = {
+        "skin": {**skin.raw, "rows": shape[0], "cols": shape[1]},
+        "trial": trial.source.name,
+    }
+    if rest.values is not None:
+        at_rest = [None if np.isnan(v) else float(v) for v in rest.values]
+        meta["values"] = {"counts_per_unit": rest.scale, "rest": at_rest}
+    exact = rest.scale == 1.0 and rest.values is None
+    frames = np.empty(trial.values.shape, dtype=np.uint16)
+    valid = np.empty(trial.values.shape, dtype=np.bool_)
+    # A part at a time, as a long recording would else fill the memory several times.
+    for begin in range(0, len(frames), PART):
+        rows = slice(begin, begin + PART)
+        counts = rest.counts(trial.values[rows])
+        valid[rows] = np.isfinite(counts)
+        counts = np.where(valid[rows], counts, 0.0)
+        _check_counts(path, counts, exact)
+        frames[rows] = np.rint(counts)
+    seen = None if valid.all() else valid.reshape(-1, *shape)
+    t = trial.t - trial.t[0]
+    return Recording(t, frames.reshape(-1, *shape), trial.joints, seen, meta)
+
+
+def _check_counts(path: Path, counts: NDArray[np.float64], exact: bool) -> None:
+    """Refuse what are no counts."""
+    low = float(counts.min(initial=0.0))
+    high = float(counts.max(initial=0.0))
+    whole = not exact or bool((counts == np.rint(counts)).all())
+    if low < 0.0 or high > MOST_COUNTS + 0.5 or not whole:
+        hint = "--signed, " if low < 0.0 else ""
+        lowest = float(counts.min())
+        raise InputError(
+            f"{path}: {lowest:g} to {high:g} are no counts (whole numbers from 0 to "
+            f"65535); see {hint}--falls, --scale and --taxels"
+        )
+
+
+def _shape(text: str | None, first: Measured, skin: ConfigTable) -> tuple[int, ...]:
     """Rows and columns of the skin."""
-    shape = table.shape or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    if given is not None:
-        sizes = re.fullmatch(r"(\d+)x(\d+)", given)
+    taxels = len(first.meaning.taxels)
+    table = first.source.table
+    told = table.shape or first.meaning.shape
+    shape = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
+    if text is not None:
+        sizes = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
         if sizes is None:
-            raise InputError(f"--shape must be ROWSxCOLS, such as 16x24, not {given}")
+            raise InputError(
+                f"--shape must be ROWSxCOLS, such as 16x24, not {text[:40]}"
+            )
         shape = int(sizes[1]), int(sizes[2])
     if len(shape) != 2 or shape[0] * shape[1] != taxels:
         size = " x ".join(map(str, shape))

@@ -3,14 +3,16 @@ used."""
 
 import io
 import json
+import os
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.io import savemat
 
 from edge.recording import load
 from train.__main__ import main
-from train.importers.csv import _table
 
 T = np.array([0.0, 0.02, 0.05, 0.06])
 FRAMES = np.arange(24).reshape(4, 2, 3)
@@ -25,6 +27,7 @@ def text(rows, mark=",", head="") -> str:
 
 def wide_with_a_header(folder):
     (folder / "cup 3.csv").write_text(text(WIDE, head="time,a,b,c,d,e,f"))
+    return ["--taxels", "a-f"]
 
 
 def numbers_alone(folder):
@@ -73,6 +76,7 @@ def a_long_table_of_frames(folder):
     (folder / "all.tsv").write_text(
         text(rows, "\t", "trial\tobject\tseconds\ta\tb\tc\td\te\tf")
     )
+    return ["--taxels", "a-f"]
 
 
 @pytest.fixture
@@ -134,19 +138,13 @@ def test_the_first_frame_of_a_folder_is_the_earliest(folder):
     assert recordings["cup"].t.tolist() == [0.0, 1.0]
 
 
-def test_texts_are_objects_as_numpy_swallows_ctrl_c_in_texts_of_its_own(folder):
-    wide_with_a_header(folder)
-    (file,) = folder.iterdir()
-    assert _table(file).values.dtype == object
-
-
 def test_trials_may_be_numbered_in_an_array(folder):
     rows = np.array([[0.0], [0.0], [7.0]])
     savemat(
         folder / "all.mat",
         {"trial": rows, "t": np.array([[0.0], [0.1], [0.0]]), "a": rows},
     )
-    _, recordings = imported(folder)
+    _, recordings = imported(folder, "--taxels", "a")
     assert {name: len(trial.t) for name, trial in recordings.items()} == {
         "0.0": 2,
         "7.0": 1,
@@ -161,6 +159,7 @@ def test_joints_fractions_gaps_and_files_beside(folder):
         json.dumps({"rows": 2, "cols": 1, "threshold_counts": 3})
     )
     words = ["--rate", "10", "--joints", "q", "--degrees", "--scale", "10"]
+    words += ["--taxels", "left,right"]
     status, recordings = imported(folder, *words)
     assert status == 0
     trial = recordings["a"]
@@ -211,7 +210,7 @@ RATE = ("--rate", "1")
             RATE,
             "1.txt: not a table: it is not UTF-8 text; save it",
         ),
-        ({"1.csv": "a,b\n1,2\n1,x\n"}, RATE, "1.csv: 'x' in column b is no number"),
+        ({"1.csv": "p1,p2\n1,2\n1,x\n"}, RATE, "1.csv: 'x' in column p2 is no number"),
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--taxels", "3"),
@@ -233,7 +232,11 @@ RATE = ("--rate", "1")
             (*RATE, "--shape", "2x-1"),
             "--shape must be ROWSxCOLS, such as 16x",
         ),
-        ({"1.txt": "1 2\n", "2.txt": "1 2 3\n"}, RATE, "2.txt: has 3 taxels, and "),
+        (
+            {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
+            (*RATE, "--strict"),
+            "2.txt: has 3 taxels, and ",
+        ),
         ({}, (), "in: holds no file .csv"),
         (
             {"a.csv": "1 2\n"},
@@ -274,7 +277,7 @@ RATE = ("--rate", "1")
         ({"1.txt": "1 2\n", "labels.csv": ""}, RATE, f"labels.csv: {EMPTY}"),
         ({"1.txt": "1 2\n", "1.csv": "1 2\n"}, RATE, "in: two trials are named 1"),
         (
-            {"all.csv": "trial,a\n../1,2\n"},
+            {"all.csv": "trial,p1\n../1,2\n"},
             RATE,
             "all.csv: the trial '../1' needs a name ",
         ),
@@ -289,4 +292,149 @@ def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, ref
     path = next(folder.glob("all.*"), folder)
     assert sentence in refusal(
         "import", "csv", path, "--out", folder.parent / "out", *words
+    )
+
+
+TABLES = int(os.environ.get("TABLES", "60"))
+"""Generated tables; TABLES=2000 tries as many."""
+
+
+@settings(max_examples=TABLES, deadline=None)
+@given(data=st.data())
+def test_generated_tables_arrive_as_an_independent_reader_has_them(
+    tmp_path_factory, data
+):
+    """Any order of the columns, separator, unit, sign, and columns that are no taxels."""
+    draw = data.draw
+    taxels = draw(st.integers(1, 12))
+    rows = draw(st.integers(4, 12))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    counts = rng.integers(0, 1000, (rows, taxels))
+    signed = draw(st.booleans())
+    values = counts * 0.25 if signed else counts
+    if signed:
+        values = values * rng.choice([-1, 1], values.shape)
+        values[:3] = values[0]
+    factor = draw(st.sampled_from([1.0, 1e3, 1e6]))
+    columns = {"t": [f"{i * 0.02 * factor:.6f}" for i in range(rows)]}
+    for i in range(taxels):
+        columns[f"p{i + 1}"] = [f"{value:g}" for value in values[:, i]]
+    for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
+        columns[name] = [str(int(n)) for n in rng.integers(0, 9, rows)]
+    order = draw(st.permutations(sorted(columns)))
+    sep = draw(st.sampled_from([",", ";", "\t"]))
+    lines = [sep.join(order)]
+    for row in range(rows):
+        lines.append(sep.join(columns[name][row] for name in order))
+    folder = tmp_path_factory.mktemp("table")
+    (folder / "in").mkdir()
+    dirt = draw(st.sampled_from(["", "\n", "# a comment\n"]))
+    ending = draw(st.sampled_from(["\n", "\r\n"]))
+    contents = dirt + "\n".join(lines) + "\n"
+    (folder / "in" / "cup_1.csv").write_text(contents, newline=ending)
+    words = ["--signed"] if signed else []
+    status, recordings = imported(folder / "in", *words)
+    assert status == 0
+    recording = recordings["cup_1"]
+    expected = np.abs(counts if not signed else values - values[0])
+    scale = recording.meta["values"]["counts_per_unit"] if signed else 1
+    assert recording.frames.reshape(rows, -1) == pytest.approx(
+        expected * scale, abs=1e-6
+    )
+    assert recording.t == pytest.approx(0.02 * np.arange(rows))
+
+
+@pytest.mark.parametrize(
+    ("files", "label"),
+    [
+        ({"cup/trial_1/x.csv": 1}, "cup"),
+        ({"cup/1/x.csv": 1}, "cup"),
+        ({"cup/x_1.csv": 1}, "cup"),
+        ({"cup_1.csv": 1}, "cup"),
+    ],
+)
+def test_a_label_is_no_folder_that_counts_trials(folder, files, label):
+    for name in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("t,p1\n0,1\n0.1,2\n")
+    _, recordings = imported(folder)
+    (recording,) = recordings.values()
+    assert recording.labels == {"object": label}
+
+
+def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
+    for i in range(3):
+        (folder / f"cup_{i}.csv").write_text(f"t,p1\n0,1\n0.1,{i}\n")
+    (folder / "pen_1.csv").write_text("t,p1\n0,1\n0.1,x\n")
+    (folder / "pen_2.csv").write_text("t,s1\n0,1\n0.1,2\n")
+    status, recordings = imported(folder)
+    err = capsys.readouterr().err
+    assert status == 1
+    assert sorted(recordings) == ["cup_0", "cup_1", "cup_2"]
+    assert "pen_1.csv: 'x' in column p1 is no number" in err
+    assert "pen_2.csv: its taxels are ['s1'], and those of" in err
+
+
+def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
+    for name in ("r0", "r1"):
+        (folder / f"{name}.csv").write_text(f"t,p1\n0,{name[1]}\n0.1,2\n")
+    (folder / "labels.csv").write_text("trial,object\nr0,box\nR1,cup\n")
+    status, recordings = imported(folder)
+    err = capsys.readouterr().err
+    assert status == 1
+    assert recordings["r0"].labels == {"object": "box"}
+    assert recordings["r1"].labels == {}
+    assert "R1 names no file" in err
+    assert "has no row for r1" in err
+
+
+def test_trials_with_the_same_frames_are_named(folder, capsys):
+    for name in ("cup_1", "cup_2"):
+        (folder / f"{name}.csv").write_text("t,p1\n0,1\n0.1,2\n")
+    imported(folder)
+    assert "2 trials have the frames of others" in capsys.readouterr().out
+
+
+def test_signed_values_keep_all_digits_and_say_how(folder):
+    rows = "\n".join(
+        f"{i / 10},{2.5 + 0.25 * (i > 3)},{-1.25 - 3 * (i > 4)}" for i in range(8)
+    )
+    (folder / "cup.csv").write_text(f"t,e1,e2\n{rows}\n")
+    status, recordings = imported(folder, "--signed")
+    assert status == 0
+    recording = recordings["cup"]
+    assert recording.meta["values"] == {"counts_per_unit": 100.0, "rest": [2.5, -1.25]}
+    assert recording.frames[-1].tolist() == [[25, 300]]
+    assert recording.frames[0].tolist() == [[0, 0]]
+
+
+def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
+    rows = "a,box,0,1,2\na,box,0.1,51,62\n"
+    (folder / "all.csv").write_text("trial,object,t,p1,p2\n" + rows)
+    _, recordings = imported(folder, "--taxels", "4-5")
+    assert recordings["a"].frames[-1].tolist() == [[51, 62]]
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        ("a,0,1,5\na,0,1,6\n", "two values of taxel 1 at time 0"),
+        (
+            "".join(f"a,{i},{i},1\n" for i in range(300)),
+            "the taxels need times in common",
+        ),
+    ],
+)
+def test_a_long_table_of_values_must_be_a_table(folder, refusal, rows, sentence):
+    (folder / "all.csv").write_text("trial,t,taxel,value\n" + rows)
+    assert sentence in refusal(
+        "import", "csv", folder / "all.csv", "--out", folder.parent / "out"
+    )
+
+
+def test_a_label_that_changes_within_a_trial_is_refused(folder, refusal):
+    rows = "a,box,0,1\na,cup,0.1,2\n"
+    (folder / "all.csv").write_text("trial,object,t,p1\n" + rows)
+    assert "object changes within trial a, from 'box' to 'cup'" in refusal(
+        "import", "csv", folder / "all.csv", "--out", folder.parent / "out"
     )

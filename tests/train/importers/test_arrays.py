@@ -1,0 +1,121 @@
+"""Arrays: which axis is the time, trials within a file, and sizes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from edge.errors import InputError
+from train.importers import arrays
+from train.importers.arrays import read_arrays, table_of, trials_of
+
+PATH = Path("a.mat")
+FRAMES = np.arange(24).reshape(6, 4)
+
+
+@pytest.mark.parametrize(
+    ("stored", "form"),
+    [
+        ({"t": np.arange(6.0), "skin": FRAMES}, "time is axis 1 of skin"),
+        ({"t": np.arange(6.0), "skin": FRAMES.T}, "time is axis 2 of skin"),
+        ({"q": np.zeros((3, 6)), "skin": FRAMES.T}, "time is axis 2 of skin"),
+        ({"skin": FRAMES}, "time is axis 1 of skin"),
+    ],
+)
+def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
+    table = table_of(PATH, stored, None, set())
+    assert form in table.form
+    skin = [name for name in table.names if name.startswith("skin")]
+    assert table.data[skin].to_numpy().tolist() == FRAMES.tolist()
+
+
+@pytest.mark.parametrize(
+    ("stored", "sentence"),
+    [
+        ({"a": np.ones((6, 6)), "b": np.ones((6, 2))}, "which axis of a"),
+        ({"a": np.ones((6, 4)), "b": np.ones((5, 3))}, "which axis is the time"),
+        ({"a": np.ones((6, 4)), "b": np.ones((4, 6))}, "which axis is the time"),
+        ({"t": np.ones(7), "a": np.ones((6, 4))}, "no axis of 7 frames"),
+        ({"a": np.ones((6, 4, 2, 2))}, "has 4 dimensions"),
+        ({"a": np.array(["x"])}, "holds no values"),
+    ],
+)
+def test_what_would_be_guessed_is_asked(stored, sentence):
+    with pytest.raises(InputError, match=sentence):
+        table_of(PATH, stored, None, set())
+
+
+def test_an_axis_that_is_named_is_taken():
+    square = np.arange(36).reshape(6, 6)
+    stored = {"a": square, "b": np.ones((6, 2))}
+    table = table_of(PATH, stored, 1, {"a"})
+    assert table.data.to_numpy().tolist() == square.T.tolist()
+
+
+def test_an_array_of_rows_and_columns_tells_the_shape():
+    stored = {"t": np.arange(6.0), "skin": FRAMES.reshape(6, 2, 2)}
+    assert table_of(PATH, stored, None, set()).shape == (2, 2)
+
+
+def of_structures(path):
+    trials = np.zeros(2, dtype=[("frames", "O"), ("label", "O")])
+    trials[0] = (FRAMES, "cup")
+    trials[1] = (FRAMES + 1, "pen")
+    savemat(path, {"trials": trials})
+
+
+def of_cells(path):
+    cells = np.empty(2, dtype=object)
+    cells[0], cells[1] = FRAMES, FRAMES + 1
+    savemat(path, {"frames": cells, "label": np.array(["cup", "pen"], dtype=object)})
+
+
+def stacked(path):
+    frames = np.stack([FRAMES, FRAMES + 1])
+    savemat(path, {"frames": frames, "label": np.array(["cup", "pen"], dtype=object)})
+
+
+@pytest.mark.parametrize("write", [of_structures, of_cells, stacked])
+def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
+    path = tmp_path / "a.mat"
+    write(path)
+    (first, second) = trials_of(path, read_arrays(path), "object")
+    assert first[0] == "a_000"
+    assert second[0] == "a_001"
+    assert first[1] == {"object": "cup"}
+    assert second[1] == {"object": "pen"}
+    assert first[2]["frames"].tolist() == FRAMES.tolist()
+    assert second[2]["frames"].tolist() == (FRAMES + 1).tolist()
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
+def test_arrays_are_read_from_every_format(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".npy":
+        np.save(path, FRAMES)
+    elif suffix == ".npz":
+        np.savez_compressed(path, skin=FRAMES)
+    elif suffix == ".mat":
+        savemat(path, {"skin": FRAMES})
+    else:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            file["skin"] = FRAMES
+    (array,) = read_arrays(path).values()
+    assert array.tolist() == FRAMES.tolist()
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat"])
+def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypatch):
+    path = tmp_path / f"a{suffix}"
+    large = np.zeros((100, 100), np.uint8)
+    if suffix == ".npy":
+        np.save(path, large)
+    elif suffix == ".npz":
+        np.savez_compressed(path, a=large)
+    else:
+        savemat(path, {"a": large}, do_compression=True)
+    monkeypatch.setattr(arrays, "MOST_VALUES", 1000)
+    with pytest.raises(InputError, match="values, more than the 1000 that are read"):
+        read_arrays(path)

@@ -1,0 +1,158 @@
+"""What the columns of a table are taken for, and what is asked instead of guessed."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from edge.errors import InputError
+from train.importers.columns import Wishes, meaning, times_of
+from train.importers.reading import Table
+
+COUNTS = np.arange(5)
+
+
+def table(*names, **columns):
+    data = pd.DataFrame(dict.fromkeys(names, COUNTS) | columns)
+    return Table(Path("a.csv"), data)
+
+
+def taken(given, **wishes):
+    return meaning(given, given.names, Wishes(**wishes))
+
+
+def test_taxels_are_those_of_a_stem_with_running_numbers():
+    found = taken(table("s2", "s1", "s10", *(f"s{i}" for i in range(3, 10))), rate=10)
+    assert found.taxels == tuple(f"s{i}" for i in range(1, 11))
+
+
+def test_taxels_with_a_row_and_a_column_tell_the_shape():
+    names = [f"taxel_{row}_{col}" for col in range(3) for row in range(2)]
+    found = taken(table(*names), rate=10)
+    assert found.shape == (2, 3)
+    assert found.taxels[:3] == ("taxel_0_0", "taxel_0_1", "taxel_0_2")
+
+
+@pytest.mark.parametrize(
+    "name", ["label", "object_id", "slipped", "temperature", "frame", "sample", ""]
+)
+def test_any_further_column_is_left_out_and_named(name):
+    found = taken(table("p1", "p2", name), rate=10)
+    assert found.taxels == ("p1", "p2")
+    assert found.left_out == (name,)
+
+
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [
+        (("thumb", "index"), "no columns are named as taxels"),
+        (("s1", "s3"), "no columns are named as taxels"),
+        (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
+    ],
+)
+def test_what_would_be_guessed_is_asked(names, sentence):
+    with pytest.raises(InputError, match=sentence):
+        taken(table(*names), rate=10)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        ("b,a", ("b", "a")),
+        ("a-c", ("a", "b", "c")),
+        ("2-3", ("b", "c")),
+        ("d", ("d",)),
+        ("q", ("q.1", "q.2")),
+    ],
+)
+def test_columns_are_named_by_names_ranges_and_places(wanted, names):
+    given = table("a", "b", "c", "d", "q.1", "q.2")
+    assert taken(given, taxels=wanted, rate=10).taxels == names
+
+
+@pytest.mark.parametrize(
+    ("wishes", "sentence"),
+    [
+        ({"taxels": "5-9"}, "has no column 5-9"),
+        ({"taxels": "s3"}, "has no column s3"),
+        ({"taxels": "s1,s1"}, "named twice"),
+        ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
+        ({"joints": "s1,s2"}, "no columns are named as taxels"),
+        ({"time": "s1,s2"}, "--time names several columns"),
+    ],
+)
+def test_contradictions_are_refused(wishes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        taken(table("s1", "s2"), rate=10, **wishes)
+
+
+def test_a_rate_beside_a_time_is_refused_and_neither_too():
+    with pytest.raises(InputError, match="beside --rate"):
+        taken(table("t", "s1"), rate=10)
+    with pytest.raises(InputError, match="no column is a time; give --rate"):
+        taken(table("s1"))
+
+
+@pytest.mark.parametrize(
+    ("name", "step", "unit"),
+    [
+        ("t", 0.01, "s"),
+        ("t", 10.0, "ms"),
+        ("t", 1e4, "us"),
+        ("t", 1e7, "ns"),
+        ("time_ms", 0.5, "ms"),
+        ("Time [s]", 2.0, "s"),
+        ("timestamp (us)", 1.0, "us"),
+    ],
+)
+def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit):
+    found = taken(table("s1", **{name: COUNTS * step}))
+    assert found.unit == unit
+    seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
+    times = times_of(table("s1", **{name: COUNTS * step}), found)
+    assert times == pytest.approx(COUNTS * step * seconds)
+
+
+@pytest.mark.parametrize(
+    ("start", "unit"), [(1.7e9, "s"), (1.7e12, "ms"), (1.7e15, "us"), (1.7e18, "ns")]
+)
+def test_times_since_1970_tell_their_unit(start, unit):
+    assert taken(table("s1", t=start + COUNTS * 1e6)).unit == unit
+
+
+def test_iso_dates_are_times_whatever_their_column_is_called():
+    dates = [f"2024-03-01T10:00:00.{i}00" for i in range(5)]
+    given = table("s1", zeit=dates)
+    found = taken(given)
+    assert found.unit == "iso"
+    assert times_of(given, found) == pytest.approx(0.1 * COUNTS)
+
+
+def test_steps_that_may_be_seconds_or_milliseconds_are_asked_for():
+    with pytest.raises(InputError, match="give --time-unit s or ms"):
+        taken(table("t", "s1"))
+    assert taken(table("t", "s1"), unit="ms").unit == "ms"
+
+
+@pytest.mark.parametrize(
+    ("times", "sentence"),
+    [
+        ([0.0, 0.1, 0.1, 0.2, 0.3], "stands still at row 3"),
+        ([0.0, 0.1, 0.05, 0.2, 0.3], "goes back by 0.05 s at row 3"),
+        ([0.0, 0.1, np.nan, 0.2, 0.3], "row 3 has no time"),
+    ],
+)
+def test_times_must_rise(times, sentence):
+    given = table("s1", t=times)
+    with pytest.raises(InputError, match=sentence):
+        times_of(given, taken(given))
+
+
+def test_a_line_says_what_was_taken():
+    given = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
+    found = meaning(given, given.names, Wishes(unit="ms"))
+    assert found.text("folder", (4, 4)) == (
+        'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
+        'left out: "label", a column without a name'
+    )

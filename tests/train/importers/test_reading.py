@@ -1,0 +1,147 @@
+"""Text tables as people save them: separators, encodings, comments, packed files."""
+
+import bz2
+import gzip
+import lzma
+import zipfile
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from edge.errors import InputError
+from train.importers import reading
+from train.importers.reading import numbers_of, read_frame, read_parquet, read_text
+
+PLAIN = "t,p1,p2\n0,1,2\n0.01,3,4\n"
+ROWS = [[0.0, 1.0, 2.0], [0.01, 3.0, 4.0]]
+
+
+def read(folder, content, name="a.csv"):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_text(path)
+
+
+def rows_of(table):
+    return np.column_stack([numbers_of(table, n) for n in table.names]).tolist()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN,
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace("\n", "\r"),
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", "  "),
+        PLAIN.replace(".", ",")
+        .replace("t,p1,p2", "t;p1;p2")
+        .replace("0,01,3", "0,01;3"),
+        "\ufeff" + PLAIN,
+        PLAIN.encode("utf-16"),
+        "# by me\n" + PLAIN,
+        "# t,p1,p2\n0,1,2\n0.01,3,4\n",
+        PLAIN.replace("\n0.01", "\n# a pause\n0.01"),
+        PLAIN.replace("\n", "\n\n"),
+        PLAIN + "\n\n",
+        PLAIN[:-1],
+    ],
+)
+def test_the_same_table_is_read_from_every_form(tmp_path, content):
+    if "0,01;3" in str(content):
+        content = "t;p1;p2\n0,0;1,0;2,0\n0,01;3,0;4,0\n"
+    table = read(tmp_path, content)
+    assert table.names == ["t", "p1", "p2"]
+    assert rows_of(table) == ROWS
+
+
+@pytest.mark.parametrize(
+    ("name", "pack"),
+    [
+        ("a.csv.gz", gzip.compress),
+        ("a.csv.bz2", bz2.compress),
+        ("a.csv.xz", lzma.compress),
+    ],
+)
+def test_packed_texts_are_unpacked(tmp_path, name, pack):
+    assert rows_of(read(tmp_path, pack(PLAIN.encode()), name)) == ROWS
+
+
+def test_a_zip_of_one_file_is_unpacked_and_one_of_several_refused(tmp_path):
+    path = tmp_path / "a.csv.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.csv", PLAIN)
+    assert rows_of(read_text(path)) == ROWS
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("b.csv", PLAIN)
+    with pytest.raises(InputError, match="holds 2 files; unpack it into a folder"):
+        read_text(path)
+
+
+def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "LARGEST_BYTES", 1 << 20)
+    with pytest.raises(InputError, match="holds more than 1 MB"):
+        read(tmp_path, gzip.compress(b"1" * (2 << 20)), "a.csv.gz")
+
+
+def test_how_a_file_was_read_is_said(tmp_path):
+    table = read(tmp_path, "zeit;p1\n0,0;1,5\n0,01;2,5\n".encode("utf-16"))
+    assert table.form == ("UTF-16", "decimal commas", "separated by semicolons")
+    assert "Windows-1252" in read(tmp_path, "t,größe\n0,1\n".encode("cp1252")).form
+
+
+def test_a_first_row_that_counts_the_columns_is_a_header(tmp_path):
+    table = read(tmp_path, "1,2,3\n7,8,9\n4,5,6\n")
+    assert rows_of(table) == [[7, 8, 9], [4, 5, 6]]
+    assert any("is a header" in note for note in table.form)
+    plain = read(tmp_path, "1,2,4\n7,8,9\n")
+    assert rows_of(plain) == [[1, 2, 4], [7, 8, 9]]
+    assert not plain.named
+
+
+def test_a_column_that_only_a_comma_at_the_end_makes_is_no_column(tmp_path):
+    assert read(tmp_path, "t,p1,\n0,1,\n1,2,\n").names == ["t", "p1"]
+    assert rows_of(read(tmp_path, "t,p1\n0,1,\n1,2,\n")) == [[0, 1], [1, 2]]
+
+
+def test_an_empty_cell_is_missing(tmp_path):
+    assert np.isnan(rows_of(read(tmp_path, "t,p1\n0,\n1,2\n"))[0][1])
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("", "holds no values"),
+        ("t,p1\n", "holds no values"),
+        ("p1,p1\n1,2\n", "two columns are named p1"),
+        ("0x10,2\n1,2\n", "0x10 is no decimal number"),
+        ("t,p1\n0,1\n0.01\n", "row 3 has 1 value, and the first row 2"),
+        ("# t\n\n1 2\n3\n", "row 2 has 1 value, and the first row 2"),
+        (b"1 2\0\n", "it is not text"),
+        ("1 " * (3 << 20), "has a line of 6 MB"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path, content, sentence):
+    with pytest.raises(InputError, match=sentence):
+        read(tmp_path, content)
+
+
+def test_a_text_among_numbers_is_named(tmp_path):
+    table = read(tmp_path, "t,p1\n0,1\n1,off\n")
+    with pytest.raises(InputError, match="'off' in column p1 is no number"):
+        numbers_of(table, "p1")
+
+
+def test_a_frame_has_no_header(tmp_path):
+    path = tmp_path / "0.csv"
+    path.write_text("0,1,2\n3,4,5\n")
+    assert read_frame(path).tolist() == [[0, 1, 2], [3, 4, 5]]
+
+
+def test_parquet_is_read_where_its_reader_is_installed(tmp_path):
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "a.parquet"
+    pd.DataFrame(ROWS, columns=["t", "p1", "p2"]).to_parquet(path)
+    assert rows_of(read_parquet(path)) == ROWS
