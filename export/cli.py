@@ -14,6 +14,7 @@ from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
 from edge.files import check_writable
 from edge.model.model import Model
+from edge.tools.slips import counts_text
 from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
 from export.api import measure, save
@@ -158,6 +159,8 @@ def run(arguments: argparse.Namespace) -> int:
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
     prices = measure(fitted)
+    labels = [trial.labels for trial in fitted.dataset.trials]
+    print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if arguments.report:

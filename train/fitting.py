@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from edge.errors import InputError
+from edge.tools.slips import slips
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
@@ -227,12 +228,15 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     fixed = FitOptions(**options)
     loaded = load(data, fixed)
     y = _labels(loaded.dataset, fixed.tasks)
+    felt = [trial.labels for trial in loaded.dataset.trials]
+    doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(felt)]
     _check_size(len(loaded.dataset.trials), fixed.k)
     settings = choose(loaded, y, fixed)
     if loaded.dataset.own is not None:
         y = {task: y[task] for task in settings.chosen}
     measured = loaded.dataset.with_kernels(settings.window_s)
-    notes = [*loaded.notes, *settings.notes, *_leaks_of(measured, y)]
+    notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
+    notes += [*settings.notes, *_leaks_of(measured, y)]
     dataset = measured.of(_features(settings.choices.values()))
     points = _decision_points(dataset, settings, fixed, notes)
     X = dataset.features(settings.window_s, fixed.samples)
@@ -429,9 +433,32 @@ def calibrate(
     return classifier.fit(at_points, y, settings.folds, settings.without, measured.own)
 
 
+def _is_usual(dataset: DataSet, task: str) -> bool:
+    """Whether most trials have a label for a task, of those that no other task gives."""
+    labels = dataset.labels(task)
+    if dataset.own is not None:
+        return True
+    return 2 * int((labels != "").sum()) > len(labels)
+
+
+def _lacking(dataset: DataSet, wanted: Sequence[str] | None) -> list[str]:
+    """A sentence for each task that most trials lack, and that is not named."""
+    if wanted is not None:
+        return []
+    sentences = []
+    for task in dataset.tasks:
+        if not _is_usual(dataset, task):
+            count = int((dataset.labels(task) != "").sum())
+            sentences.append(
+                f"warning: task {task} is left out: {count} of {len(dataset.trials)} "
+                "trials have a label for it; --tasks names it where it is meant"
+            )
+    return sentences
+
+
 def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
     if wanted is None:
-        return dataset.tasks
+        return tuple(task for task in dataset.tasks if _is_usual(dataset, task))
     missing = [task for task in wanted if task not in dataset.tasks]
     if missing:
         raise InputError(

@@ -1,20 +1,29 @@
 """List the labels of recordings, or change them.
 
-Without --set and --rename, prints each recording's labels, and how many recordings have
-each. With them, writes the changed recordings anew, each whole or not at all, if all of
-them can be read. The next `make export` trains on the new labels.
+Without --set, --unset and --rename, prints each recording's labels, how many recordings
+have each, and which are probably slips. With them, shows what would change, and with
+--yes writes the changed recordings anew, each whole or not at all, if all of them can
+be read. The next `make export` trains on the new labels.
 """
 
 import argparse
-from collections import Counter
-from collections.abc import Mapping
-from dataclasses import replace
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from edge.commands.options import task_label
-from edge.commands.output import Output
+from edge.commands.output import LOG, Output, counted
+from edge.config import parse_json
 from edge.errors import InputError
+from edge.files import read_text, write_whole
 from edge.recording import find, load, save
+from edge.tools.slips import counts_text, slips
+
+JOURNAL = ".edge-classify-labels.json"
+"""Beside recordings whose labels are being changed."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,54 +51,155 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             metavar=metavar,
             help=text,
         )
+    parser.add_argument(
+        "--unset",
+        action="append",
+        default=[],
+        metavar="TASK",
+        help="take this task's label away; repeat it for more",
+    )
+    parser.add_argument(
+        "--yes", action="store_true", help="change the recordings without a question"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the labels, after changing those that are to be changed."""
+    """Print the labels, or change those that are to be changed."""
     output = Output.of(arguments)
-    names, labels = dict(arguments.rename), dict(arguments.set)
+    change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
     paths = find(arguments.data)
-    metas = [changed(str(path), load(path).meta, names, labels) for path in paths]
-    counts: Counter[tuple[str, str]] = Counter()
-    width = max(len(str(path)) for path in paths)
-    for path, meta in zip(paths, metas, strict=True):
-        if names or labels:
-            save(path, replace(load(path), meta=meta))
-        current = meta.get("labels", {})
-        counts.update(current.items())
-        text = (
-            " ".join(f"{task}={label}" for task, label in current.items()) or "no label"
-        )
-        event = {"event": "labels", "file": str(path), "labels": current}
-        output.event(event, f"{path!s:<{width}}  {text}")
-    for (task, label), count in sorted(counts.items()):
-        output.text(f"{count:>6} of {len(paths)}  {task}={label}")
+    for folder in sorted({path.parent for path in paths}):
+        finish_interrupted(folder)
+    former = [load(path).meta for path in paths]
+    metas = [
+        changed(str(path), meta, change)
+        for path, meta in zip(paths, former, strict=True)
+    ]
+    if not (arguments.rename or arguments.set or arguments.unset):
+        _print(output, paths, metas)
+        return 0
+    differing = []
+    for path, before, after in zip(paths, former, metas, strict=True):
+        if before.get("labels", {}) != after.get("labels", {}):
+            differing.append((path, after))
+            old = _text(before.get("labels", {}))
+            output.text(f"{path}: {old} becomes {_text(after.get('labels', {}))}")
+    if not differing:
+        output.text("every recording has these labels already")
+        return 0
+    if not (arguments.yes or _agreed(output, len(differing))):
+        output.text("nothing is changed")
+        return 1
+    change_all(differing)
+    _print(output, paths, metas)
     return 0
 
 
-def changed(
-    name: str,
-    meta: Mapping[str, Any],
-    names: Mapping[str, str],
-    labels: Mapping[str, str],
-) -> dict[str, Any]:
-    """A recording's metadata with tasks renamed (`names`), and with new labels.
+def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
+    """Write recordings anew with other metadata: all of them, or a later start does.
+
+    A journal beside the first file says what is to be done, until it is.
+    """
+    journal = metas[0][0].parent / JOURNAL
+    entries = [[str(path.absolute()), meta["labels"]] for path, meta in metas]
+    with write_whole(journal) as file:
+        file.write(json.dumps(entries).encode())
+    for path, meta in metas:
+        save(path, replace(load(path), meta=dict(meta)))
+    journal.unlink()
+
+
+def finish_interrupted(folder: Path) -> None:
+    """Finish a change of labels that was interrupted, where a journal tells of one."""
+    journal = folder / JOURNAL
+    if not journal.is_file():
+        return
+    finished = 0
+    entries = parse_json(read_text(journal), str(journal))
+    for name, labels in entries if isinstance(entries, list) else []:
+        path = Path(name)
+        if path.is_file():
+            recording = load(path)
+            if recording.labels != labels:
+                meta = {**recording.meta, "labels": labels}
+                save(path, replace(recording, meta=meta))
+                finished += 1
+    journal.unlink()
+    LOG.warning(
+        f"{folder}: finished a change of labels that was interrupted: "
+        f"{counted(finished, 'recording')}"
+    )
+
+
+def _agreed(output: Output, count: int) -> bool:
+    """Whether a person at the terminal agrees; a program has to say --yes.
+
+    Raises:
+        InputError: nobody can be asked.
+    """
+    if output.as_json or not sys.stdin.isatty():
+        raise InputError(
+            f"{counted(count, 'recording')} would change, as shown; add --yes to do it"
+        )
+    return input(f"Change {counted(count, 'recording')}? [y/N] ").lower() == "y"
+
+
+def _text(labels: Mapping[str, str]) -> str:
+    parts = (f"{task}={label}" for task, label in labels.items())
+    return " ".join(parts) or "no label"
+
+
+def _print(
+    output: Output, paths: Sequence[Path], metas: Sequence[Mapping[str, Any]]
+) -> None:
+    """Print each recording's labels, how many have each, and probable slips."""
+    width = max(len(str(path)) for path in paths)
+    labels = [meta.get("labels", {}) for meta in metas]
+    for path, current in zip(paths, labels, strict=True):
+        event = {"event": "labels", "file": str(path), "labels": current}
+        output.event(event, f"{path!s:<{width}}  {_text(current)}")
+    for line in counts_text(labels):
+        output.text(line)
+    for sentence in slips(labels):
+        output.text(f"probably a slip: {sentence}")
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is to change in labels.
+
+    Attributes:
+        names: {task: its new name}.
+        labels: {task: its new label}.
+        without: tasks whose label is taken away.
+    """
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    without: Sequence[str] = ()
+
+
+def changed(name: str, meta: Mapping[str, Any], change: Change) -> dict[str, Any]:
+    """A recording's metadata with other labels.
 
     Raises:
         InputError: the recording has a task of the new name, or its contacts have their
             own labels.
     """
     current = meta.get("labels", {})
+    names = change.names
     for old, new in names.items():
         if old in current and new in current:
             raise InputError(
                 f"{name}: has a label for {new} already; {old} cannot take its name"
             )
-    if meta.get("contacts") and (names or labels):
+    if meta.get("contacts") and (names or change.labels or change.without):
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` "
-            "makes a "
-            "recording of each"
+            "makes a recording of each"
         )
     renamed = {names.get(task, task): label for task, label in current.items()}
-    return {**meta, "labels": {**renamed, **labels}}
+    labels = {**renamed, **change.labels}
+    for task in change.without:
+        labels.pop(task, None)
+    return {**meta, "labels": labels}

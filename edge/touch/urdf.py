@@ -1,11 +1,14 @@
 """Joints of a URDF file (wiki.ros.org/urdf/XML) between two of its links."""
 
+import logging
 import os
 import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 from edge.errors import InputError
 from edge.files import parsing, read_bytes
+
+LOG = logging.getLogger(__name__)
 
 
 def joints_between(
@@ -22,8 +25,14 @@ def joints_between(
         raise InputError(
             f"{path}: link {tip!r} is both base and tip; name the arm's two ends"
         )
+    data = read_bytes(path)
+    if os.fspath(path).endswith(".xacro") or b"${" in data or b"xacro:" in data:
+        raise InputError(
+            f"{path}: is a xacro macro, not a URDF file; expand it by "
+            f"`xacro {os.path.basename(path)} > arm.urdf`"
+        )
     with parsing(os.fspath(path), "a URDF file"):
-        root = ElementTree.fromstring(read_bytes(path))
+        root = ElementTree.fromstring(data)
     if root.tag != "robot":
         raise InputError(
             f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>"
@@ -34,9 +43,20 @@ def joints_between(
             raise InputError(
                 f"{path}: no link {name!r}; it has {', '.join(map(str, links))}"
             )
-    parents = {
-        _link(path, element, "child"): element for element in root.findall("joint")
-    }
+    parents: dict[str, ElementTree.Element] = {}
+    names: set[str] = set()
+    for element in root.findall("joint"):
+        child = _link(path, element, "child")
+        name = str(element.get("name"))
+        if child in parents:
+            raise InputError(
+                f"{path}: joints {parents[child].get('name')!r} and {name!r} both lead "
+                f"to link {child!r}; remove one of them"
+            )
+        if name in names:
+            raise InputError(f"{path}: two joints are named {name!r}; rename one")
+        names.add(name)
+        parents[child] = element
     joints: list[dict[str, Any]] = []
     link = tip
     while link != base:
@@ -86,5 +106,12 @@ def _joint(
                     float(number) for number in child.attrib[attribute].split()
                 ]
         if limit is not None and kind in ("revolute", "prismatic"):
-            joint["limits"] = [float(limit.get(end, "0")) for end in ("lower", "upper")]
+            low, high = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+            if low <= high:
+                joint["limits"] = [low, high]
+            else:
+                LOG.warning(
+                    f"{path}: joint {name!r} has its lower limit {low:g} above its upper "
+                    f"limit {high:g}; both are left out"
+                )
     return joint

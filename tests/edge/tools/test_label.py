@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from edge.recording import load, save
+from edge.tools import label
 
 
 @pytest.fixture
@@ -36,12 +37,13 @@ def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(folder, ed
         replace(touch, meta={**touch.meta, "labels": {"object": "\x1b[2J"}}),
     )
     status, _, err = edge("label", folder / "a.npz")
-    assert (status, err) == (0, "     1 of 1  object=\\x1b[2J\n")
+    assert status == 0
+    assert err == "object (1 of 1): \\x1b[2J 1\n"
 
 
 def test_a_file_is_relabelled_and_keeps_all_else(folder, edge):
     before = load(folder / "a.npz")
-    new = ("--set", "object=brick", "--set", "softness=rigid")
+    new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
     _, lines, _ = edge("label", folder / "a.npz", *new)
     after = load(folder / "a.npz")
     assert lines[0]["labels"] == after.labels
@@ -55,7 +57,7 @@ def test_a_file_is_relabelled_and_keeps_all_else(folder, edge):
 
 
 def test_a_task_is_renamed(folder, edge):
-    edge("label", folder / "a.npz", "--rename", "object=thing")
+    edge("label", folder / "a.npz", "--rename", "object=thing", "--yes")
     assert load(folder / "a.npz").labels == {
         "category": "rigid-fixed",
         "thing": "hard 0",
@@ -73,6 +75,49 @@ def test_what_cannot_be_changed_leaves_every_file_as_it_was(
     change, sentence, folder, edge
 ):
     before = (folder / "a.npz").read_bytes()
-    status, _, err = edge("label", folder, *change)
+    status, _, err = edge("label", folder, *change, "--yes")
     assert (status, sentence in err) == (2, True)
     assert (folder / "a.npz").read_bytes() == before
+
+
+def test_nothing_changes_before_it_is_shown_and_agreed_to(folder, edge):
+    before = (folder / "a.npz").read_bytes()
+    status, _, err = edge("label", folder / "a.npz", "--set", "object=brick")
+    assert status == 2
+    assert "object=hard 0 becomes category=rigid-fixed object=brick" in err
+    assert "1 recording would change, as shown; add --yes to do it" in err
+    assert (folder / "a.npz").read_bytes() == before
+
+
+def test_a_label_is_taken_away(folder, edge):
+    edge("label", folder / "a.npz", "--unset", "object", "--yes")
+    assert load(folder / "a.npz").labels == {"category": "rigid-fixed"}
+
+
+def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
+    make_touch, tmp_path, edge, monkeypatch
+):
+    for i in range(4):
+        save(tmp_path / f"{i}.npz", make_touch(seed=i))
+    written = []
+
+    def save_two(path, recording):
+        if len(written) == 2:
+            raise KeyboardInterrupt
+        written.append(path)
+        save(path, recording)
+
+    monkeypatch.setattr(label, "save", save_two)
+    with pytest.raises(KeyboardInterrupt):
+        label.change_all(
+            [
+                (path, {**load(path).meta, "labels": {"object": "brick"}})
+                for path in sorted(tmp_path.glob("*.npz"))
+            ]
+        )
+    monkeypatch.setattr(label, "save", save)
+    status, lines, err = edge("label", tmp_path)
+    assert status == 0
+    assert [line["labels"] for line in lines] == [{"object": "brick"}] * 4
+    assert "finished a change of labels that was interrupted: 2 recordings" in err
+    assert list(tmp_path.glob(".*")) == []

@@ -92,3 +92,45 @@ def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, said):
 def test_a_urdf_that_is_not_there_is_one_sentence(tmp_path):
     with pytest.raises(InputError, match="cannot be read: No such file"):
         joints_between(tmp_path / "none.urdf", "a", "b")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("arm.urdf.xacro", ARM),
+        ("arm.urdf", ARM.replace("0.3 0 -1e-3", "${length} 0 0")),
+    ],
+)
+def test_a_xacro_macro_is_called_one_with_the_command_that_expands_it(
+    tmp_path, name, text
+):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError, match="is a xacro macro") as caught:
+        Chain.from_urdf(path, "base", "tool")
+    assert f"`xacro {name} > arm.urdf`" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "child", "sentence"),
+    [
+        ("other", "upper", "joints 'shoulder' and 'other' both lead to link 'upper'"),
+        ("shoulder", "free", "two joints are named 'shoulder'"),
+    ],
+)
+def test_joints_of_one_child_or_of_one_name_are_refused(urdf, name, child, sentence):
+    extra = (
+        f'<link name="free"/><joint name="{name}" type="fixed">'
+        f'<parent link="base"/><child link="{child}"/></joint></robot>'
+    )
+    urdf.write_text(ARM.replace("</robot>", extra))
+    with pytest.raises(InputError, match=sentence):
+        Chain.from_urdf(urdf, "base", "tool")
+
+
+def test_swapped_limits_are_left_out_with_a_warning(urdf, caplog):
+    urdf.write_text(ARM.replace('lower="-2.5"', 'lower="25"'))
+    expected = Chain.from_urdf(urdf, "base", "tool")
+    assert "joint 'elbow' has its lower limit 25 above its upper limit" in caplog.text
+    elbow = next(joint for joint in expected.joints if joint.name == "elbow")
+    assert elbow.limits is None
