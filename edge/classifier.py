@@ -16,6 +16,7 @@ from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, check_rate
 from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
 from edge.touch.contact import Contact
+from edge.touch.doubts import frame_doubts
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -24,15 +25,10 @@ if TYPE_CHECKING:
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
 
-GAP_SHARE = 0.25
-"""A step between two frames of more than this share of the window is a gap: the samples
-in it are interpolated from its ends."""
 LATE = "late"
 """Flag of a decision on a contact that began before it could be seen."""
 ASIDE_S = 0.5
 """Taxels are named as set aside after so long, as a touch under way soon shows."""
-GAP_S = 0.1
-"""A step of at most this time is no gap, however short the window."""
 
 
 @dataclass
@@ -85,12 +81,14 @@ class Classifier:
     Flags of a decision: `unknown` (the contact is unlike everything in training; only a
     model with decision points can tell), `tie` (another label had as many votes),
     `short` (the stream ended inside the window; the last values were held), `late` (the
-    contact began before the first frame), `gap`
-    (frames are missing in much of the window, see `GAP_SHARE`, or its times are not in
-    seconds), `missing_taxels` (taxels could not be read), `missing_pose` (joint angles
-    were absent in part of the window), `skin_motion` (motion was measured on the skin,
-    though the model's is in the world), `as_trained` (see `AS_TRAINED`) and
-    `out_of_range` (see `OUT_OF_RANGE`).
+    contact began before the first frame), `gap` (frames are missing in much of the
+    window, or its times are not in seconds), `frozen` (frames repeat bit for bit),
+    `several` (a second region beside the contact, as training seldom had),
+    `still_joints` and `joint_limits` (joint angles never change, or lie beyond their
+    limits; see `edge.touch.doubts`), `missing_taxels` (taxels could not be read),
+    `missing_pose` (joint angles were absent in part of the window), `skin_motion`
+    (motion was measured on the skin, though the model's is in the world), `as_trained`
+    (see `AS_TRAINED`) and `out_of_range` (see `OUT_OF_RANGE`).
 
     A task that was trained with recordings of no contact is decided by `finish` where
     there was none, flagged `no_contact` and at the time of the last frame;
@@ -336,9 +334,12 @@ class Classifier:
         point = pending.decision_point
         window_s = self.model.decision_points_s[point]
         series = pending.contact.series()
-        longest_s = np.diff(np.minimum(series.t, window_s)).max(initial=0.0)
-        gap = longest_s > max(GAP_SHARE * window_s, GAP_S)
-        blank = self._blank(pending, window_s, {"short": short, "gap": gap})
+        info = self.model.info
+        limits = () if info.chain is None else info.chain.limits
+        doubts = frame_doubts(series, window_s, info.several, limits)
+        if self._max_contacts > 1:
+            del doubts["several"]
+        blank = self._blank(pending, window_s, {"short": short, **doubts})
         try:
             vector = self.model.info.vector(series, window_s)
             decisions = self.model.decide(vector, None if self.error is None else point)

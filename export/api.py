@@ -13,6 +13,7 @@ from edge import __version__
 from edge.files import write_whole
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
+from edge.touch.doubts import is_several
 from edge.touch.track import DEBOUNCE
 from export import golden
 from export.graph import to_onnx
@@ -129,9 +130,16 @@ def describe(
         else tuple(sequential.decision_points_s),
         stopping={} if sequential is None else sequential.stopping_,
         novelty=None if sequential is None else sequential.novelty_,
+        several=several_share(dataset, window_s),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
     )
+
+
+def several_share(dataset: DataSet, window_s: float) -> float:
+    """Share of the trials with a second region beside the contact."""
+    windows = [trial.series.felt(window_s) for trial in dataset.trials]
+    return sum(map(is_several, windows)) / len(windows)
 
 
 def measure(fitted: Fitted) -> list[tuple[float, float]]:

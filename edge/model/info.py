@@ -99,6 +99,8 @@ class ModelInfo:
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be
     kept."""
+    several: float = 1.0
+    """Share of the training trials with a second region beside the contact."""
     taught: int = 0
     """Number of the last trials, which were added on a board
     (`edge.tools.teaching`)."""
@@ -239,6 +241,7 @@ class ModelInfo:
             kernels=_kernels(meta, names, layout),
             name=meta.text("name", "", empty=True),
             trials=meta.texts("trials", ()),
+            several=meta.number("several", 1.0, low=0.0, high=1.0),
             taught=meta.whole("taught", 0, allowed=range(1 << 31)),
         )
         tracking.done()

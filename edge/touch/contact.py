@@ -50,6 +50,8 @@ class FeatureSeries:
             None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or
             None.
+        same: (n,) whether a frame repeats the one before it bit for bit.
+        beside: (n,) whether another region rises above the onset beside the contact.
     """
 
     t: NDArray[np.float64]
@@ -64,6 +66,8 @@ class FeatureSeries:
     taxels: NDArray[np.int64] | None = None
     kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
+    same: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    beside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     def felt(self, window_s: float) -> Self:
         """The frames in which the contact is felt, up to the end of the window.
@@ -86,7 +90,7 @@ class FeatureSeries:
         changes: dict[str, Any] = {
             name: value[pick]
             for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
+            if isinstance(value, np.ndarray) and value.size
         }
         changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
         return replace(self, **changes)
@@ -139,6 +143,8 @@ class Contact:
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
         numbers of region and zones."""
         self._starts: dict[str, Vector] = {}
+        self._before: NDArray[np.uint16] | None = None
+        """The counts of the last frame."""
 
     def add(
         self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float
@@ -160,6 +166,12 @@ class Contact:
         zones = measurer.measure(active, region)
         plain = [0] * PLAIN
         row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
+        before = self._before
+        row["same"] = before is not None and bool((frame.counts == before).all())
+        row["beside"] = region is not None and active.has_other(
+            region, self.layout.onset
+        )
+        self._before = frame.counts
         if region is not None:
             self.region = region
             self.joints = frame.joints

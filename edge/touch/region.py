@@ -307,6 +307,13 @@ class ActiveTaxels:
             tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index)
         )
 
+    def has_other(self, region: Region, onset: int) -> bool:
+        """Whether a taxel beside a region is above the onset."""
+        others = self.bits & ~region.bits
+        if not others:
+            return False
+        return int(self.counts[self._grid.unpack(others)].max()) > onset
+
     def _region(self, bits: int) -> Region:
         return Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
 

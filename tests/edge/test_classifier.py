@@ -207,8 +207,8 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
         (lambda t: t, False),
         (lambda t: 1e3 * t, True),  # milliseconds
         (lambda t: np.where(t > 0.235, t + 5.0, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.31, t), True),
-        (lambda t: np.where(t > 0.5, t + 0.28, t), False),
+        (lambda t: np.where(t > 0.5, t + 0.11, t), True),
+        (lambda t: np.where(t > 0.5, t + 0.08, t), False),
     ],
 )
 def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):

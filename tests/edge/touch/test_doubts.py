@@ -1,0 +1,108 @@
+"""Reasons to doubt frames and joint angles, at both sides of their limits."""
+
+import numpy as np
+import pytest
+
+from edge.touch.doubts import SELDOM, frame_doubts, is_several
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.track import ContactTracker
+
+LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
+WINDOW_S = 1.2
+ANGLES = np.array([0.1, 0.2])
+
+
+def series(times, picture, joints=None):
+    """The series of a contact whose frame i is picture(i), with joint angles
+    joints(i)."""
+    count = 0 if joints is None else 2
+    names = ("max_force", "joint_change") if count else ("max_force",)
+    tracker = ContactTracker(LAYOUT, horizon_s=2.0, features=names, joints=count)
+    contacts = []
+    for i, t in enumerate(times):
+        angles = None if joints is None else joints(i)
+        contacts = tracker.push(Frame(t, picture(i), joints=angles)) or contacts
+    return contacts[0].series()
+
+
+def pressed(i):
+    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+    counts[3, 3] = 100 + i
+    return counts
+
+
+def doubts(felt, several_share=1.0, limits=()):
+    found = frame_doubts(felt, WINDOW_S, several_share, limits)
+    return {flag for flag, holds in found.items() if holds}
+
+
+TIMES = np.arange(140) * 0.01
+
+
+def test_an_ordinary_contact_raises_no_doubt():
+    assert doubts(series(TIMES, pressed)) == set()
+
+
+@pytest.mark.parametrize(("pause_s", "flags"), [(0.08, set()), (0.12, {"gap"})])
+def test_a_pause_of_a_tenth_of_a_second_is_a_gap(pause_s, flags):
+    times = np.where(TIMES > 0.5, TIMES + pause_s, TIMES)
+    assert doubts(series(times, pressed)) == flags
+
+
+@pytest.mark.parametrize(("pause_s", "flags"), [(0.2, set()), (0.5, {"gap"})])
+def test_of_slow_frames_a_pause_is_compared_with_the_usual_one(pause_s, flags):
+    times = np.arange(14) * 0.15
+    late = np.where(times > 0.5, times + pause_s - 0.15, times)
+    assert doubts(series(late, pressed)) == flags
+
+
+@pytest.mark.parametrize(("frames", "flags"), [(9, set()), (12, {"frozen"})])
+def test_frames_that_repeat_for_a_tenth_of_a_second_are_frozen(frames, flags):
+    def frozen(i):
+        return pressed(min(i, 50) if i <= 50 + frames else i)
+
+    assert doubts(series(TIMES, frozen)) == flags
+
+
+def beside(share):
+    def picture(i):
+        counts = pressed(i)
+        counts[3, 4] = 100
+        counts[7, 7] = 61 * (i % 100 < 100 * share)
+        return counts
+
+    return picture
+
+
+@pytest.mark.parametrize(("share", "several"), [(0.1, False), (0.3, True)])
+def test_a_second_region_in_a_fifth_of_the_window_counts(share, several):
+    felt = series(TIMES, beside(share))
+    assert is_several(felt.felt(WINDOW_S)) is several
+
+
+@pytest.mark.parametrize(
+    ("seldom", "flags"), [(SELDOM, set()), (SELDOM - 0.01, {"several"})]
+)
+def test_a_second_region_is_a_doubt_where_training_seldom_had_one(seldom, flags):
+    assert doubts(series(TIMES, beside(0.5)), seldom) == flags
+
+
+def test_joint_angles_that_never_change_are_still():
+    still = series(TIMES, pressed, lambda i: ANGLES.copy())
+    assert doubts(still, limits=(None, None)) == {"still_joints"}
+    moving = series(TIMES, pressed, lambda i: ANGLES + 1e-6 * i)
+    assert doubts(moving, limits=(None, None)) == set()
+
+
+@pytest.mark.parametrize(
+    ("limit", "flags"),
+    [
+        ((0.16, 1.0), {"joint_limits"}),
+        ((0.14, 1.0), set()),
+        ((-1.0, 0.04), {"joint_limits"}),
+    ],
+)
+def test_joint_angles_beyond_their_limits_are_named(limit, flags):
+    moving = series(TIMES, pressed, lambda i: ANGLES + 1e-6 * i)
+    assert doubts(moving, limits=(limit, None)) == flags
