@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -284,6 +286,18 @@ def _joints(
             joints.close()
 
 
+def _way_to(link: str) -> str:
+    """A sentence with the page's link; the journal, which others read, gets a file's
+    name instead."""
+    if "JOURNAL_STREAM" not in os.environ:
+        return f"open {link} in a browser"
+    folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
+    descriptor, name = tempfile.mkstemp(prefix="edge-classify-link-", dir=folder)
+    with os.fdopen(descriptor, "w") as file:  # which its owner alone can read
+        file.write(f"{link}\n")
+    return f"the page's link is in {name}"
+
+
 @contextmanager
 def _page(address: str, opened: Opened, options: dict[str, Any]) -> Iterator[Page]:
     """The live page of a skin."""
@@ -291,7 +305,7 @@ def _page(address: str, opened: Opened, options: dict[str, Any]) -> Iterator[Pag
 
     page = Page(address, opened.skin.layout, title=opened.source, **options)
     try:
-        LOG.info(f"open {page.server.link} in a browser")
+        LOG.info(_way_to(page.server.link))
         yield page
     finally:
         page.server.close()

@@ -9,8 +9,10 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
-from edge.recording import Recording, load, save
+from edge.files import read_bytes, refusing, write_whole
+from edge.recording import LARGEST_BYTES, Recording, load, save
 from edge.skin.loop import Schedule
+from edge.tools.label import Change, changed
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -66,13 +68,15 @@ class Page:
         self.labels = dict(labels or {})
         self.recording = bool(self.labels)
         self._trials: dict[str, dict[str, Any]] = {}
+        self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
+        self._undo: tuple[str, bytes] | None = None
+        """The file that the last action changed or deleted, as it was before."""
         if folder is not None:
             for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:]:
-                self.saved(path, load(path))
+                self._show_trial(path)
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
         self._decisions: dict[str, dict[str, Any]] = {}
-        self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._due = -float("inf")
         self._scale = layout.counts_per_newton or 1.0
         self._fixed = {
@@ -122,6 +126,7 @@ class Page:
                 {"file": name, **trial} for name, trial in list(self._trials.items())
             ],
             "notices": list(self._notices),
+            "undo": None if self._undo is None else self._undo[0],
         }
         if schedule is not None:
             picture["missed"] = schedule.missed_ticks
@@ -136,6 +141,13 @@ class Page:
         """Add a trial that has been recorded."""
         seconds = round(float(trial.t[-1] - trial.t[0]), 2)
         self._trials[path.name] = {"labels": trial.labels, "seconds": seconds}
+
+    def _show_trial(self, path: Path) -> None:
+        """Add a trial of the folder; a damaged one is named and left out."""
+        try:
+            self.saved(path, load(path))
+        except InputError as error:
+            self.notice(f"{error}; it is left out of the list")
 
     def _curves(self) -> dict[str, Any] | None:
         """The last contact: its taxels, and its features since onset."""
@@ -173,18 +185,40 @@ class Page:
                     "give a label first; a trial without one teaches nothing"
                 )
             self.recording = bool(action.get("on"))
+        elif kind == "undo":
+            self._take_back(self._folder)
         elif kind not in ("relabel", "delete"):
             raise InputError(f"{kind!r} is no action")
         elif (name := action.get("file")) not in list(self._trials):
             raise InputError(f"{name!r} is none of the trials that this page shows")
-        elif kind == "delete":
-            (self._folder / name).unlink(missing_ok=True)
-            del self._trials[name]
         else:
-            trial = load(self._folder / name)
-            trial = replace(trial, meta={**trial.meta, "labels": _labels(action)})
-            save(self._folder / name, trial)
-            self.saved(self._folder / name, trial)
+            path = self._folder / str(name)
+            before = read_bytes(path, LARGEST_BYTES)
+            if kind == "delete":
+                with refusing(f"{path}: cannot be deleted"):
+                    path.unlink(missing_ok=True)
+                del self._trials[path.name]
+            else:
+                self._relabel(path, _labels(action))
+            self._undo = path.name, before
+
+    def _relabel(self, path: Path, labels: dict[str, str]) -> None:
+        """Give a trial labels beside those that it has for other tasks."""
+        trial = load(path)
+        meta = changed(str(path), trial.meta, Change(labels=labels))
+        trial = replace(trial, meta=meta)
+        save(path, trial)
+        self.saved(path, trial)
+
+    def _take_back(self, folder: Path) -> None:
+        """Bring back the file that the last action changed or deleted."""
+        if self._undo is None:
+            raise InputError("there is nothing to undo")
+        name, before = self._undo
+        with write_whole(folder / name) as file:
+            file.write(before)
+        self._undo = None
+        self._show_trial(folder / name)
 
 
 def _decision(event: Decided) -> dict[str, Any]:

@@ -118,6 +118,11 @@ class Trials:
         onset_s = math.inf if self._saved is None else self._saved.onset_s
         return self.rest() if over or frame.t - onset_s >= self._length else None
 
+    @property
+    def under_way(self) -> bool:
+        """Whether the frames of a trial are being collected."""
+        return self._frames is not None
+
     def rest(self) -> list[Frame] | None:
         """End the trial that is under way, if any, and return its frames."""
         frames = self._frames
@@ -211,10 +216,11 @@ def run(arguments: argparse.Namespace) -> int:
             for key in pressed if by_key else "":
                 recorder.press(key, choices)
             live.show(frame, faults)
+            recorder.follow(trials)
             recorder.save(trials.push(frame), complete=True)
-            if len(recorder.paths) == most:
+            if recorder.count == most:
                 break
-        if len(recorder.paths) != most:
+        if recorder.count != most:
             recorder.save(trials.rest(), complete=False)
     return _status(arguments, recorder, live.skin)
 
@@ -276,7 +282,7 @@ def _metadata(opened: Opened, arm: Chain | None) -> dict[str, Any]:
 
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:
     """The exit status, with a message where nothing was saved as it should be."""
-    if not recorder.paths:
+    if not recorder.count:
         silent = int((skin.invalid_for > 0).sum())
         where = f"; taxels without a valid value: {silent}" if silent else ""
         LOG.warning(f"no contact was saved{where}")
@@ -300,6 +306,7 @@ class Recorder:
         page: the live page, which then gives the labels and says whether to save; or
             None.
         paths: the trials saved so far and not deleted.
+        recording: whether the touch under way, or the next one, is to be saved.
         any_joints: whether a saved frame had joint angles.
     """
 
@@ -310,6 +317,7 @@ class Recorder:
     lines: Lines
     page: Page | None = None
     paths: list[Path] = field(default_factory=list)
+    recording: bool = True
     any_joints: bool = False
 
     def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
@@ -324,11 +332,26 @@ class Recorder:
             path.unlink(missing_ok=True)
             self.lines.write([{"event": "deleted", "file": str(path)}])
 
+    @property
+    def count(self) -> int:
+        """Trials that have been saved and are still there."""
+        return sum(path.exists() for path in self.paths)
+
+    def follow(self, trials: Trials) -> None:
+        """Take over the page's labels, but for a touch that is under way: a trial has
+        those of its beginning."""
+        if self.page is not None and not trials.under_way:
+            self.labels = self.page.labels
+            self.recording = self.page.recording
+
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
         """Save the frames of a trial, if there is one and it is to be saved."""
-        if self.page is not None:
-            self.labels = self.page.labels
-        if frames is None or (self.page is not None and not self.page.recording):
+        if frames is None or not self.recording:
+            if frames is not None and self.page is not None and self.page.recording:
+                LOG.warning(
+                    "recording was switched on during the touch, whose onset is missing: "
+                    "it is not saved"
+                )
             return
         unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}

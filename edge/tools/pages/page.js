@@ -151,10 +151,13 @@ function drawDecisions(picture) {
     const item = element("div", undefined, "decision");
     item.append(element("div", `${decision.task}, after ${decision.window_s} s`, "task"));
     item.append(element("strong", decision.label === null ? "out of range" : decision.label));
-    item.append(document.createTextNode(` ${Math.round(100 * decision.confidence)} %`));
-    const meter = element("meter");
-    meter.value = decision.confidence;
-    item.append(meter);
+    if (decision.confidence !== null) {
+      item.append(document.createTextNode(` ${Math.round(100 * decision.confidence)} %`));
+      const meter = element("meter");
+      meter.value = decision.confidence;
+      meter.setAttribute("aria-label", "confidence");
+      item.append(meter);
+    }
     for (const flag of decision.flags) item.append(element("span", flag, "flag"));
     if (decision.neighbours.length) {
       const near = decision.neighbours.map(([name, distance]) => `${name} (${distance})`);
@@ -227,7 +230,7 @@ function drawRecord(picture) {
     const row = element("tr");
     const buttons = element("td");
     const relabel = element("button", "Relabel");
-    relabel.title = "Give this trial the labels of the form above";
+    relabel.title = "Give this trial the labels of the form above; its other tasks keep theirs";
     relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: formLabels() });
     const remove = element("button", "Delete");
     remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
@@ -236,6 +239,11 @@ function drawRecord(picture) {
       element("td", trial.seconds.toFixed(2)), buttons);
     return row;
   }));
+}
+
+function drawUndo(picture) {
+  $("undo").hidden = !picture.undo;
+  $("undo").textContent = picture.undo ? `Undo the change of ${picture.undo}` : "Undo";
 }
 
 function draw(picture) {
@@ -249,10 +257,12 @@ function draw(picture) {
   drawContact(picture);
   drawDecisions(picture);
   drawRecord(picture);
+  drawUndo(picture);
   $("notice-part").hidden = !picture.notices.length;
   $("notices").replaceChildren(...picture.notices.map((text) => element("li", text)));
 }
 
+$("undo").onclick = () => act({ do: "undo" });
 $("more").onclick = () => labelRow("", "");
 $("labels").onsubmit = (event) => { event.preventDefault(); act({ do: "labels", labels: formLabels() }); };
 $("record").onclick = async () => {
@@ -261,16 +271,15 @@ $("record").onclick = async () => {
 };
 addEventListener("resize", () => latest && draw(latest));
 
-async function watch() {
-  const answer = await fetch("picture" + query).catch(() => null);
-  const picture = answer && answer.status === 200 ? await answer.json().catch(() => null) : null;
-  if (picture) draw(picture);
-  else if (!answer || !answer.ok) {
+// A stream of pictures; the browser opens it again by itself where it breaks.
+function watch() {
+  const stream = new EventSource("events" + query);
+  stream.onmessage = (event) => draw(JSON.parse(event.data));
+  stream.onerror = () => {
     $("state").className = "lost";
-    $("state").textContent = answer && answer.status === 401
+    $("state").textContent = stream.readyState === EventSource.CLOSED
       ? "The program has started anew; open the link that it has printed."
       : "The program does not answer; trying again.";
-  }
-  setTimeout(watch, answer && answer.ok ? 100 : 1000);
+  };
 }
 watch();

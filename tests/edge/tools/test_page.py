@@ -2,6 +2,8 @@
 trials."""
 
 from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,8 +151,63 @@ def test_trials_of_the_folder_are_relabelled_and_deleted(tmp_path):
 
     assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
     changed = edge.load(tmp_path / "a.npz")
-    assert changed.labels == {"object": "sponge"}
+    assert changed.labels == {**trial.labels, "object": "sponge"}
     assert np.array_equal(changed.frames, trial.frames)
+
+
+@pytest.fixture
+def folder_page(tmp_path):
+    """A page of a folder with the trials a and b, and one file that is damaged."""
+    trial = edge.load(demo.FOLDER / "foam-block-fixed.npz")
+    for name in ("a.npz", "b.npz"):
+        edge.save(tmp_path / name, trial)
+    (tmp_path / "c.npz").write_bytes(b"PK damaged")
+    page = Page("127.0.0.1:0", trial.layout, title="pad", folder=tmp_path)
+    with closing(page.server):
+        yield page
+
+
+def test_a_damaged_recording_is_named_and_left_out(folder_page):
+    assert sorted(folder_page._trials) == ["a.npz", "b.npz"]
+    (notice,) = folder_page._notices
+    assert "c.npz" in notice
+    assert "left out" in notice
+
+
+@pytest.mark.parametrize("action", ["relabel", "delete"])
+def test_the_last_action_is_undone(folder_page, tmp_path, action):
+    before = (tmp_path / "a.npz").read_bytes()
+    folder_page._act({"do": action, "file": "a.npz", "labels": {"object": "x"}})
+    assert (
+        not (tmp_path / "a.npz").exists()
+        or edge.load(tmp_path / "a.npz").labels["object"] == "x"
+    )
+    folder_page._act({"do": "undo"})
+    assert (tmp_path / "a.npz").read_bytes() == before
+    assert "a.npz" in folder_page._trials
+    with pytest.raises(InputError, match="nothing to undo"):
+        folder_page._act({"do": "undo"})
+
+
+def test_a_recording_of_several_contacts_is_relabelled_no_more_than_by_label(
+    folder_page, tmp_path
+):
+    trial = edge.load(tmp_path / "a.npz")
+    edge.save(
+        tmp_path / "a.npz", replace(trial, meta={**trial.meta, "contacts": "alike"})
+    )
+    with pytest.raises(InputError, match="its contacts have labels of their own"):
+        folder_page._act({"do": "relabel", "file": "a.npz", "labels": {"object": "x"}})
+
+
+def test_what_cannot_be_deleted_is_one_sentence(folder_page, monkeypatch):
+    def refuse(path, missing_ok):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(InputError, match="a.npz: cannot be deleted: Permission denied"):
+        folder_page._act({"do": "delete", "file": "a.npz"})
+    assert "a.npz" in folder_page._trials
 
 
 class TestInABrowser:

@@ -5,7 +5,7 @@ import http.client
 import json
 import socket
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 
 import pytest
 
@@ -116,7 +116,7 @@ def test_it_is_watched_as_long_as_a_browser_asks_for_pictures(server, monkeypatc
 
 
 def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
-    monkeypatch.setattr(web._Handler, "timeout", 0.2)
+    monkeypatch.setattr(web, "SLOW_S", 0.2)
     server.show({"counts": "0" * 20_000_000})
     with socket.create_connection(
         ("127.0.0.1", server.server_port), timeout=5
@@ -148,3 +148,81 @@ def test_a_port_in_use_is_named(server):
         InputError, match=r"cannot be listened at: Address already in use"
     ):
         WebServer(f"127.0.0.1:{server.server_port}", refuse)
+
+
+def raw(server, data, timeout=5):
+    """What a connection answers to these bytes."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout) as client:
+        client.sendall(data)
+        received = b""
+        with suppress(ConnectionResetError):
+            while piece := client.recv(1 << 16):
+                received += piece
+    return received
+
+
+def test_a_browser_that_does_not_send_its_whole_request_is_dropped(server, monkeypatch):
+    monkeypatch.setattr(web, "SLOW_S", 0.2)
+    began = time.monotonic()
+    assert raw(server, b"GET / HTTP/1.1") == b""
+    assert time.monotonic() - began < 2.0
+
+
+def test_the_token_is_looked_at_before_the_head_is_there(server):
+    assert b" 401 " in raw(server, b"GET /?token=x HTTP/1.1\r\n")
+
+
+@pytest.mark.parametrize(
+    ("data", "status"),
+    [
+        (b"GET /?" + b"a=b&" * 5000, b" 414 "),
+        (b"GET /?token=%s HTTP/1.1\r\nA: " + b"b" * 5000, b" 431 "),
+    ],
+)
+def test_a_request_of_more_than_4_kb_is_refused(server, data, status):
+    if b"%s" in data:
+        data = data.replace(b"%s", server.token.encode())
+    assert status in raw(server, data)
+
+
+@pytest.mark.parametrize(
+    ("fields", "status"),
+    [
+        ("Host: 127.0.0.1:%d", b" 204 "),
+        ("Host: localhost:%d", b" 204 "),
+        ("Host: evil.example:%d", b" 403 "),
+        ("Host: 127.0.0.1:%d\r\nOrigin: http://127.0.0.1:%d", b" 204 "),
+        ("Host: 127.0.0.1:%d\r\nOrigin: http://evil.example", b" 403 "),
+    ],
+)
+def test_another_host_or_origin_is_refused(server, fields, status):
+    head = f"GET /picture?token={server.token} HTTP/1.1\r\n{fields}\r\n\r\n"
+    assert status in raw(server, head.replace("%d", str(server.server_port)).encode())
+
+
+def test_one_address_has_eight_connections(server):
+    with ExitStack() as stack:
+        place = ("127.0.0.1", server.server_port)
+        for _ in range(web.MOST_OF_ONE):
+            stack.enter_context(socket.create_connection(place))
+        time.sleep(0.2)
+        ninth = stack.enter_context(socket.create_connection(place, timeout=1.0))
+        assert ninth.recv(1) == b""
+
+
+def test_a_wrong_token_explains_itself(server):
+    assert b"needs the link that the program printed" in ask(server, token="x")[2]
+
+
+def test_a_stream_gets_every_new_picture(server):
+    place = ("127.0.0.1", server.server_port)
+    with socket.create_connection(place, timeout=5) as client:
+        client.sendall(f"GET /events?token={server.token} HTTP/1.1\r\n\r\n".encode())
+        received = b""
+        for t in (1.5, 2.5, 3.5):
+            server.show({"t": t})
+            while b'data: {"t":%.1f}\n\n' % t not in received:
+                received += client.recv(1 << 16)
+        assert server.watched
+    assert received.startswith(b"HTTP/1.1 200 OK\r\n")
+    assert b"Content-Type: text/event-stream" in received
