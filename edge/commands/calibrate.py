@@ -14,17 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.commands.options import add_skin, within
-from edge.commands.output import LOG, Output
+from edge.commands.output import LOG, Output, counted
 from edge.commands.source import open_skin
 from edge.errors import InputError
+from edge.skin.baseline import deaf_taxels
 from edge.skin.calibration import save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+from edge.touch.region import find_regions
 
 FRAMES = 1000
 """As many as the paper's lab averaged for its baseline."""
 FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
+FEWEST_TOGETHER = 2
+"""Taxels side by side that have moved as under a touch."""
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
 NOISY, NOISY_COUNTS = 10.0, 5.0
@@ -135,6 +139,58 @@ def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     return sorted(taxels, key=lambda taxel: -noise[taxel])
 
 
+def moved_together(
+    file: SkinFile, baseline: NDArray[np.uint16], former: TaxelCalibration | None
+) -> list[tuple[int, int]]:
+    """Taxels (row, col) that rest as if they were touched.
+
+    They form a region, of which each has moved by more than the onset against the
+    former calibration; or, without one, rests above the onset though its chip rests at
+    zero.
+    """
+    if former is not None:
+        moved = np.abs(baseline.astype(np.int64) - former.baseline)
+    else:
+        moved = np.zeros(baseline.shape, dtype=np.int64)
+        for chip in file.chips:
+            if chip.kind.rests_at_zero:
+                moved.ravel()[chip.served] = baseline.ravel()[chip.served]
+    if file.layout.onset == 0:  # any noise would be above it
+        return []
+    regions = find_regions(moved, file.layout.onset, wraps=file.layout.wraps)
+    taxels: list[tuple[int, int]] = []
+    for region in regions:
+        if region.area >= FEWEST_TOGETHER:
+            taxels += [(row, col) for row, col in np.argwhere(region.mask).tolist()]
+    return taxels
+
+
+def check_rest(
+    file: SkinFile, calibration: TaxelCalibration, former: TaxelCalibration | None
+) -> None:
+    """Refuse a calibration that was measured on a touched or very noisy skin.
+
+    Raises:
+        InputError: the sentence names the taxels.
+    """
+    touched = moved_together(file, calibration.baseline, former)
+    if touched:
+        against = "against the former calibration" if former else "above zero"
+        raise InputError(
+            f"{counted(len(touched), 'taxel')} side by side moved by more than the onset "
+            f"of {file.layout.onset} counts {against}, such as {list(touched[0])}, as if "
+            "something leant on the skin; keep everything off it, or use --force"
+        )
+    deaf = deaf_taxels(replace(file, calibration=calibration))
+    if deaf:
+        raise InputError(
+            f"{counted(len(deaf), 'taxel')} would be deaf, such as {list(deaf[0])}: a "
+            f"dead band of {file.signal.dead_band_sigma:g} times the noise reaches the "
+            f"threshold of {file.layout.threshold_counts} counts; keep everything off "
+            "the skin, raise threshold_counts, or use --force"
+        )
+
+
 def replace_unusable(
     file: SkinFile, measured: Measurement, former: TaxelCalibration | None, force: bool
 ) -> int:
@@ -192,6 +248,8 @@ def run(arguments: argparse.Namespace) -> int:
             f"all [{row}, {col}], by {noise[row, col]:.1f} counts; keep everything off "
             "the skin, list broken taxels under dead in [signal], or use --force"
         )
+    if not arguments.force:
+        check_rest(file, measured.calibration, former)
     now = datetime.now(UTC).replace(microsecond=0)
     calibration = replace(measured.calibration, taken=now)
     backup = save_calibration(arguments.skin, calibration)

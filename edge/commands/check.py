@@ -15,6 +15,7 @@ from typing import Self
 
 from edge.commands.options import within
 from edge.commands.output import Output, counted
+from edge.skin.baseline import deaf_taxels
 from edge.skin.file import SkinFile, frame_rate, load
 
 FRAMES = 100
@@ -52,6 +53,13 @@ def faults(file: SkinFile) -> Iterator[str]:
         yield (
             "sign = 1, but a touch lowers an MPR121's values: leave sign out, or set "
             "it to -1"
+        )
+    deaf = deaf_taxels(file)
+    if deaf:
+        yield (
+            f"{counted(len(deaf), 'taxel')} deaf, such as {list(deaf[0])}: the dead band "
+            f"reaches the threshold of {file.layout.threshold_counts} counts; calibrate "
+            "again with nothing on the skin, or raise threshold_counts"
         )
     if _noise_touches(file):
         yield (

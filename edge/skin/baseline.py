@@ -74,6 +74,16 @@ class Baseline:
         np.clip(self._now, self._low, self._high, out=self._now)
 
 
+def deaf_taxels(skin: "SkinFile") -> list[tuple[int, int]]:
+    """Working taxels (row, col) whose dead band reaches the contact threshold."""
+    threshold = skin.layout.threshold_counts
+    if not threshold:
+        return []
+    band = dead_band(skin).reshape(skin.layout.shape)
+    deaf = np.argwhere((band >= threshold) & skin.layout.alive)
+    return [(row, col) for row, col in deaf.tolist()]
+
+
 def dead_band(skin: "SkinFile") -> NDArray[np.int32]:
     """(taxels,) counts under which a taxel reads 0; at least 1, as none is negative."""
     least = max(1, skin.signal.dead_band_counts)

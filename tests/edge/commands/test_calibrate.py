@@ -1,6 +1,7 @@
 """`edge-classify calibrate`: exact means and deviations, and a skin that must be at
 rest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,3 +146,59 @@ def test_mean_and_deviation_are_exact_at_a_large_offset():
     exact = (values - 60000).astype(np.float64).std(axis=0, ddof=1)
     exact[0, 0] = 0.0
     np.testing.assert_allclose(deviation, exact, rtol=1e-12, atol=1e-12)
+
+
+def shifted(skin, tmp_path, counts, taxels):
+    """A recording of rest in which some taxels rest higher, steadily."""
+    still = recording.load(tmp_path / "rest.npz")
+    frames = still.frames.copy()
+    for row, col in taxels:
+        frames[:, row, col] = counts
+    path = tmp_path / "leant.npz"
+    recording.save(path, replace(still, frames=frames))
+    return path
+
+
+@pytest.fixture
+def calibrated(edge, skin, quiet, tmp_path):
+    """A skin file that was calibrated at rest."""
+    recording.save(tmp_path / "rest.npz", recording.load(quiet))
+    assert edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)[0] == 0
+    return skin
+
+
+SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
+
+
+def test_a_skin_that_something_leans_on_steadily_is_refused(edge, calibrated, tmp_path):
+    before = calibrated.read_text()
+    leant = shifted(calibrated, tmp_path, 120, SIX)
+    words = ("calibrate", "--skin", calibrated, "--fake", leant, "--frames", 50)
+    status, _, err = edge(*words)
+    assert status == 2
+    assert "6 taxels side by side moved by more than the onset" in err
+    assert calibrated.read_text() == before
+    assert edge(*words, "--force")[0] == 0
+
+
+@pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])
+def test_a_single_taxel_or_a_small_drift_is_calibrated(
+    edge, calibrated, tmp_path, counts, taxels
+):
+    drifted = shifted(calibrated, tmp_path, counts, taxels)
+    words = ("calibrate", "--skin", calibrated, "--fake", drifted, "--frames", 50)
+    assert edge(*words)[0] == 0
+
+
+def test_a_calibration_that_would_make_taxels_deaf_is_refused(
+    edge, calibrated, tmp_path
+):
+    rest = tmp_path / "rest.npz"
+    words = ("calibrate", "--skin", calibrated, "--fake", rest, "--frames", 50)
+    status, _, err = edge(*words, "--noise", 9)
+    assert status == 2
+    assert "would be deaf" in err
+    assert edge(*words, "--noise", 9, "--force")[0] == 0
+    status, (event,), _ = edge("check", calibrated)
+    assert status == 1
+    assert any("taxels deaf, such as" in remark for remark in event["remarks"])
