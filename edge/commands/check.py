@@ -15,8 +15,10 @@ from typing import Self
 
 from edge.commands.options import within
 from edge.commands.output import Output, counted
+from edge.model.model import Model
 from edge.skin.baseline import deaf_taxels
 from edge.skin.file import SkinFile, frame_rate, load
+from edge.touch.layout import differences
 
 FRAMES = 100
 """Counted together, since some transactions are not needed in every frame."""
@@ -30,6 +32,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="skin.toml",
         help="the file that describes the skin; without it, look at this machine",
     )
+    parser.add_argument("--model", help="model.onnx, whose skin is compared with it")
     parser.add_argument(
         "--overhead",
         type=within(float, 0.0, 10_000.0),
@@ -120,6 +123,9 @@ def run(arguments: argparse.Namespace) -> int:
     wires = Wires.of(file, arguments.overhead)
     wrong = list(faults(file))
     remarked = list(remarks(file))
+    if arguments.model is not None:
+        model = Model(arguments.model)
+        remarked += differences(model.info.layout, file.layout)
     asked = file.reading.rate_hz
     if wires.rate_hz < asked:
         wrong.append(

@@ -21,6 +21,7 @@ from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter
 from edge.output.systemd import Notifier
 from edge.skin.loop import Schedule
+from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
 
 LAST_TOUCHES, FEWEST_TOUCHES = 20, 8
@@ -125,8 +126,15 @@ def run(arguments: argparse.Namespace) -> int:
     on_skin = arguments.without_joints == "skin"
     notifier = Notifier(now=time.monotonic)
     with reading(
-        arguments, model=model, needs_joints=not on_skin, decides=True
+        arguments,
+        model=model,
+        needs_joints=not on_skin,
+        decides=True,
+        # Angles that another program writes go by the real clock.
+        real_time=arguments.joints is not None,
     ) as live:
+        for sentence in differences(model.info.layout, live.skin.layout):
+            LOG.warning(f"{arguments.model}: {sentence}")
         classifier = Classifier(
             model,
             live.skin.layout,

@@ -20,6 +20,9 @@ LONGEST_RELEASE_S = 60.0
 MOST_LINES = 1024
 """Most rows, and most columns."""
 
+THRESHOLD_SHARE = 0.2
+"""Part by which a skin's thresholds may differ from the model's without a word."""
+
 
 @dataclass(frozen=True)
 class SkinLayout:
@@ -209,3 +212,45 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         onset_counts=min(round(model.onset * ratio), 65535),
         dead=model.dead,
     )
+
+
+def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
+    """Sentences that say in what a device's skin differs from the model's, where they
+    can still be used together.
+
+    Raises:
+        InputError: they cannot, see `for_device`.
+    """
+    used = for_device(model, device)
+    sentences = []
+    dead = set(device.dead) - set(model.dead)
+    if dead:
+        sentences.append(f"{len(dead)} taxels are dead that were alive in training")
+    if device.counts_per_newton != model.counts_per_newton:
+        sentences.append(
+            f"a newton is {device.counts_per_newton:g} counts, and "
+            f"{model.counts_per_newton:g} in training; forces are converted"
+        )
+    for name, own, trained in (
+        ("threshold", device.threshold_counts, used.threshold_counts),
+        ("onset", device.onset, used.onset),
+    ):
+        if own and abs(own - trained) > THRESHOLD_SHARE * own:
+            sentences.append(
+                f"the skin's {name} is {own} counts, but the model's of {trained} is "
+                "used"
+            )
+    if not _alike(device.pitch, model.pitch):
+        sentences.append(
+            f"taxels are {_millimetres(device.pitch)} apart, and "
+            f"{_millimetres(model.pitch)} in training"
+        )
+    return sentences
+
+
+def _alike(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    return all(math.isclose(x, y, rel_tol=0.02) for x, y in zip(a, b, strict=True))
+
+
+def _millimetres(pitch: tuple[float, float]) -> str:
+    return " x ".join(f"{1e3 * step:g}" for step in pitch) + " mm"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.layout import SkinLayout
+from edge.touch.layout import SkinLayout, differences
 from tests.conftest import FOREARM
 
 ANGLES = [
@@ -104,3 +104,27 @@ def test_what_makes_no_sense_names_its_key_and_the_file(change, word):
     with pytest.raises(InputError, match=word) as caught:
         SkinLayout.from_dict(skin, where="skin.toml")
     assert "skin.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"dead": (3, 4)}, "2 taxels are dead that were alive in training"),
+        ({"counts_per_newton": 900.0}, "a newton is 900 counts, and 1000 in training"),
+        ({"threshold_counts": 90, "onset_counts": 100}, "the skin's threshold is 90"),
+        ({"pitch_m": 0.02}, "taxels are 20 x 20 mm apart, and 10 x 10 mm in training"),
+    ],
+)
+def test_what_differs_from_the_models_skin_is_said(changes, sentence):
+    model = SkinLayout(
+        4,
+        4,
+        threshold_counts=40,
+        onset_counts=100,
+        wraps=False,
+        counts_per_newton=1000.0,
+        pitch_m=0.01,
+    )
+    (said, *_) = differences(model, replace(model, **changes))
+    assert sentence in said
+    assert differences(model, model) == []
