@@ -27,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, or explain."""
     from edge.errors import InputError
     from train.simulate import scene as scenes
+    from train.simulate.plan import summary
 
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
     if not arguments.out and not arguments.explain:
@@ -40,6 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(explain(scene))
     if arguments.out:
+        print("\n".join(summary(scene)), file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 

@@ -201,6 +201,7 @@ def check_supported(scene: Scene, where: str) -> None:
                     "its label "
                     "says"
                 )
+    check_heeded(scene, where)
     required_by_object = [
         required_effects(scene, o, c) for o in scene.objects for c in o.conditions
     ]
@@ -227,3 +228,46 @@ def check_supported(scene: Scene, where: str) -> None:
             f"{where}: effects.add names {name}, which this scene cannot support: "
             f"it needs {', '.join(needs)}"
         )
+
+
+def check_heeded(scene: Scene, where: str) -> None:
+    """Refuse a key of an object that no condition of it heeds.
+
+    Raises:
+        InputError: the sentence names the key.
+    """
+    for item in scene.objects:
+        heeded: set[str] = set(scene.leave_out)
+        for condition in item.conditions:
+            heeded |= required_effects(scene, item, condition).keys()
+        for name, info in EFFECTS.items():
+            if info.keys and item.given.issuperset(info.keys) and name not in heeded:
+                needs = " and ".join(info.needs) or "another family"
+                raise InputError(
+                    f"{where}: object {item.name!r} gives {' and '.join(info.keys)}, "
+                    f"which has no effect without {needs}; leave it out, or make the "
+                    "object movable"
+                )
+
+
+def summary(scene: Scene) -> list[str]:
+    """Three lines: the effects that a scene's trials call for, those that none does,
+    and how much of the effects' work that leaves out."""
+    counts = dict.fromkeys(EFFECTS, 0)
+    trials = 0
+    for item in scene.objects:
+        for condition in item.conditions:
+            trials += scene.count
+            for effect in required_effects(scene, item, condition):
+                counts[effect] += scene.count
+    called = [f"{name} ({n})" for name, n in counts.items() if n]
+    unused = [name for name, n in counts.items() if not n]
+    pairs = sum(counts.values())
+    every = trials * len(EFFECTS)
+    return [
+        f"effects, with the trials of {trials} that call for them: "
+        f"{', '.join(called) or 'none'}",
+        f"not called for, and not loaded: {', '.join(unused) or 'none'}",
+        f"so {pairs} effects of trials are computed, and {every - pairs} of {every} "
+        f"({1.0 - pairs / every:.0%}) are not; --explain gives their times",
+    ]

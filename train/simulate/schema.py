@@ -84,7 +84,7 @@ SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
 """{spread around 0: the other key that a movable object needs for it}; the object need
 not give a value for the spread itself."""
 OBJECT = {
-    "mass_kg": Field(0.0, 1e12, None, "kilograms", open_low=True),
+    "mass_kg": Field(1e-6, 1e12, None, "kilograms"),
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
     "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
     "skin_friction": Field(0.0, 5.0, None, "mu between the skin and the object's face"),
@@ -104,7 +104,7 @@ OBJECT = {
         0.0, 10.0, None, "speed at which friction has fallen", open_low=True
     ),
     "modulus_pa": Field(0.0, 1e18, 12e3, "of the elastic foundation", open_low=True),
-    "depth_m": Field(0.0, 10.0, 0.10, "of the elastic foundation", open_low=True),
+    "depth_m": Field(1e-4, 10.0, 0.10, "of the elastic foundation"),
     "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
     "relax_s": Field(0.0, 1e6, 0.5, "its time", open_low=True),
     "stem_count": Field(1, 200, 12, "stems the forearm can meet", integer=True),

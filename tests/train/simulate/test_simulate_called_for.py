@@ -1,6 +1,7 @@
 """An effect that is not called for costs nothing and changes nothing: six proofs."""
 
 import json
+import re
 import sys
 import types
 
@@ -13,7 +14,14 @@ from tests.train.simulate import scenes
 from tests.train.simulate.scenes import run_batch
 from train.simulate.convergence import kinds
 from train.simulate.engine import values_of
-from train.simulate.plan import INSTEAD, STAGES, make_plan, module_of, required_effects
+from train.simulate.plan import (
+    INSTEAD,
+    STAGES,
+    make_plan,
+    module_of,
+    required_effects,
+    summary,
+)
 from train.simulate.scene import from_dict
 from train.simulate.schema import EFFECTS
 
@@ -224,3 +232,13 @@ def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
     assert seen[0].tobytes() == seen[1].tobytes()
     noisy = (seen[0][:, 0] > 0).any()
     assert noisy if band < 21.0 else not noisy
+
+
+def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
+    called, unused, saved = summary(scene("noise"))
+    counts = dict(re.findall(r"(\w+) \((\d+)\)", called))
+    assert counts
+    assert not set(counts) & set(unused.partition(": ")[2].split(", "))
+    assert len(counts) + len(unused.partition(": ")[2].split(", ")) == len(EFFECTS)
+    pairs = sum(map(int, counts.values()))
+    assert f"so {pairs} effects of trials are computed" in saved

@@ -157,7 +157,7 @@ MISTAKES = [
     (
         "object.0.mass_kg",
         -1.0,
-        "mass_kg must be a number above 0, at most 1e+12, not -1.0",
+        "mass_kg must be a number from 1e-06 to 1e+12, not -1.0",
     ),
     ("object.0.friction_static", None, "friction_static is missing"),
     ("object.0.friction_kinetic", 0.6, "must be at most friction_static (0.5)"),
@@ -253,3 +253,12 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
         InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"
     ):
         from_dict(table, here)
+
+
+def test_a_key_that_no_condition_of_the_object_heeds_is_refused():
+    table = changed("object.0.conditions", ["fixed"])
+    table["object"][0]["slope_deg"] = 5.0
+    with pytest.raises(
+        InputError, match="gives slope_deg, which has no effect without"
+    ):
+        from_dict(table, where="scene.toml")
