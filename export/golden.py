@@ -18,16 +18,13 @@ VECTORS = 256
 """Feature vectors beyond the trials' own."""
 BOUNDS = {
     "scores": 1e-15,
-    "label_distances": 1e-12,
     "features": 1e-12,
     "time_s": 1e-9,
 }
-"""Scores are quotients of small integers, correctly rounded everywhere. A label's
-distance is the mean of whole numbers whose sum may exceed 2^53 where a vector lies
-outside the training set: its relative error is then below 2^-46. Features are
+"""Scores are quotients of small integers, correctly rounded everywhere. Features are
 interpolated in a few operations, and motion passes through sines and cosines that
 differ by an ulp between C libraries: below 100 ulp of metres. The bounds leave a factor
-of 40 and more."""
+of 40 and more. All other outputs of the graph must be equal, to the bit."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
@@ -102,12 +99,9 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         # Besides the trials, which were trained with, points between them.
         between = 0.5 * (early + np.roll(early, 1, axis=1))
         arrays["decision_point_vectors"] = np.concatenate([early, between], axis=1)
-    bounds = dict(BOUNDS)
-    if not info.has_label_distances:
-        del bounds["label_distances"]
     meta = {
         "skin": recordings[0].meta.get("skin", {}),
-        "bounds": bounds,
+        "bounds": BOUNDS,
         "model": info.data_digest,
     }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

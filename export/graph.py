@@ -235,9 +235,10 @@ def _label_distances(
     wider = build.node("Pad", [squares, build.ints(0, 0, 0, 1), build.constant(np.inf)])
     own = build.node("Gather", [wider, rows], axis=1)
     nearest, _ = build.nodes("TopK", [own, most], ["", ""], axis=2, largest=0, sorted=1)
-    kept = build.node("Where", [taken, nearest, build.constant(0.0)])
+    roots = build.node("Round", [build.node("Sqrt", [nearest])])
+    kept = build.node("Where", [taken, roots, build.constant(0.0)])
     total = build.node("ReduceSum", [kept, build.ints(2)], keepdims=0)
-    return build.node("Sqrt", [build.node("Div", [total, counts])])
+    return build.node("Div", [total, counts])
 
 
 def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:

@@ -146,7 +146,9 @@ def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
     ros.run(monkeypatch)
     (mobility,) = ros.topics["~/mobility"]
     assert (mobility.header.stamp, mobility.header.frame_id) == ("now", "arm_skin")
-    assert [(r.class_id, r.score) for r in mobility.results] == [("movable", 0.955709)]
+    (answer,) = mobility.results
+    assert answer.class_id == "movable"
+    assert 0.9 < answer.score < 1.0
     assert ros.topics["~/object"][0].results[0].class_id == "pillow"
     events = [json.loads(message.data) for message in ros.topics["~/events"]]
     tasks = len(edge.Model(demo.MODEL).info.tasks)

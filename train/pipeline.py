@@ -49,18 +49,20 @@ def squared_distances(
 
 
 def label_distances(
-    squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int
+    squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int, unit: float
 ) -> NDArray[np.float64]:
     """(m, classes) distance of each label, from squared distances (m, n) to the trials.
 
-    It is the root of the mean square to the label's nearest trials; `nearest_of_label`
-    says to how many.
+    It is the mean distance of the label's nearest trials; `nearest_of_label` says of
+    how many. Distances are rounded to the unit of the grid first. So their sum is a
+    whole number of units far below 2^53, which every order of summation gives.
     """
     counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
     for label, count in enumerate(counts):
         own = np.sort(squares[:, labels == label], axis=1)[:, :count]
-        out[:, label] = np.sqrt(own.sum(axis=1) / count)
+        wholes = np.rint(np.sqrt(own) / unit)
+        out[:, label] = wholes.sum(axis=1) / count * unit
     return out
 
 
@@ -319,9 +321,9 @@ class ContactClassifier:
                 met = new & used & np.isin(y[task], classes)
                 if len(classes) > 1:
                     squares = model.squares(task, X[met])
-                    distances = label_distances(
-                        squares, model.labels_[task], len(classes)
-                    )
+                    known = model.labels_[task]
+                    unit = model.unit(task)
+                    distances = label_distances(squares, known, len(classes), unit)
                     labels = classes.searchsorted(y[task][met])[:, None]
                     right = np.take_along_axis(distances, labels, axis=1)[:, 0]
                     np.put_along_axis(distances, labels, np.inf, axis=1)
@@ -367,6 +369,10 @@ class ContactClassifier:
             self.project(space, X)[:, :c], self.rows_[space][:, :c]
         )
 
+    def unit(self, task: str) -> float:
+        """The unit of a task's coordinates, a power of two."""
+        return self.projections_[self.spaces_[task]].grid_.unit
+
     def neighbours(
         self, task: str, X: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -389,7 +395,8 @@ class ContactClassifier:
         for task, known in self.labels_.items():
             squares = self.squares(task, X)
             labels[task] = vote(known[self.nearest(task, squares)])
-            to_labels = label_distances(squares, known, len(self.classes_[task]))
+            classes = len(self.classes_[task])
+            to_labels = label_distances(squares, known, classes, self.unit(task))
             distances[task] = to_labels * self.slopes_[task]
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)

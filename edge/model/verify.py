@@ -12,9 +12,10 @@ by.
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
+| `novelty` | float64 (v,) | likewise |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
-| `meta` | JSON text | `skin`, `bounds` {`scores`, `label_distances`, `features`, `time_s`} |
+| `meta` | JSON text | `skin`, `bounds` {`scores`, `features`, `time_s`} |
 
 A bound b allows abs(seen - expected) <= b * max(1, abs(expected)). A quantity without a
 bound must be equal. Distances have none: they come from whole numbers, and an engine
@@ -212,12 +213,19 @@ def answers(
         seen["decision_point_"] = {
             key: np.stack([p[key] for p in points]) for key in points[0]
         }
-    return {
+    results = {
         f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
         for prefix, outputs in seen.items()
         for task in model.info.tasks
         for end in ends
     }
+    if model.info.decision_points_s:
+        task = next(iter(model.info.tasks))
+        for prefix, outputs in seen.items():
+            # What follows from a vector that is not finite may differ.
+            answered = outputs[f"{task}_label"] >= 0
+            results[f"{prefix}novelty"] = np.where(answered, outputs["novelty"], 0.0)
+    return results
 
 
 def _outputs(
