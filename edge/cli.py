@@ -48,7 +48,9 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         prog="edge-classify",
         description="Tells from a robot's skin what the robot has touched.",
         epilog="`edge-classify COMMAND --help` explains a command. Commands print text to a "
-        "terminal, and one JSON object per line to a pipe or a file.",
+        "terminal, and one JSON object per line to a pipe or a file. In a checkout of the "
+        "project, edge-classify export, import, simulate, study, tradeoff, show, split and "
+        "thresholds run the workstation's commands.",
     )
     top.add_argument(
         "--version", action="version", version=f"edge-classify {__version__}"
@@ -170,19 +172,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         top.print_help()
         return 2
     if not command and words and not words[0].startswith("-"):
-        from difflib import get_close_matches  # rarely needed, and slow to load
+        from edge.tools import workstation  # rarely needed
 
-        near = get_close_matches(words[0], COMMANDS, 1, 0.5)
-        hint = (
-            f"did you mean {near[0]!r}?"
-            if near
-            else f"the commands are {', '.join(COMMANDS)}"
-        )
-        print(f"{top.prog}: there is no command {words[0]!r}; {hint}", file=sys.stderr)
-        return 2
+        if words[0] in workstation.COMMANDS:
+            return workstation.run(words)
+        return refuse_command(top.prog, words[0], [*COMMANDS, *workstation.COMMANDS])
     return dispatch(top, words)
+
+
+def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:
+    """Say that there is no such command, and which may have been meant; returns 2."""
+    from difflib import get_close_matches  # rarely needed, and slow to load
+
+    near = get_close_matches(word, commands, 1, 0.5)
+    hint = f"the commands are {', '.join(commands)}"
+    if near:
+        hint = f"did you mean {near[0]!r}?"
+    print(f"{program}: there is no command {word!r}; {hint}", file=sys.stderr)
+    return 2
 
 
 # The interpreter's last garbage collection would visit every imported object, which
 # doubles the time that the program takes to end.
 atexit.register(gc.freeze)
+
+if __name__ == "__main__":
+    sys.exit(main())

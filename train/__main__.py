@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from edge.cli import add_commands, dispatch
+from edge.cli import add_commands, dispatch, refuse_command
 
 COMMANDS = {
     "import": "train.commands.import_",
@@ -31,8 +31,14 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; 0 fine, 1 a check failed, 2 bad usage or input."""
+    words = list(sys.argv[1:] if argv is None else argv)
     try:
-        return dispatch(parser(), argv)
+        if not words:
+            parser().print_help()
+            return 2
+        if not words[0].startswith("-") and words[0] not in COMMANDS:
+            return refuse_command("train", words[0], list(COMMANDS))
+        return dispatch(parser(), words)
     except KeyboardInterrupt:  # while the commands were being loaded
         return 130
 

@@ -1,0 +1,46 @@
+"""Commands that run in a checkout of the project, on the workstation."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import edge
+
+COMMANDS = {
+    "export": "export",
+    "import": "train",
+    "simulate": "train",
+    "study": "train",
+    "tradeoff": "train",
+    "show": "train",
+    "split": "train",
+    "thresholds": "train",
+}
+"""The package of each command."""
+
+
+def run(words: Sequence[str]) -> int:
+    """Run a command in the checkout that this package is part of; its exit status.
+
+    Elsewhere a sentence says where it runs, and the status is 2.
+    """
+    command, *options = words
+    package = COMMANDS[command]
+    checkout = Path(edge.__file__).resolve().parents[1]
+    if not (checkout / package / "__main__.py").is_file():
+        print(
+            f"edge-classify: {command} runs on the workstation, in a checkout of the "
+            "project (see its README): this machine has the board's package alone",
+            file=sys.stderr,
+        )
+        return 2
+    module = [package] if package == command else [package, command]
+    paths = [str(checkout), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    program = [sys.executable, "-m", *module, *options]
+    try:
+        return subprocess.call(program, env=environment)
+    except KeyboardInterrupt:
+        return 130
