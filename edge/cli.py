@@ -30,6 +30,7 @@ COMMANDS = {
     "explain": "edge.tools.explain",
     "info": "edge.tools.info",
     "verify": "edge.commands.verify",
+    "install": "edge.commands.install",
     "bench": "edge.tools.bench",
     "fake": "edge.tools.fake",
     "demo": "edge.tools.demo",

@@ -7,20 +7,28 @@ tells systemd when it is ready and that it is alive.
 
 import argparse
 import time
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier
-from edge.commands.options import add_engine, add_error, add_reading, check_error
+from edge.commands.options import (
+    add_engine,
+    add_error,
+    add_reading,
+    check_error,
+    within,
+)
 from edge.commands.output import LOG, MOST_PLACES, counted
-from edge.commands.source import reading
+from edge.commands.source import Opened, reading
 from edge.events import Aside, Decided, Event
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter
 from edge.output.systemd import Notifier
 from edge.skin.loop import Schedule
+from edge.touch.frame import Frame
 from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
 
@@ -52,6 +60,25 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--map",
         metavar="FILE",
         help="follow several contacts at once, and append each to FILE with its position",
+    )
+    parser.add_argument(
+        "--keep",
+        metavar="DIR",
+        type=Path,
+        help="keep touches there as recordings with their decisions, to label and train on",
+    )
+    parser.add_argument(
+        "--keep-if",
+        default="unsure,unknown",
+        metavar="WHY",
+        help="which touches are kept: unsure, unknown, all (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--keep-mb",
+        type=within(float, 1.0, 1e6),
+        default=200.0,
+        metavar="MB",
+        help="most megabytes of kept touches; the oldest go first (default: %(default)g)",
     )
 
 
@@ -143,7 +170,10 @@ def run(arguments: argparse.Namespace) -> int:
             motion_on_skin=on_skin,
         )
         writers = _map_writers(arguments.map, model)
-        with closing(live.lines(arguments.udp, writers)) as lines:
+        with (
+            closing(live.lines(arguments.udp, writers)) as lines,
+            _keeper(arguments, model, live.opened) as keep,
+        ):
             notifier.ready(f"reading {live.opened.source}")
             unknown_touches = UnknownTouches(arguments.model)
             frames = 0
@@ -152,6 +182,7 @@ def run(arguments: argparse.Namespace) -> int:
                 notifier.alive()
                 decided = classifier.push(frame)
                 warn_of_still_taxels(decided)
+                keep(frame, decided)
                 notice = unknown_touches.push(decided)
                 if notice is not None:
                     faults.append(notice)
@@ -163,6 +194,30 @@ def run(arguments: argparse.Namespace) -> int:
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])
     return 0
+
+
+@contextmanager
+def _keeper(
+    arguments: argparse.Namespace, model: Model, opened: Opened
+) -> Iterator[Callable[[Frame, Sequence[Event]], None]]:
+    """What takes in every frame with its events; it keeps touches where asked."""
+    if arguments.keep is None:
+        yield lambda frame, events: None
+        return
+    from edge.tools.keep import Keeper, meta_of, reasons  # few runs keep touches
+
+    keeper = Keeper(
+        arguments.keep,
+        reasons(arguments.keep_if),
+        arguments.keep_mb,
+        opened.skin,
+        model.info.window_s,
+        meta_of(opened.skin.file, opened.source, model.info.chain),
+    )
+    try:
+        yield keeper.push
+    finally:
+        keeper.close()
 
 
 def _map_writers(path: str | None, model: Model) -> list[LineWriter]:

@@ -89,6 +89,10 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     name = os.fspath(path)
     arrays = load_arrays(name)
     meta = load_meta(name, arrays)
+    if meta.get("model", model.info.data_digest) != model.info.data_digest:
+        raise InputError(
+            f"{name}: is of another model than {model.path}; copy or export both together"
+        )
     with parsing(
         name, "a golden file of this model", "; export it again with the model"
     ):

@@ -73,7 +73,11 @@ def change_text(key: str, a: Any, b: Any) -> str:
     if key in COARSE:
         return f"{key}: differs"
     if isinstance(a, list) or isinstance(b, list):
-        a, b = a or [], b or []
+        a = a or []
+        b = b or []
+        if key == "trials":
+            a = _file_names(a)
+            b = _file_names(b)
         gone, new = [x for x in a if x not in b], [x for x in b if x not in a]
         texts = [
             f"{sign} {_some(side)}" for sign, side in (("-", gone), ("+", new)) if side
@@ -83,6 +87,11 @@ def change_text(key: str, a: Any, b: Any) -> str:
         a, b = f"{a:.1%}", f"{b:.1%}"
     a, b = ("a table" if isinstance(value, dict) else value for value in (a, b))
     return f"{key}: {a} -> {b}"
+
+
+def _file_names(trials: list[str]) -> list[str]:
+    """Names of trials without the folders that several data sets put before them."""
+    return [trial.rpartition("/")[2] for trial in trials]
 
 
 def _some(values: list[Any]) -> str:

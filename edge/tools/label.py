@@ -149,15 +149,34 @@ def _text(labels: Mapping[str, str]) -> str:
     return " ".join(parts) or "no label"
 
 
+def _decided_text(decided: Mapping[str, Any]) -> str:
+    """The decisions of a kept touch, with their confidence and flags."""
+    parts = []
+    for task, answer in decided.items():
+        sure = answer["confidence"]
+        notes = [] if sure is None else [f"{sure:.0%}"]
+        notes += answer["flags"]
+        parts.append(f"{task}={answer['label']} {', '.join(notes)}".strip())
+    return "; ".join(parts)
+
+
 def _print(
     output: Output, paths: Sequence[Path], metas: Sequence[Mapping[str, Any]]
 ) -> None:
     """Print each recording's labels, how many have each, and probable slips."""
     width = max(len(str(path)) for path in paths)
     labels = [meta.get("labels", {}) for meta in metas]
-    for path, current in zip(paths, labels, strict=True):
-        event = {"event": "labels", "file": str(path), "labels": current}
-        output.event(event, f"{path!s:<{width}}  {_text(current)}")
+    for path, current, meta in zip(paths, labels, metas, strict=True):
+        event: dict[str, Any] = {
+            "event": "labels",
+            "file": str(path),
+            "labels": current,
+        }
+        text = f"{path!s:<{width}}  {_text(current)}"
+        if "decided" in meta:
+            event["decided"] = meta["decided"]
+            text += f" (decided: {_decided_text(meta['decided'])})"
+        output.event(event, text)
     for line in counts_text(labels):
         output.text(line)
     for sentence in slips(labels):

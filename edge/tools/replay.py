@@ -4,9 +4,13 @@ Decides on recordings as `edge-classify run` decides live. Files that cannot be 
 named on stderr and skipped; the exit status is then 2.
 """
 
+from __future__ import annotations
+
 import argparse
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from edge.classifier import Classifier, suited
@@ -27,7 +31,12 @@ UNDECIDED = "(none)"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--model", required=True, help="model.onnx")
+    parser.add_argument(
+        "--model",
+        required=True,
+        action="append",
+        help="model.onnx; repeat it to compare several on the same recordings",
+    )
     parser.add_argument(
         "--summary",
         action="store_true",
@@ -77,17 +86,41 @@ def decide(
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 2 if a file could not be used."""
-    model = Model(arguments.model, arguments.engine)
-    check_error(model, arguments.error)
-    summary, output = Summary(model.info.tasks), Output.of(arguments)
+    models = [Model(path, arguments.engine) for path in arguments.model]
+    output = Output.of(arguments)
+    paths = find(arguments.recordings)
+    summaries = []
     failed = 0
-    for path in find(arguments.recordings):
+    for model in models:
+        check_error(model, arguments.error)
+        if len(models) > 1 and not output.as_json:
+            output.text(f"{model.path}:")
+        summary = Summary(model.info.tasks)
+        failed += _replay(model, paths, arguments.error, output, summary)
+        summaries.append(summary)
+        if arguments.summary:
+            output.text(summary.text())
+    for model, summary in zip(models[1:], summaries[1:], strict=True):
+        output.text(compared(models[0].path, summaries[0], model.path, summary))
+    return 2 if failed else 0
+
+
+def _replay(
+    model: Model,
+    paths: Iterable[Path],
+    error: float | None,
+    output: Output,
+    summary: Summary,
+) -> int:
+    """Print a model's events of recordings; the number of files it could not use."""
+    failed = 0
+    for path in paths:
         try:
             recording = load(path)
-            events = decide(model, recording, str(path), arguments.error)
-        except InputError as error:
+            events = decide(model, recording, str(path), error)
+        except InputError as problem:
             failed += 1
-            LOG.error("%s", error)
+            LOG.error("%s", problem)
             continue
         labels = recording.labels
         if not output.as_json:
@@ -99,10 +132,30 @@ def run(arguments: argparse.Namespace) -> int:
             if event["event"] == "decision" and event["task"] in labels:
                 line["expected"] = labels[event["task"]]
             output.event(line)
-        summary.add(labels, events)
-    if arguments.summary:
-        output.text(summary.text())
-    return 2 if failed else 0
+        summary.add(labels, events, str(path))
+    return failed
+
+
+def compared(name: str, first: Summary, other_name: str, other: Summary) -> str:
+    """What a second model gains or loses on the same labelled recordings, by task."""
+    lines = [f"{other_name} compared with {name}:"]
+    for task in first.hits.keys() & other.hits.keys():
+        shared = first.hits[task].keys() & other.hits[task].keys()
+        pairs = [(first.hits[task][path], other.hits[task][path]) for path in shared]
+        if not pairs:
+            continue
+        gained = sum(b and not a for a, b in pairs)
+        lost = sum(a and not b for a, b in pairs)
+        n = len(pairs)
+        change = (gained - lost) / n
+        spread = math.sqrt(max(gained + lost - n * change**2, 0.0)) / n
+        low = 100.0 * (change - 1.96 * spread)
+        high = 100.0 * (change + 1.96 * spread)
+        lines.append(
+            f"{printable(task)}: {gained} gained, {lost} lost of {n}: "
+            f"{100.0 * change:+.1f} points (95 % interval {low:+.1f} to {high:+.1f})"
+        )
+    return "\n".join([lines[0], *sorted(lines[1:])])
 
 
 class Summary:
@@ -112,12 +165,17 @@ class Summary:
         self._pairs: dict[str, Counter[tuple[str, str]]] = {
             task: Counter() for task in tasks
         }
+        self.hits: dict[str, dict[str, bool]] = {task: {} for task in tasks}
+        """{task: {recording: whether it is decided right}}."""
         self.recordings = 0
         self.as_trained = 0
         """Recordings whose features equal those of a training trial."""
 
     def add(
-        self, labels: Mapping[str, str], events: Iterable[Mapping[str, Any]]
+        self,
+        labels: Mapping[str, str],
+        events: Iterable[Mapping[str, Any]],
+        name: str = "",
     ) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
@@ -130,7 +188,10 @@ class Summary:
             d["task"]: printable(d["label"] or UNDECIDED) for d in reversed(decisions)
         }
         for task in self._pairs.keys() & labels:
-            self._pairs[task][printable(labels[task]), first.get(task, UNDECIDED)] += 1
+            truth = printable(labels[task])
+            decided = first.get(task, UNDECIDED)
+            self._pairs[task][truth, decided] += 1
+            self.hits[task][name] = truth == decided
 
     def right(self, task: str) -> tuple[int, int]:
         """The number of right decisions, and of labelled recordings, of a task."""

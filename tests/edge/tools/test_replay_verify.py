@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from edge.cli import main
-from edge.tools.replay import Summary
+from edge.tools.replay import Summary, compared
 from tests.conftest import ROOT, python
 
 
@@ -188,3 +188,24 @@ def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
         == [str(i + 1) for i in range(12)]
     )
     assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12
+
+
+def test_two_models_are_compared_on_the_same_recordings(exported, recordings, edge):
+    path = exported / "model.onnx"
+    status, events, err = edge(
+        "replay", "--model", path, "--model", path, recordings, "--summary"
+    )
+    assert status == 0
+    decisions = [event for event in events if event["event"] == "decision"]
+    assert len(decisions) == 2 * 2 * 16
+    assert "object: 0 gained, 0 lost of 16: +0.0 points (95 % interval +0.0" in err
+
+
+def test_a_comparison_counts_what_is_gained_and_lost():
+    first, other = Summary({"t": None}), Summary({"t": None})
+    for i in range(10):
+        decided = [{"event": "decision", "task": "t", "label": "a", "flags": []}]
+        first.add({"t": "a" if i < 4 else "b"}, decided, str(i))
+        other.add({"t": "a" if i >= 2 else "b"}, decided, str(i))
+    text = compared("A", first, "B", other)
+    assert "t: 6 gained, 2 lost of 10: +40.0 points" in text

@@ -1,0 +1,177 @@
+"""Put a new model in the place of the one that the robot runs, or take it back.
+
+Verifies the model with its golden file in every engine that is installed, and against
+the skin file if one is given. The former model is kept beside the new one, which takes
+its place in one step. With --service, the service is restarted, and the former model
+comes back by itself if the service has not run for a minute.
+"""
+
+import argparse
+import os
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from edge.commands.output import LOG, Output
+from edge.errors import EdgeError, InputError
+from edge.files import read_bytes, write_whole
+from edge.model.model import LARGEST_BYTES, Model
+from edge.model.verify import verify
+from edge.skin.file import load
+from edge.touch.layout import differences
+
+FORMER = ".former"
+"""Ends the name of the model that was replaced, and of its golden file."""
+PROVE_S = 60.0
+"""How long a service must run with a new model."""
+LOOK_S = 2.0
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument(
+        "model", nargs="?", type=Path, metavar="model.onnx", help="the new model"
+    )
+    parser.add_argument(
+        "--to",
+        type=Path,
+        default=Path("/etc/edge-classify/model.onnx"),
+        help="the model that the robot runs (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--golden",
+        type=Path,
+        help="its golden.npz (default: that beside the model)",
+    )
+    parser.add_argument("--skin", help="skin.toml, which the model must suit")
+    parser.add_argument("--service", help="systemd service to restart, and to watch")
+    parser.add_argument(
+        "--back", action="store_true", help="bring the former model back"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Install, or go back; 1 if the new model did not prove itself."""
+    output = Output.of(arguments)
+    target = arguments.to
+    if arguments.back:
+        go_back(target)
+        restart(arguments.service)
+        model = Model(target)
+        text = f"{target}: the former model {model.version} is back"
+        output.event({"event": "installed", "version": model.version}, text)
+        return 0
+    if arguments.model is None:
+        raise InputError("give the model to install, or --back for the former one")
+    golden = arguments.golden or arguments.model.with_name("golden.npz")
+    prove(arguments.model, golden, arguments.skin)
+    place(arguments.model, golden, target)
+    restart(arguments.service)
+    if arguments.service and not runs_on(is_active_of(arguments.service)):
+        LOG.error(f"{arguments.service} does not run with the new model")
+        if with_end(target, FORMER).is_file():
+            go_back(target)
+            restart(arguments.service)
+            LOG.error(f"{target}: the former model is back")
+        return 1
+    version = Model(target).version
+    text = f"{target}: {version} is installed; `edge-classify install --back` goes back"
+    output.event({"event": "installed", "version": version}, text)
+    return 0
+
+
+def prove(path: Path, golden: Path, skin: str | None) -> None:
+    """Refuse a model that this machine computes otherwise, or that suits no such skin.
+
+    Raises:
+        InputError: the sentence names what differs.
+    """
+    model = Model(path)
+    if not golden.is_file():
+        raise InputError(
+            f"{golden}: no such file; copy golden.npz with the model, or name it by "
+            "--golden"
+        )
+    failed = [check.name for check in verify(model, golden) if not check.passed]
+    if failed:
+        raise InputError(
+            f"{path}: this machine gives other results than the exporting one: "
+            f"{', '.join(failed[:4])}; see `edge-classify verify`"
+        )
+    if skin is not None:
+        for sentence in differences(model.info.layout, load(skin).layout):
+            LOG.warning(f"{path}: {sentence}")
+
+
+def with_end(path: Path, end: str) -> Path:
+    """The path with a longer name."""
+    return path.with_name(path.name + end)
+
+
+def place(model: Path, golden: Path, target: Path) -> None:
+    """Put the model and its golden file in place, and keep the former ones."""
+    for source, goal in ((golden, target.with_name("golden.npz")), (model, target)):
+        if goal.is_file():
+            _copy(goal, with_end(goal, FORMER))
+        _copy(source, goal)
+
+
+def go_back(target: Path) -> None:
+    """Bring the former model and its golden file back.
+
+    Raises:
+        InputError: there is no former model.
+    """
+    if not with_end(target, FORMER).is_file():
+        raise InputError(f"{target}: has no former model to go back to")
+    for goal in (target.with_name("golden.npz"), target):
+        former = with_end(goal, FORMER)
+        if former.is_file():
+            _copy(former, goal)
+            os.unlink(former)
+
+
+def _copy(source: Path, goal: Path) -> None:
+    data = read_bytes(source, LARGEST_BYTES)
+    with write_whole(goal) as file:
+        file.write(data)
+
+
+def restart(service: str | None) -> None:
+    """Restart a service, where there is one.
+
+    Raises:
+        EdgeError: systemctl refuses.
+    """
+    if service is None:
+        return
+    done = subprocess.run(
+        ["systemctl", "restart", service], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        reason = done.stderr.strip() or f"exit status {done.returncode}"
+        raise EdgeError(f"{service} cannot be restarted: {reason}")
+
+
+def is_active_of(service: str) -> Callable[[], bool]:
+    """A function that asks whether a service runs."""
+
+    def is_active() -> bool:
+        command = ["systemctl", "is-active", "--quiet", service]
+        return subprocess.run(command, check=False).returncode == 0
+
+    return is_active
+
+
+def runs_on(
+    is_active: Callable[[], bool],
+    prove_s: float = PROVE_S,
+    sleep: Callable[[float], None] = time.sleep,
+) -> bool:
+    """Whether a service runs at every look for so long."""
+    for _ in range(round(prove_s / LOOK_S)):
+        sleep(LOOK_S)
+        if not is_active():
+            return False
+    return True

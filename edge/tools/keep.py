@@ -1,0 +1,201 @@
+"""Touches that `run` keeps as recordings, with their decisions, to learn from."""
+
+import math
+import queue
+import threading
+from collections import deque
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from edge.commands.output import LOG
+from edge.errors import EdgeError, InputError
+from edge.events import Decided, Event
+from edge.files import check_writable
+from edge.model.novelty import UNKNOWN
+from edge.recording import save
+from edge.skin.file import SkinFile
+from edge.skin.skin import Skin
+from edge.tools.record import Trials, recording
+from edge.touch.arm import Chain
+from edge.touch.frame import Frame
+
+REASONS = ("unsure", "unknown", "all")
+UNSURE = 0.8
+"""Confidence below which a decision is unsure."""
+LONGEST_S = 10.0
+"""Seconds from onset that are kept of a touch."""
+WAITING = 4
+"""Touches that may wait to be written; of more the oldest is lost."""
+STEM = "kept"
+
+
+class Keeper:
+    """Collects touches with their decisions, and saves those that ask for it.
+
+    Files are written by a thread, whole or not at all, so that no disk delays a
+    decision. The oldest go first where they would exceed the limit.
+
+    Attributes:
+        kept: number of files written.
+        lost: touches that came faster than they could be written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        reasons: Sequence[str],
+        megabytes: float,
+        skin: Skin,
+        window_s: float,
+        meta: Mapping[str, Any],
+    ) -> None:
+        """Keep touches of a skin in a folder.
+
+        Args:
+            folder: for the recordings; made where it is missing.
+            reasons: some of `REASONS`.
+            megabytes: most that the kept files may take together.
+            skin: whose frames are pushed.
+            window_s: of the model, after which a touch is decided.
+            meta: of every recording.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        check_writable(folder)
+        self.kept = 0
+        self.lost = 0
+        self._folder = folder
+        self._reasons = frozenset(reasons)
+        self._most_bytes = 1e6 * megabytes
+        self._window_s = window_s
+        self._meta = dict(meta)
+        self._trials = Trials(skin, LONGEST_S)
+        self._complete: deque[list[Frame]] = deque()
+        """The frames of touches that wait for their decisions."""
+        self._decided: list[Decided] = []
+        self._queue: queue.Queue[tuple[list[Frame], list[Decided]] | None]
+        self._queue = queue.Queue(WAITING)
+        self._thread = threading.Thread(target=self._write_all, daemon=True)
+        self._thread.start()
+
+    def push(self, frame: Frame, events: Sequence[Event]) -> None:
+        """Take in a frame and the events that came with it."""
+        self._decided += [event for event in events if isinstance(event, Decided)]
+        frames = self._trials.push(frame)
+        if frames is not None:
+            self._complete.append(frames)
+        if self._complete and frame.t - self._complete[0][-1].t >= self._window_s:
+            self._hand_over(self._complete.popleft())
+
+    def close(self) -> None:
+        """Save what is complete, and wait until all is written."""
+        rest = self._trials.rest()
+        for frames in [*self._complete, *([rest] if rest else [])]:
+            self._hand_over(frames)
+        self._queue.put(None)
+        self._thread.join()
+        if self.kept or self.lost:
+            lost = f", {self.lost} lost" if self.lost else ""
+            LOG.info(f"{self._folder}: {self.kept} touches kept{lost}")
+
+    def _hand_over(self, frames: list[Frame]) -> None:
+        first, last = frames[0].t, frames[-1].t
+        decided = [d for d in self._decided if first <= d.onset_s <= last]
+        self._decided = [d for d in self._decided if d.onset_s > last]
+        if not (decided and self._reasons & reasons_of(decided)):
+            return
+        try:
+            self._queue.put_nowait((frames, decided))
+        except queue.Full:
+            self.lost += 1
+
+    def _write_all(self) -> None:
+        while (touch := self._queue.get()) is not None:
+            try:
+                self._write(*touch)
+            except EdgeError as error:
+                self.lost += 1
+                LOG.error(f"a touch could not be kept: {error}")
+
+    def _write(self, frames: list[Frame], decided: list[Decided]) -> None:
+        now = datetime.now(UTC)
+        name = f"{STEM}-{now:%Y%m%dT%H%M%S}-{self.kept:05}"
+        meta = {
+            **self._meta,
+            "trial": name,
+            "labels": {},
+            "kept": now.isoformat(timespec="seconds"),
+            "decided": decisions_of(decided),
+        }
+        save(self._folder / f"{name}.npz", recording(frames, meta), lasting=False)
+        self.kept += 1
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """Remove the oldest kept files until the rest fits."""
+        files = sorted(self._folder.glob(f"{STEM}-*.npz"))
+        sizes = [file.stat().st_size for file in files]
+        total = sum(sizes)
+        for file, size in zip(files[:-1], sizes, strict=False):
+            if total <= self._most_bytes:
+                return
+            file.unlink(missing_ok=True)
+            total -= size
+
+
+def reasons_of(decided: Sequence[Decided]) -> set[str]:
+    """The reasons for which a touch with these decisions is worth keeping."""
+    reasons = {"all"}
+    for decision in decided:
+        sure = decision.confidence
+        if UNKNOWN in decision.flags:
+            reasons.add("unknown")
+        if sure is None or sure < UNSURE or "unsure" in decision.flags:
+            reasons.add("unsure")
+    return reasons
+
+
+def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
+    """{task: its answer} for the metadata of a kept touch."""
+    answers = {}
+    for decision in decided:
+        sure = decision.confidence
+        answers[decision.task] = {
+            "label": decision.label,
+            "confidence": None if sure is None or math.isnan(sure) else sure,
+            "flags": list(decision.flags),
+            "window_s": decision.window_s,
+            "model": decision.model,
+        }
+    return answers
+
+
+def meta_of(file: SkinFile, source: str, chain: Chain | None) -> dict[str, Any]:
+    """The metadata that all kept touches of a skin share."""
+    meta = {
+        "skin": file.layout.to_dict(),
+        "skin_name": file.name,
+        "source": source,
+        "rate_hz": file.reading.rate_hz,
+    }
+    if chain is not None:
+        meta |= {"arm": chain.to_dict(), "joint_names": list(chain.names)}
+    return meta
+
+
+def reasons(text: str) -> tuple[str, ...]:
+    """The reasons in a list such as `unsure,unknown`.
+
+    Raises:
+        InputError: one of them is none.
+    """
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in REASONS:
+            raise InputError(
+                f"--keep-if takes {', '.join(REASONS)}, separated by commas, not {name!r}"
+            )
+    return names

@@ -1,0 +1,80 @@
+"""Touches that a run keeps, with their decisions."""
+
+import pytest
+
+from edge import demo
+from edge.errors import InputError
+from edge.events import Decided
+from edge.recording import load
+from edge.tools.keep import reasons, reasons_of
+
+
+def decision(confidence, *flags):
+    return Decided("t", "a", confidence, 1.2, 0.2, 0.1, flags=flags)
+
+
+@pytest.mark.parametrize(
+    ("decided", "expected"),
+    [
+        (decision(0.95), {"all"}),
+        (decision(0.8), {"all"}),
+        (decision(0.79), {"all", "unsure"}),
+        (decision(None), {"all", "unsure"}),
+        (decision(0.95, "unsure"), {"all", "unsure"}),
+        (decision(0.95, "unknown"), {"all", "unknown"}),
+    ],
+)
+def test_a_touch_is_kept_for_what_is_not_sure_of_it(decided, expected):
+    assert reasons_of([decision(1.0), decided]) == expected
+
+
+def test_reasons_are_a_list_of_names():
+    assert reasons("unsure,all") == ("unsure", "all")
+    with pytest.raises(InputError, match="--keep-if takes unsure, unknown, all"):
+        reasons("never")
+
+
+def run(edge, folder, *words):
+    touch = demo.FOLDER / "foam-block-fixed.npz"
+    return edge("run", "--model", demo.MODEL, "--fake", touch, "--keep", folder, *words)
+
+
+def test_a_kept_touch_has_the_frames_and_the_decision(edge, tmp_path):
+    status, lines, err = run(edge, tmp_path / "kept", "--keep-if", "all")
+    assert status == 0
+    assert "1 touches kept" in err
+    (path,) = (tmp_path / "kept").glob("kept-*.npz")
+    kept = load(path)
+    assert kept.labels == {}
+    assert kept.joints is not None
+    decided = {e["task"]: e for e in lines if e["event"] == "decision"}
+    assert kept.meta["decided"].keys() == decided.keys()
+    for task, answer in kept.meta["decided"].items():
+        assert answer["label"] == decided[task]["label"]
+        assert answer["confidence"] == decided[task]["confidence"]
+        assert answer["flags"] == decided[task]["flags"]
+
+
+def test_a_kept_touch_is_decided_again_as_it_was(edge, tmp_path):
+    _, lines, _ = run(edge, tmp_path, "--keep-if", "all")
+    (path,) = tmp_path.glob("kept-*.npz")
+    _, again, _ = edge("replay", "--model", demo.MODEL, path)
+    labels = [line["label"] for line in lines if line["event"] == "decision"]
+    assert [e["label"] for e in again if e["event"] == "decision"] == labels
+
+
+def test_what_is_sure_is_not_kept(edge, tmp_path):
+    assert run(edge, tmp_path)[0] == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_oldest_go_first(edge, tmp_path):
+    for i in range(3):
+        (tmp_path / f"kept-20200101T00000{i}-00000.npz").write_bytes(bytes(400_000))
+    other = tmp_path / "mine.npz"
+    other.write_bytes(bytes(2_000_000))
+    assert run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)[0] == 0
+    names = sorted(path.name[5:20] for path in tmp_path.glob("kept-*.npz"))
+    assert names[0] == "20200101T000001"
+    assert len(names) == 3
+    assert other.exists()
