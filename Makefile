@@ -203,12 +203,13 @@ ifndef DATA
 stopping: $(SIMULATED)/.made
 endif
 
-# An environment of its own: aeon 1.6.0 does not take the numpy that constraints.txt pins.
+# An environment of its own: aeon 1.6.0 does not take the numpy and pandas that
+# constraints.txt pins.
 PEERS := $(OUT)/peers
 
 $(PEERS)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(PEERS)
-	grep -v '^numpy==' constraints.txt > $(PEERS)/constraints.txt
+	grep -v '^numpy==\|^pandas==' constraints.txt > $(PEERS)/constraints.txt
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt "pip>=25.1"
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
 	@touch $@
