@@ -36,7 +36,7 @@ ROUNDS, CALLS = 7, 200
 def _round_to_float32(tensor: onnx.TensorProto) -> None:
     """Turn a tensor of float64 into one of float32; a limit beyond its range becomes
     infinite."""
-    if tensor.data_type == TensorProto.DOUBLE:
+    if tensor.data_type in (TensorProto.DOUBLE, TensorProto.INT16):
         with np.errstate(over="ignore"):
             values = numpy_helper.to_array(tensor).astype(np.float32)
         tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))

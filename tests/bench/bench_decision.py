@@ -31,7 +31,15 @@ def exported(X, y, components, path):
         X, {"object": y}
     )
     task = Task(tuple(map(str, fitted.classes_["object"])), K, components, "IV", 0.5)
-    info = replace(Model(MODEL).info, tasks={"object": task}, rows=len(X), trials=())
+    info = replace(
+        Model(MODEL).info,
+        tasks={"object": task},
+        rows=len(X),
+        trials=(),
+        decision_points_s=(),
+        stopping={},
+        novelty=None,
+    )
     path.write_bytes(graph.to_onnx(fitted, info))
     return Model(path)
 

@@ -16,10 +16,13 @@ from train.tradeoff.board import FORMAT, read_formats
 GOLDEN = Path(__file__).parents[1] / "golden"
 
 
-@pytest.fixture
-def rows(monkeypatch):
+@pytest.fixture(params=["golden", "demo"])
+def rows(monkeypatch, request):
+    """Of a model without calibration, and of one that scores novelty."""
     monkeypatch.setattr(arithmetic, "CALLS", 2)
     monkeypatch.setattr(arithmetic, "ROUNDS", 1)
+    if request.param == "demo":
+        return arithmetic.compare(MODEL, GOLDEN / "demo.npz")
     return arithmetic.compare(GOLDEN / "model.onnx", GOLDEN / "golden.npz")
 
 
