@@ -26,18 +26,19 @@ labels then names nothing, so an `unknown` for a trained object is an error of i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.special import expit
 
 from edge.errors import InputError
 from edge.model.novelty import NOVELTY_RATE, Novelty
-from edge.model.stopping import Stopping, margin
+from edge.model.stopping import Stopping, StoppingRule, margin
 from edge.touch.features import FEATURES
 from train.evaluate import finest, stratified_folds
 from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
@@ -168,6 +169,24 @@ class Curve:
         intercept = float(solution[2] - slopes @ middle)
         return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
 
+    def with_mean(
+        self,
+        margins: NDArray[np.float64],
+        excess: NDArray[np.float64],
+        share: float,
+    ) -> Curve:
+        """The curve with the intercept at which the mean probability is `share`."""
+        least = 0.5 / margins.size
+        target = min(max(share, least), 1.0 - least)
+
+        def surplus(shift: float) -> float:
+            shifted = replace(self, intercept=self.intercept + shift)
+            return float(shifted.probabilities(margins, excess).mean()) - target
+
+        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
+        shift = float(brentq(surplus, -reach, reach))
+        return replace(self, intercept=self.intercept + shift)
+
     def probabilities(
         self, margins: NDArray[np.float64], excess: NDArray[np.float64]
     ) -> NDArray[np.float64]:
@@ -217,6 +236,19 @@ def unlike(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(points, n) whether contacts are unknown, from their novelty (points, n)."""
     limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
     return np.asarray(scores > limits[:, None])
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Answers to each trial by models that were fitted without it.
+
+    Attributes:
+        right: {task: (decision points, n) whether the label is right}.
+        margins: {task: (decision points, n) the label's margin}.
+    """
+
+    right: dict[str, NDArray[np.bool_]]
+    margins: dict[str, NDArray[np.float64]]
 
 
 class SequentialClassifier:
@@ -286,6 +318,30 @@ class SequentialClassifier:
         self._fit_points(X, y, own)
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(X, y, folds)
+        chosen_without = self._held_out(X, y, folds, fold_choices, own)
+        self.right_ = chosen_without.right
+        rules = self._certify(chosen_without, folds, tested)
+        # Margins are on the scale of the settings. Curves that the exported model uses
+        # come from margins by its own settings, in fits without the trials; as the
+        # trials had a part in the choice of these, the curves' means come from choices
+        # without them.
+        if all(choices == self.choices for choices in fold_choices):
+            curves = chosen_without
+        else:
+            same = [self.choices] * len(fold_choices)
+            curves = self._held_out(X, y, folds, same, own)
+        self._calibrate(curves, tested, rules)
+        return self
+
+    def _held_out(
+        self,
+        X: NDArray[np.float64],
+        y: Mapping[str, NDArray[np.str_]],
+        folds: NDArray[np.int64],
+        fold_choices: Sequence[Mapping[str, Choice]],
+        own: NDArray[np.bool_] | None,
+    ) -> HeldOut:
+        """Answers to each trial by models with some settings, without its fold."""
         form = self.features, self.widths
         by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
         right = {}
@@ -297,9 +353,7 @@ class SequentialClassifier:
                 labels, sure = answers_of[task]
                 right[task][:, folds == k] = labels == y[task][folds == k]
                 margins[task][:, folds == k] = sure
-        self.right_ = right
-        self._certify(margins, self.unknown_, folds, tested)
-        return self
+        return HeldOut(right, margins)
 
     def _fit_points(
         self,
@@ -339,18 +393,16 @@ class SequentialClassifier:
 
     def _certify(
         self,
-        margins: Mapping[str, NDArray[np.float64]],
-        unknown: NDArray[np.bool_],
+        answered: HeldOut,
         folds: NDArray[np.int64],
         tested: Mapping[str, NDArray[np.bool_]],
-    ) -> None:
-        """Set the stopping rules and curves of each task."""
-        excess = self._excess
+    ) -> dict[str, tuple[list[StoppingRule], NDArray[np.bool_]]]:
+        """{task: its certified rules, and whether the full window is wrong (n,)}."""
         scores = {}
-        for task, right in self.right_.items():
-            answered = margins[task], excess, right
-            scores[task] = cross_fitted(*answered, folds, tested[task])
-        courses = self._courses(scores, self.right_, unknown, tested)
+        for task, right in answered.right.items():
+            evidence = answered.margins[task], self._excess, right
+            scores[task] = cross_fitted(*evidence, folds, tested[task])
+        courses = self._courses(scores, answered.right, self.unknown_, tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -359,13 +411,28 @@ class SequentialClassifier:
                     rules[factor], rules[task], courses[factor], seconds
                 )
         full, _ = candidates(len(seconds))
+        return {task: (rules[task], courses[task].under(full)[1]) for task in rules}
+
+    def _calibrate(
+        self,
+        answered: HeldOut,
+        tested: Mapping[str, NDArray[np.bool_]],
+        rules: Mapping[str, tuple[list[StoppingRule], NDArray[np.bool_]]],
+    ) -> None:
+        """Set the stopping rules and curves of each task."""
         self.stopping_ = {}
         for task, tests in tested.items():
-            evidence = margins[task][:, tests], excess[:, tests]
-            right = self.right_[task][:, tests]
-            together = Curve.of(*evidence, right)
-            curves = [Curve.of(*point) for point in zip(*evidence, right, strict=True)]
-            _, wrong = courses[task].under(full)
+            evidence = answered.margins[task][:, tests], self._excess[:, tests]
+            right = answered.right[task][:, tests]
+            honest = self.right_[task][:, tests]
+            together = Curve.of(*evidence, right).with_mean(*evidence, honest.mean())
+            curves = []
+            for margins, excess, hits, shown in zip(
+                *evidence, right, honest, strict=True
+            ):
+                curve = Curve.of(margins, excess, hits)
+                curves.append(curve.with_mean(margins, excess, shown.mean()))
+            of_task, wrong = rules[task]
             self.stopping_[task] = Stopping(
                 slopes=tuple(curve.slope for curve in curves),
                 intercepts=tuple(curve.intercept for curve in curves),
@@ -373,7 +440,7 @@ class SequentialClassifier:
                 slope=together.slope,
                 intercept=together.intercept,
                 doubt=together.doubt,
-                rules=tuple(rules[task]),
+                rules=tuple(of_task),
                 trials=len(wrong),
                 wrong=int(wrong.sum()),
                 risk=RISK,

@@ -15,6 +15,10 @@ promised.
 A point of the front (`make export FRONT=`) is a choice at a window, with an interval of
 its nested accuracy. The row "export" has the interval that an export at the full window
 prints. The accuracy on other trials may lie outside it in one data set of twenty.
+
+The last table judges the confidence at the full window on new trials of known objects:
+its calibration error, and how many of them are flagged `unknown` where 2 % are asked
+for; in brackets, what four fifths of the sets give.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ from train.progress import bar
 from train.rules import RISK
 from train.simulate import scene as scenes
 from train.simulate.run import write
-from train.stopping import answers
+from train.stopping import answers, unlike
 from train.tradeoff.front import NAMES, ParetoFront
 
 SCENE = Path(__file__).parents[2] / "train" / "scenes" / "cody18.toml"
@@ -54,6 +58,7 @@ ERRORS = (0.05, 0.1, 0.2)
 LATE_S = 0.05
 OUTSIDE = 0.05
 """Share of the data sets whose accuracy may lie outside the interval of the front."""
+BINS = 10
 SHOWN = (*NAMES, "export")
 SEEDS, COUNT = 5, 20
 """Batches, each of a seed of its own; trials of each object and condition in a
@@ -124,7 +129,7 @@ def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
 
 def judged(
     drawn: DrawnSet, labels: NDArray[np.str_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fit a data set, and judge its promises on the trials that were not drawn.
 
     Args:
@@ -135,7 +140,8 @@ def judged(
         (tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean
         seconds, NaN where the request is refused; the first request is the smallest
         error that is certified. (tasks, `SHOWN`, 5) window, accuracy, its interval and
-        the realised accuracy of each point of the front.
+        the realised accuracy of each point of the front. (tasks, 5) of `trust` at the
+        full window.
     """
     others, y = drawn.others(labels)
     points: dict[float, dict[str, Chosen]] = {}
@@ -154,9 +160,10 @@ def judged(
     model, seconds = fitted.sequential, np.array(POINTS_S)
     assert model is not None
     outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
-    _, _, courses = model.judged(
-        drawn.vectors(POINTS_S, others, fitted.dataset.names), y
-    )
+    new = drawn.vectors(POINTS_S, others, fitted.dataset.names)
+    hits, confidences, courses = model.judged(new, y)
+    unknown = unlike(model.novelty_, model.space_.scores(new))[-1]
+    doubts = [trust(hits[task][-1], confidences[task][-1], unknown) for task in y]
     for task, out in zip(y, outcomes, strict=True):
         stopping = model.stopping_[task]
         for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
@@ -173,7 +180,26 @@ def judged(
             fronts.append(
                 (point.window_s, point.accuracy, point.low, point.high, realised)
             )
-    return outcomes, np.array(fronts).reshape(len(y), len(SHOWN), 5)
+    return outcomes, np.array(fronts).reshape(len(y), len(SHOWN), 5), np.array(doubts)
+
+
+def trust(
+    right: NDArray[np.bool_],
+    confidence: NDArray[np.float64],
+    unknown: NDArray[np.bool_],
+) -> tuple[float, ...]:
+    """Of new trials of known objects (m,): their mean confidence, the share that is
+    right, the expected calibration error in ten ranges, the Brier score, and the share
+    that counts as unknown."""
+    ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
+    gaps = np.bincount(ranges, confidence - right)
+    return (
+        float(confidence.mean()),
+        float(right.mean()),
+        float(np.abs(gaps).sum() / len(right)),
+        float(((confidence - right) ** 2).mean()),
+        float(unknown.mean()),
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -205,14 +231,16 @@ def run(arguments: argparse.Namespace) -> int:
         rows = np.sort(rng.permutation(len(trials))[: arguments.trials])
         drawn = {**vars(first), "trials": tuple(trials[rows])}
         cases.append((DrawnSet(**drawn, rows=rows, pool=X, columns=columns), y))
-    outcomes, fronts = map(
-        np.array, zip(*work(judged, cases, "data sets"), strict=True)
-    )
-    return int(report(first.tasks, outcomes, fronts) > 0)
+    results = work(judged, cases, "data sets")
+    outcomes, fronts, doubts = map(np.array, zip(*results, strict=True))
+    return int(report(first.tasks, outcomes, fronts, doubts) > 0)
 
 
 def report(
-    tasks: Sequence[str], outcomes: NDArray[np.float64], fronts: NDArray[np.float64]
+    tasks: Sequence[str],
+    outcomes: NDArray[np.float64],
+    fronts: NDArray[np.float64],
+    doubts: NDArray[np.float64],
 ) -> int:
     """Print and write what `judged` gave; the number of promises broken too often."""
     certified = []
@@ -230,7 +258,21 @@ def report(
             outside = row["below the interval"] + row["above it"]
             failed += outside > binom.ppf(0.99, len(rows), OUTSIDE)
             shown.append({"task": task, "front": name, **row})
-    tables.write("risk", [certified, shown])
+    trusted = []
+    for task, rows in zip(tasks, doubts.swapaxes(0, 1), strict=True):
+        confidence, right, error, brier, flagged = rows.T
+        low, high = np.quantile(flagged, (0.1, 0.9))
+        trusted.append(
+            {
+                "task": task,
+                "mean confidence": f"{confidence.mean():.3f}",
+                "right": f"{right.mean():.3f}",
+                "calibration error": f"{error.mean():.3f}",
+                "Brier score": f"{brier.mean():.3f}",
+                "flagged unknown": f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})",
+            }
+        )
+    tables.write("risk", [certified, shown, trusted])
     return failed
 
 

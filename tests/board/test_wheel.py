@@ -15,7 +15,7 @@ import pytest
 import edge
 from tests.board.debian import CHECKOUT
 
-LARGEST = 260_000
+LARGEST = 300_000
 
 
 @pytest.fixture(scope="session")

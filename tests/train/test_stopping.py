@@ -75,6 +75,17 @@ class TestCurve:
             in_microns.probabilities(1e-6 * margins, excess)
         )
 
+    @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 1.0])
+    def test_the_mean_probability_is_moved_to_a_share(self, share):
+        rng = np.random.default_rng(4)
+        margins = rng.normal(size=200)
+        excess = rng.exponential(size=200)
+        curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share)
+        assert curve.slope == 2.0
+        assert curve.doubt == 1.0
+        expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
+        assert curve.probabilities(margins, excess).mean() == pytest.approx(expected)
+
 
 SECONDS = np.array([0.4, 0.8, 1.2])
 

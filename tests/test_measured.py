@@ -1,0 +1,59 @@
+"""Figures in README.md and docs/recipes.md are those of the measured tables."""
+
+import re
+
+import pytest
+
+from edge.touch.features import WINDOW_S
+from tests.bench import tables
+from tests.conftest import ROOT
+from train.fitting import STEPS_S
+from train.rules import RISK, TEST_SHARE, upper_limit
+
+PAGES = ("README.md", "docs/recipes.md")
+FIGURE = re.compile(
+    r"\d[\d.,]* ?(?:%|per cent|percentage points|s\b|seconds|minutes|MB|kB)"
+)
+CODE = re.compile(r"(?ms)^ *```.*?^ *```|`[^`]*`")
+TABLES = {path.stem: path.read_text() for path in sorted(tables.FOLDER.glob("*.md"))}
+
+
+def figures(page):
+    prose = CODE.sub("", (ROOT / page).read_text())
+    return FIGURE.findall(" ".join(prose.split()))
+
+
+def computed():
+    """Figures that no table holds, because they follow from the code."""
+    figures = {f"{WINDOW_S:g} seconds", f"{STEPS_S[0]:g} seconds", "1 MB"}
+    for trials in (42, 299):
+        certified = upper_limit(0, trials, TEST_SHARE * RISK)
+        figures.add(f"{100 * certified:.0f} %")
+    return figures
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_each_figure_is_measured_or_computed(page):
+    text = "\n".join(TABLES.values())
+    unexplained = [f for f in figures(page) if f not in text and f not in computed()]
+    assert unexplained == []
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_each_table_names_its_command_commit_machine_and_date(name):
+    head = TABLES[name].splitlines()[0]
+    assert re.fullmatch(
+        r"\*`(make|python|edge-classify).*`, commit .+, .+ cores, \d{4}-\d\d-\d\d\*",
+        head,
+    )
+
+
+def test_each_table_is_on_the_page_and_each_link_has_its_table():
+    page = (ROOT / "docs" / "measured.md").read_text()
+    linked = re.findall(r"^\[[^\]]+\]\(measured/([\w-]+)\.md\)$", page, re.M)
+    assert sorted(linked) == sorted(TABLES)
+
+
+def test_a_page_of_the_site_includes_its_tables():
+    text = tables.markdown([{"a": 1, "b": "x"}, {"a": 2, "b": "y"}])
+    assert text == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | y |"
