@@ -35,7 +35,12 @@ def computed():
 @pytest.mark.parametrize("page", PAGES)
 def test_each_figure_is_measured_or_computed(page):
     text = "\n".join(TABLES.values())
-    unexplained = [f for f in figures(page) if f not in text and f not in computed()]
+    unexplained = []
+    for figure in figures(page):
+        number = re.escape(re.match(r"[\d.,]*\d", figure)[0])
+        measured = re.search(rf"(?<![\d.]){number}(?![\d])", text)
+        if measured is None and figure not in computed():
+            unexplained.append(figure)
     assert unexplained == []
 
 
