@@ -13,7 +13,7 @@ import numpy as np
 from edge.errors import OutOfRange
 from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
-from edge.model.novelty import NOVELTY_RATE, check_rate
+from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
 from edge.touch.contact import Contact
 from edge.touch.doubts import frame_doubts
@@ -348,6 +348,10 @@ class Classifier:
             answers = [replace(blank, task=task) for task in pending.tasks]
         else:
             answers = self._answers(pending, blank, decisions)
+            last = point == len(self.model.decision_points_s) - 1
+            if last and any(UNKNOWN in answer.flags for answer in answers):
+                phrase = info.unusual(vector)
+                answers = [replace(answer, unusual=phrase) for answer in answers]
         pending.decision_point += 1
         for answer in answers:
             pending.tasks.remove(answer.task)

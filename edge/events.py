@@ -58,6 +58,7 @@ class Decided:
         model: name and version of the model, if it has a name.
         strongest: without a contact, the largest count of any taxel, as a part of the
             count at which a contact begins; else None.
+        unusual: of an unknown contact, what is most unlike training, as a phrase.
         nearest: names of the nearest training trials, which voted, or their numbers in
             a model without names.
         decision: the model's own answer, with the votes and the nearest training
@@ -77,6 +78,7 @@ class Decided:
     position: tuple[float, float, float] | None = None
     strongest: float | None = None
     model: str | None = None
+    unusual: str | None = None
     nearest: tuple[str, ...] = field(default=(), compare=False, repr=False)
     decision: Decision | None = field(default=None, compare=False, repr=False)
 
@@ -93,6 +95,8 @@ class Decided:
             line["strongest"] = self.strongest
         if self.stopped_by is not None:
             line |= {"error": self.error, "stopped_by": self.stopped_by}
+        if self.unusual is not None:
+            line["unusual"] = self.unusual
         if self.model is not None:
             line["model"] = self.model
         return {**line, "flags": list(self.flags)}

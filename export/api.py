@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from edge import __version__
 from edge.files import write_whole
 from edge.model.info import ModelInfo, Task
@@ -131,9 +133,24 @@ def describe(
         stopping={} if sequential is None else sequential.stopping_,
         novelty=None if sequential is None else sequential.novelty_,
         several=several_share(dataset, window_s),
+        usual={} if sequential is None else usual_ranges(dataset, window_s, samples),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
     )
+
+
+def usual_ranges(
+    dataset: DataSet, window_s: float, samples: int
+) -> dict[str, tuple[float, float]]:
+    """{feature: the mean over the window that 1 % of the trials are below, and that 1 %
+    are above}."""
+    X = dataset.features(window_s, samples)
+    ends = np.cumsum(dataset.widths(samples))[:-1]
+    ranges = {}
+    for name, part in zip(dataset.names, np.split(X, ends, axis=1), strict=True):
+        low, high = np.quantile(part.mean(axis=1), (0.01, 0.99))
+        ranges[name] = float(low), float(high)
+    return ranges
 
 
 def several_share(dataset: DataSet, window_s: float) -> float:

@@ -101,6 +101,8 @@ def decision_text(line: Mapping[str, Any]) -> str:
     """A decision as text: its time, task, label, confidence and flags."""
     label = "out of range" if line["label"] is None else line["label"]
     notes = [", ".join(line["flags"])] if line["flags"] else []
+    if "unusual" in line:
+        notes.append(line["unusual"])
     if "strongest" in line:
         share = f"{line['strongest']:.0%}"
         notes.append(f"the strongest taxel came to {share} of the onset")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
-from edge.model.novelty import Novelty
+from edge.model.novelty import Novelty, unusual
 from edge.touch import measures
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import feature_vector, widths
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 METADATA_KEY = "edge-classify"
 FORMAT = 7
 OPTIONAL = (
-    "decision_points_s stopping novelty joints kernels name trials taught".split()
+    "decision_points_s stopping novelty joints kernels name trials taught usual".split()
 )
 """Keys that are left out where they would be empty."""
 
@@ -99,6 +99,9 @@ class ModelInfo:
     trials: tuple[str, ...] = ()
     """(rows,) names of the training trials; empty where they were too many to be
     kept."""
+    usual: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """{feature: the least and the greatest mean over the full window of nearly all
+    training trials}; empty without decision points."""
     several: float = 1.0
     """Share of the training trials with a second region beside the contact."""
     taught: int = 0
@@ -127,6 +130,14 @@ class ModelInfo:
         return feature_vector(
             series, window_s, self.samples, self.features, self.kernels
         )
+
+    def unusual(self, vector: NDArray[np.float64]) -> str | None:
+        """What is most unlike training in a vector of the full window, as a phrase."""
+        if not self.usual:
+            return None
+        ends = np.cumsum(self.widths)[:-1]
+        means = [float(part.mean()) for part in np.split(vector, ends)]
+        return unusual(means, self.usual)
 
     @property
     def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
@@ -241,6 +252,7 @@ class ModelInfo:
             kernels=_kernels(meta, names, layout),
             name=meta.text("name", "", empty=True),
             trials=meta.texts("trials", ()),
+            usual=_usual(meta, names),
             several=meta.number("several", 1.0, low=0.0, high=1.0),
             taught=meta.whole("taught", 0, allowed=range(1 << 31)),
         )
@@ -271,6 +283,14 @@ def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
 def _novelty(meta: ConfigTable, points: int) -> Novelty | None:
     """The limits of novelty, where the model has decision points."""
     return Novelty.from_table(meta.table("novelty"), points) if points else None
+
+
+def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
+    """The usual range of each feature, where the model has them."""
+    if not meta.has("usual"):
+        return {}
+    table = meta.table("usual")
+    return {name: table.numbers(name, 2) for name in names}
 
 
 def _kernels(

@@ -59,7 +59,7 @@ STEPS = 4
 REST_S = 0.003
 SWITCH_S = 0.0005
 """The loop waits at most about so long for this thread."""
-PIECE = 1 << 16
+PIECE = 1 << 18
 """Bytes that are sent or taken at once."""
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.novelty import Novelty, check_rate
+from edge.model.novelty import Novelty, check_rate, unusual
 from edge.model.stopping import TEST_SHARE, Stopping, StoppingRule, margin
 
 
@@ -180,3 +180,17 @@ def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
 def test_a_rate_lies_inside_0_to_1(value):
     with pytest.raises(InputError, match="must be above 0 and below 1"):
         check_rate(value, "the error rate")
+
+
+@pytest.mark.parametrize(
+    ("means", "phrase"),
+    [
+        ((5.0, 1.0), None),
+        ((11.0, 1.0), "max force higher than in training"),
+        ((11.0, 0.0), "skin area lower than in training"),
+        ((-1.0, 1.0), "max force lower than in training"),
+    ],
+)
+def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
+    usual = {"log_max_force@5": (0.0, 10.0), "sqrt_skin_area@20": (0.5, 1.5)}
+    assert unusual(means, usual) == phrase

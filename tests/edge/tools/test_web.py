@@ -128,7 +128,7 @@ def test_a_browser_that_stops_reading_is_dropped(server, monkeypatch):
         while not server.watched:
             assert time.monotonic() < ends
             time.sleep(0.01)
-        time.sleep(0.5)
+        time.sleep(1.5)
         received = 0
         while piece := sleeper.recv(1 << 20):
             received += len(piece)
