@@ -30,14 +30,14 @@ PREFIXES = ("log_", "sqrt_", "relative_")
 """Of features' names, which say nothing to a person."""
 
 
-def unusual(means: Sequence[float], usual: Mapping[str, Sequence[float]]) -> str | None:
-    """What is most unusual about a contact, as a phrase; None where no feature is.
+def unusual(means: Sequence[float], usual: Mapping[str, Sequence[float]]) -> str:
+    """What is most unusual about a contact, as a phrase.
 
     Args:
         means: of each feature over the window, in the order of `usual`.
         usual: {feature: the least and the greatest mean of nearly all training trials}.
     """
-    phrase = None
+    phrase = "each feature is usual, but not all of them together"
     farthest = 0.0
     for mean, (name, (low, high)) in zip(means, usual.items(), strict=True):
         beyond = max(low - mean, mean - high) / ((high - low) or 1.0)

@@ -185,7 +185,7 @@ def test_a_rate_lies_inside_0_to_1(value):
 @pytest.mark.parametrize(
     ("means", "phrase"),
     [
-        ((5.0, 1.0), None),
+        ((5.0, 1.0), "each feature is usual, but not all of them together"),
         ((11.0, 1.0), "max force higher than in training"),
         ((11.0, 0.0), "skin area lower than in training"),
         ((-1.0, 1.0), "max force lower than in training"),
