@@ -180,6 +180,7 @@ else
 BOARD := $(OUT)/tradeoff/board.json
 FORMATS := $(OUT)/tradeoff/formats.json
 tradeoff: $(READY)
+	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --out $(OUT)/tradeoff --check
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 	$(BIN)/python -m export.arithmetic --model $(OUT)/tradeoff/model.onnx \

@@ -24,7 +24,8 @@ from edge.recording import save
 from edge.skin.file import SkinFile, load
 from edge.skin.loop import stop_on
 
-TRIALS = 8
+TRIALS = 12
+"""Enough of each touch for a trade-off."""
 STILL_S = 5.0
 
 

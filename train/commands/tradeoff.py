@@ -10,7 +10,9 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from edge.errors import InputError
 from edge.files import check_writable
+from edge.recording import find
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +26,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help=".npz recordings or folders",
     )
     text = "file that `edge-classify bench` wrote of a model fitted on these recordings"
-    option("--board", required=True, metavar="board.json", help=text)
+    option("--board", metavar="board.json", help=text)
+    text = "only see whether there are enough recordings, before the long work"
+    option("--check", action="store_true", help=text)
     text = "file that `python -m export.arithmetic` wrote of that model: adds its number formats"
     option("--formats", metavar="formats.json", help=text)
     option(
@@ -71,10 +75,14 @@ def cost(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
-    from train.tradeoff.run import tradeoff
+    from train.tradeoff.run import require_enough, tradeoff
 
     check_writable(arguments.out)  # before the work
-
+    if arguments.check:
+        require_enough(len(find(arguments.data)))
+        return 0
+    if arguments.board is None:
+        raise InputError("give --board board.json, which `edge-classify bench` writes")
     report = tradeoff(
         arguments.data,
         arguments.out,

@@ -36,6 +36,18 @@ FEWEST = 40
 """Smallest number of trials."""
 
 
+def require_enough(trials: int) -> None:
+    """Refuse too few trials.
+
+    Raises:
+        InputError: they are fewer than `FEWEST`.
+    """
+    if trials < FEWEST:
+        raise InputError(
+            f"a trade-off needs at least {FEWEST} trials, not {trials}; record more"
+        )
+
+
 def tradeoff(
     data: Sequence[str],
     out: Path,
@@ -77,10 +89,7 @@ def tradeoff(
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
     dataset = followed(raw, progress=True)
-    if len(dataset.trials) < FEWEST:
-        raise InputError(
-            f"a trade-off needs at least {FEWEST} trials, not {len(dataset.trials)}"
-        )
+    require_enough(len(dataset.trials))
     main = main or ("category" if "category" in dataset.tasks else dataset.tasks[0])
     if main not in dataset.tasks:
         raise InputError(
