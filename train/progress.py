@@ -6,6 +6,8 @@ from typing import Any
 
 from tqdm import tqdm
 
+from edge.errors import printable
+
 LOG_S = 10.0
 """Between two lines of progress in a log."""
 
@@ -28,7 +30,8 @@ def bar(iterable: Iterable[Any] | None = None, **options: Any) -> Any:
 
 
 def say(text: str) -> None:
-    """Print a line on stdout, above a progress bar."""
+    """Print a line on stdout, above a progress bar, without control characters."""
+    text = printable(text)
     if sys.stderr.isatty():
         tqdm.write(text, file=sys.stdout)
     else:

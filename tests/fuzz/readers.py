@@ -130,8 +130,9 @@ def read_model(path: Path) -> None:
     """Load a model and ask it once."""
     model = Model(path)
     for task, decision in model.decide(np.ones(model.info.width)).items():
-        if not np.isfinite(decision.confidence):
-            raise Wrong(f"{task} has a confidence of {decision.confidence}")
+        confidence = decision.confidence
+        if confidence is not None and not 0.0 <= confidence <= 1.0:
+            raise Wrong(f"{task} has a confidence of {confidence}")
         Space.of(model, task)
 
 
@@ -230,7 +231,7 @@ def read_frames(path: Path) -> None:
 
 
 TABLES = [
-    b"time,a,b\n0,245,244\n0.1,240,244\n0.2,230,241\n",
+    b"time,p1,p2\n0,245,244\n0.1,240,244\n0.2,230,241\n",
     b"trial\tobject\tt\ttaxel\tvalue\n1\tcup\t0\t0\t9\n1\tcup\t0\t1\t8\n2\tpen\t0\t0\t7\n2\tpen\t0\t1\t7\n",
 ]
 """A trial of a sensor whose values fall, and two trials with a value a row."""

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 
 from edge.commands.options import add_arm, open_arm
-from edge.errors import InputError
+from edge.errors import InputError, printable
 from edge.recording import Recording, save
 from edge.touch.arm import Chain
 from train.importers import names
-from train.progress import bar
+from train.progress import bar, say
 from train.thresholds import count_felt, proposed
 
 LOG = logging.getLogger(__name__)
@@ -99,7 +99,7 @@ def counted_warnings() -> Iterator[None]:
         if counted.count:
             more = counted.count - 1
             others = f" ({more} more recordings are like it)" if more else ""
-            LOG.warning(f"{counted.first}{others}")
+            LOG.warning(printable(f"{counted.first}{others}"))
 
 
 def write(
@@ -138,13 +138,13 @@ def write(
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
     alike = [names for names in frames.values() if len(names) > 1]
     if alike:
-        print(
+        say(
             f"warning: {sum(map(len, alike))} trials have the frames of others, such as "
             f"{' and '.join(alike[0][:2])}; keep one of each, or accuracies are too high"
         )
     skipped = getattr(arguments, "skipped", [])
     for sentence in skipped:
-        print(f"left out: {sentence}", file=sys.stderr)
+        print(printable(f"left out: {sentence}"), file=sys.stderr)
     return 1 if skipped else 0
 
 
