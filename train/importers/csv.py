@@ -448,6 +448,10 @@ def _pivoted(table: Table, trial: str) -> Table:
     names = sorted((n for n in wide.columns if n != time), key=_natural)
     wide = wide[[time, *names]]
     wide.columns = [time, *(_plain(name) for name in names)]
+    if not wide.columns.is_unique:
+        raise InputError(
+            f"{table.path}: trial {trial} has two taxels of one name; rename one of them"
+        )
     return Table(table.path, wide, False, (), table.form)
 
 

@@ -92,6 +92,10 @@ def read_text(path: Path) -> Table:
             named = True
             lines += 1
         _check_names(path, names)
+        first = names.index("") if "" in names else len(names)
+        for place in range(first + 1, len(names)):
+            # Further columns without a name are told apart by their places.
+            names[place] = names[place] or f"column {place + 1}"
         table = _parsed(path, data, head, lines, names, "decimal commas" in form)
     return Table(path, table, named, form=tuple(form))
 
@@ -187,7 +191,9 @@ def _parsed(
         raise InputError(f"{path}: {EMPTY}")
     table = table[columns]
     table.columns = names
-    unnamed = [place for place, name in enumerate(names) if name == ""]
+    unnamed = [
+        place for place, name in enumerate(names) if name in ("", f"column {place + 1}")
+    ]
     empty = [p for p in unnamed if table.iloc[:, p].isna().all()]
     kept_places = [p for p in columns if p not in empty]
     return table.iloc[:, kept_places] if empty else table
@@ -349,14 +355,19 @@ def numbers_of(table: Table, name: str) -> pd.Series:
         InputError: a cell is no number.
     """
     column = table.data[name]
-    if pd.api.types.is_numeric_dtype(column):
-        return column.astype("float64")
-    numbers = pd.to_numeric(column, errors="coerce")
+    try:
+        if pd.api.types.is_numeric_dtype(column):
+            return column.astype("float64")
+        numbers = pd.to_numeric(column, errors="coerce").astype("float64")
+    except OverflowError:
+        raise InputError(
+            f"{table.path}: column {name} has a number beyond measure; mend or leave it out"
+        ) from None
     bad = numbers.isna() & column.notna()
     if bad.any():
         cell = str(column[bad].iloc[0])
         raise InputError(f"{table.path}: {shown(cell)} in column {name} is no number")
-    return numbers.astype("float64")
+    return numbers
 
 
 def is_text(table: Table, name: str) -> bool:

@@ -145,3 +145,14 @@ def test_parquet_is_read_where_its_reader_is_installed(tmp_path):
     path = tmp_path / "a.parquet"
     pd.DataFrame(ROWS, columns=["t", "p1", "p2"]).to_parquet(path)
     assert rows_of(read_parquet(path)) == ROWS
+
+
+def test_a_number_beyond_measure_is_named(tmp_path):
+    table = read(tmp_path, "t,p1\n0,1\n1," + "9" * 400 + "\n")
+    with pytest.raises(InputError, match="column p1"):
+        numbers_of(table, "p1")
+
+
+def test_columns_without_a_name_are_told_apart_by_their_places(tmp_path):
+    table = read(tmp_path, ",t,,p1,\n0,0,7,1,\n1,1,8,2,\n")
+    assert table.names == ["", "t", "column 3", "p1"]
