@@ -87,6 +87,18 @@ $(SIMULATED)/.made: $(READY) $(SCENE) $(wildcard train/scenes/*.toml train/simul
 	$(BIN)/python -m train simulate $(SCENE) --out $(SIMULATED)
 	@touch $@
 
+# What is given must be there: an empty or misspelt DATA must not train on simulated touches.
+ifeq ($(origin data),command line)
+$(error give DATA=$(data) in capitals)
+endif
+ifeq ($(origin DATA),command line)
+ifeq ($(strip $(DATA)),)
+$(error DATA is empty; name a folder of recordings)
+endif
+$(foreach part,$(DATA),$(if $(wildcard $(part)),,$(error DATA names $(part), which does not \
+  exist; a name with a space is for `edge-classify export --data` alone)))
+endif
+
 ifdef DATA
 RECORDINGS := $(DATA)
 # With a SCENE beside DATA, its touches are weighed beside the recordings.
@@ -106,7 +118,8 @@ endif
 
 export: $(READY)
 	$(BIN)/python -m export --data $(RECORDINGS) $(BESIDE) --out $(OUT) --report $(FRONTED) \
-	  $(addprefix --name ,$(NAME)) $(EXPORT)
+	  $(addprefix --name ,$(NAME)) $(addprefix --compare ,$(COMPARE)) $(if $(TEST),--test $(TEST)) \
+	  $(EXPORT)
 
 DEMO := $(OUT)/demo
 

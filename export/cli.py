@@ -14,6 +14,8 @@ from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
 from edge.files import check_writable
 from edge.model.model import Model
+from edge.recording import find, load
+from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
@@ -128,6 +130,10 @@ def parser() -> argparse.ArgumentParser:
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
     text = "also write OUT/report.html, as `make export` does"
     option("--report", action="store_true", help=text)
+    text = "recordings that are scored and never fitted, such as those of another day"
+    option("--test", nargs="+", metavar="REC", help=text)
+    text = "a former model.onnx, which is scored on the --test recordings too"
+    option("--compare", metavar="old.onnx", help=text)
     option(
         "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
     )
@@ -137,6 +143,11 @@ def parser() -> argparse.ArgumentParser:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, write and report."""
+    if arguments.compare and not arguments.test:
+        raise InputError(
+            "--compare needs --test: only recordings that neither model was fitted on "
+            "tell which is better"
+        )
     check_writable(arguments.out)  # before the work, which may take an hour
     window_s, quick = arguments.window, arguments.quick
     if arguments.front is not None:
@@ -163,11 +174,32 @@ def run(arguments: argparse.Namespace) -> int:
     print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
+    if arguments.test:
+        print(tested(path, arguments.compare, arguments.test), file=sys.stderr)
     if arguments.report:
         from train.model_report import write  # loads matplotlib
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0
+
+
+def tested(path: Path, former: str | None, recordings: Sequence[str]) -> str:
+    """The accuracy on recordings that were not fitted, also of a former model."""
+    summaries = []
+    lines = []
+    for name in [str(path), *([former] if former else [])]:
+        model = Model(name)
+        summary = Summary(model.info.tasks)
+        for file in find(list(recordings)):
+            recording = load(file)
+            events = decide(model, recording, str(file))
+            summary.add(recording.labels, events, str(file))
+        summaries.append(summary)
+        lines.append(f"{name} on recordings that it was not fitted on:")
+        lines.append(summary.text())
+    if former:
+        lines.append(compared(former, summaries[1], str(path), summaries[0]))
+    return "\n\n".join(lines)
 
 
 def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:

@@ -177,3 +177,27 @@ def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, cap
     export(tmp_path, "--data", *few, "--components", 20, *PAPER)
     err = capsys.readouterr().err
     assert "span 5 components, 15 fewer than asked for" in err
+
+
+def test_recordings_that_are_held_out_are_scored_by_both_models(
+    exported, recordings, tmp_path, capsys
+):
+    status = main(
+        [
+            *("--data", str(recordings), "--out", str(tmp_path), "--quick"),
+            *("--features", "paper", "--jobs", "1", "--decision-points", "none"),
+            *("--test", str(recordings)),
+            *("--compare", str(exported / "model.onnx")),
+        ]
+    )
+    err = capsys.readouterr().err
+    assert status == 0
+    assert "on recordings that it was not fitted on:" in err
+    assert "category: 16 of 16 right" in err
+    assert "category: 0 gained, 0 lost of 16: +0.0 points" in err
+
+
+def test_a_comparison_needs_recordings_that_were_held_out(recordings, capsys):
+    words = ["--data", str(recordings), "--compare", "old.onnx"]
+    assert main(words) == 2
+    assert "--compare needs --test" in capsys.readouterr().err
