@@ -89,20 +89,48 @@ class TCA9548A:
         self._expected = control
         self._write.buffer[0] = control
         self.bus.transfer(self._write)
-        if self.verify and not self.kept():
+        if self.verify and not self._connected():
             raise bus_error(errno.EIO, self.bus.name, self.address)
         self.control = control
 
     def kept(self) -> bool:
         """Whether the channel selected last, and no other, is still connected.
 
-        Another program may have selected a channel in the meantime.
+        Another program may have selected a channel in the meantime, of this mux or of
+        one beside it, whose chips then answer at the same addresses.
+
+        Raises:
+            BusError: a mux does not answer, so that nobody knows what it connects.
+        """
+        if not self._connected():
+            return False
+        closed = True
+        for mux in self._beside:
+            # Every one is looked at, so that every open one will be closed.
+            if mux is not self and not mux.closed():
+                closed = False
+        return closed
+
+    def _connected(self) -> bool:
+        """Whether this mux has the channel selected last, and no other."""
+        self.bus.transfer(self._read)
+        return bool(self._read.buffer[0] == self._expected)
+
+    def closed(self) -> bool:
+        """Whether no channel is connected; if one is, `leave` will disconnect it.
 
         Raises:
             BusError: the mux does not answer.
         """
-        self.bus.transfer(self._read)
-        return bool(self._read.buffer[0] == self._expected)
+        try:
+            self.bus.transfer(self._read)
+        except BusError:
+            self.forget()
+            raise
+        if self._read.buffer[0] == 0:
+            return True
+        self.forget()
+        return False
 
     def forget(self) -> None:
         """Take the connected channel as unknown, which it is after any error."""

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from edge.bus.protocol import BusFault
+from edge.bus.protocol import BusError, BusFault, write
 from edge.bus.tca9548a import LEAVE_ATTEMPTS, TCA9548A
 from edge.chips.ad7147 import AD7147
 from edge.fake.ad7147 import FakeAD7147
@@ -66,6 +66,29 @@ def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
     assert first.control == 1 << 3
     assert bus.met == absent
     assert (bus.chips[0x71].connected == []) == opens
+
+
+def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed():
+    """Chips behind both muxes then answer at one address."""
+    bus, _ = muxed()
+    first, _ = beside(bus)
+    first.select(3)
+    assert first.kept()
+    bus.transfer(bus.prepare(write(0x71, b"\x08")))
+    assert not first.kept()
+    first.forget()
+    first.select(3)
+    assert bus.chips[0x71].connected == []
+    assert first.kept()
+
+
+def test_a_mux_beside_that_does_not_answer_may_have_a_channel_open():
+    bus, _ = muxed()
+    first, _ = beside(bus)
+    first.select(3)
+    bus.inject([Fault(address=0x71, at=range(100))])
+    with pytest.raises(BusError):
+        first.kept()
 
 
 @pytest.mark.parametrize(("verify", "bits"), [(True, 40), (False, 20)])
