@@ -155,7 +155,7 @@ def outcome(rig, text):
     ("skin", "command", "options", "expected", "times"),
     [
         ("pad", "scan", "", '"state": "running"', 2),
-        ("pad", "calibrate", "--frames 20", '"noise_median": 1.', 1),
+        ("pad", "calibrate", "--frames 20 --force", '"noise_median": 1.', 1),
         (
             "pad",
             "record",
