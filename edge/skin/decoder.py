@@ -11,9 +11,13 @@ from edge.chips.chip import UNUSED, ChipSpec
 from edge.skin.bus_reader import NEVER, Slot
 from edge.skin.file import SkinFile
 
-NOISY_COUNTS = 1.0
-"""A chip with a taxel of at least this standard deviation has new bytes in every
-conversion."""
+NEVER_STUCK = int(np.iinfo(np.int64).max)
+"""The limit of a chip that may repeat its bytes for ever."""
+LOG_CHANCE = -27.6
+"""Logarithm of the chance, 1e-12, that a working chip repeats its bytes for so long that
+it counts as stuck."""
+COARSE = 0.4
+"""Variance in squared counts below which a reading takes two or three whole numbers."""
 
 
 @dataclass(frozen=True)
@@ -86,19 +90,34 @@ def value_range(file: SkinFile, taxels: TaxelMap) -> ValueRange:
     return ValueRange(lowest.astype(np.uint16), span.astype(np.uint16))
 
 
+def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The chance that a taxel's next reading is the same whole number.
+
+    Args:
+        noise: standard deviations of the readings in counts. Where they are small, the
+            reading is taken to vary by one count up and down; where they are not, as a
+            normal distribution does.
+    """
+    variance = np.square(noise)
+    fine = 1.0 / (2.0 * np.sqrt(np.pi) * np.maximum(noise, np.sqrt(COARSE)))
+    coarse = 1.0 - 2.0 * variance + 1.5 * np.square(variance)
+    return np.asarray(np.where(variance < COARSE, coarse, fine))
+
+
 def stuck_limits(file: SkinFile, taxels: TaxelMap) -> NDArray[np.int64]:
     """(chips,) equal readings in a row after which a chip is stuck.
 
-    Only of a chip with noise, and of one whose bytes hold a sequence number, must the
-    bytes change.
+    Only of a chip whose calibrated noise shows in whole counts, and of one whose bytes
+    hold a sequence number, must the bytes change.
     """
     chips = file.chips
-    noisy = np.zeros(len(chips) + 1, dtype=np.bool_)
-    if file.calibration is not None:
-        varies = file.calibration.noise.ravel() >= NOISY_COUNTS
-        noisy[taxels.chip[varies]] = True
     stuck = file.reading.stuck_frames
-    limits = np.where(noisy[:-1], stuck, np.iinfo(np.int64).max)
+    chances = np.zeros(len(chips) + 1)
+    if file.calibration is not None:
+        repeats = np.log(repeat_chance(file.calibration.noise.ravel()))
+        np.add.at(chances, taxels.chip, repeats)
+    noisy = stuck * chances[:-1] <= LOG_CHANCE
+    limits = np.where(noisy, stuck, NEVER_STUCK)
     for number, chip in enumerate(chips):
         if chip.kind.unchanged_frames is not None:
             limits[number] = min(chip.kind.unchanged_frames, stuck)

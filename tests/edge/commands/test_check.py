@@ -7,6 +7,8 @@ from edge import __version__
 from edge.commands import board as board_module
 from edge.model.info import FORMAT
 from edge.skin import file as skinfile
+from edge.skin.calibration import save_calibration
+from edge.skin.file import TaxelCalibration
 from tests.edge.skin.small import mpr121, one_chip
 
 
@@ -54,6 +56,16 @@ def test_check_counts_what_the_wire_carries(edge, skin):
         f"not calibrated yet: run `edge-classify calibrate --skin {skin}`"
     ]
     assert err == ""
+
+
+@pytest.mark.parametrize(("noise", "hidden"), [(0.0, ["32 chips"]), (4.0, [])])
+def test_check_names_the_chips_whose_freezing_nothing_would_show(
+    edge, skin, noise, hidden
+):
+    resting = numpy.full((16, 24), 9000, dtype=numpy.uint16)
+    save_calibration(skin, TaxelCalibration(resting, numpy.full((16, 24), noise)))
+    _, (event,), _ = edge("check", skin)
+    assert [r.split(" could")[0] for r in event["remarks"]] == hidden
 
 
 def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin):

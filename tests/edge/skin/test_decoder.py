@@ -1,6 +1,7 @@
 """From bytes to trusted values: which taxels are valid, and which chips are doubted."""
 
 from dataclasses import replace
+from math import erf, sqrt
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
 from edge.skin import file as skinfile
+from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits, taxel_map
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -114,6 +116,29 @@ def test_a_chip_whose_bytes_never_change_is_stuck_where_it_made_noise_before():
     with fake_skin(file, lambda t: quiet) as skin:
         valid = [bool(skin.read().valid.all()) for _ in range(150)]
     assert valid.index(False) == file.reading.stuck_frames
+
+
+@pytest.mark.parametrize(
+    ("noise", "limit"), [(4.0, 100), (0.8, 100), (0.2, 100), (0.02, NEVER_STUCK)]
+)
+def test_equal_readings_prove_a_frozen_chip_only_where_noise_shows_in_counts(
+    noise, limit
+):
+    """At a noise of 0.2 counts a taxel repeats with the chance 0.922: the twelve of an
+    AD7147 do so 100 times in a row with less than 1e-12."""
+    file = calibrated(CODY)
+    calibration = replace(file.calibration, noise=np.full((16, 24), noise))
+    file = replace(file, calibration=calibration)
+    assert (stuck_limits(file, taxel_map(file)) == limit).all()
+
+
+def test_the_chance_of_an_equal_reading_is_that_of_a_rounded_normal_value():
+    """Beside the sum of squared probabilities of the whole numbers."""
+    noise = np.array([0.7, 1.0, 2.0, 8.0])
+    edges = np.arange(-100, 101) - 0.5
+    below = [[erf(edge / (sigma * sqrt(2))) / 2 for edge in edges] for sigma in noise]
+    exact = np.square(np.diff(below, axis=1)).sum(axis=1)
+    np.testing.assert_allclose(repeat_chance(noise), exact, rtol=0.08)
 
 
 @pytest.mark.parametrize(
