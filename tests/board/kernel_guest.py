@@ -90,8 +90,10 @@ class Rig:
         self.layout, self.adapter = file.layout, Adapter(file)
         rows, cols = file.layout.shape
         self.touch = np.zeros((30, rows, cols), np.uint16)
-        # The last frames are equal, as Ctrl-C may come a frame earlier or later.
-        rising = 5 * file.layout.onset + np.arange(20, dtype=np.uint16).clip(max=15)
+        # The last frames are equal, as Ctrl-C may come a frame earlier or later. The
+        # others differ, as what stays still in the slow guest's time is set aside.
+        steps = np.arange(20, dtype=np.uint16).clip(max=15)
+        rising = 2 * file.layout.onset + steps * file.layout.onset // 5
         self.touch[6:26, 1:4, cols - 4 : cols - 1] = rising[:, None, None]
 
     def record(self, frames):
