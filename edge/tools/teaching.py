@@ -163,8 +163,9 @@ def taught(
             `with_labels`.
 
     Raises:
-        InputError: a trial lies outside the projection's reach, or has no label that is
-            known; or the file was exported by an earlier version.
+        InputError: a trial lies outside the projection's reach, or further out than
+            exact distances allow; or has no label that is known; or the file was
+            exported by an earlier version.
     """
     info = model.info
     if new_labels:
@@ -180,6 +181,10 @@ def taught(
         for task, entry in info.tasks.items():
             indices = label_indices(entry.labels, task, labels)
             z = coordinates(graph, task, vectors)
+            inside = within_reach(graph, task, z)
+            for name, trial_inside, index in zip(names, inside, indices, strict=True):
+                if index >= 0 and not trial_inside:
+                    raise _far_outside(name)
             further = _rows(graph, task, z, indices)
             further |= _votes(model, graph, entry, task, further)
             changed |= further
@@ -204,10 +209,32 @@ def _check_reach(model: Model, name: str, trial: NDArray[np.float64]) -> None:
         with about(name):
             decisions = model.decide(vector, point)
         if next(iter(decisions.values())).out_of_range:
-            raise InputError(
-                f"{name}: lies far outside the trials that the model was fitted on, so "
-                "its projection cannot place it; export a model with it"
-            )
+            raise _far_outside(name)
+
+
+def _far_outside(name: str) -> InputError:
+    return InputError(
+        f"{name}: lies far outside the trials that the model was fitted on, so its "
+        "projection cannot place it; export a model with it"
+    )
+
+
+def within_reach(graph: Graph, task: str, z: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) which trials at coordinates z (points, m, components) may become rows.
+
+    Squared distances add up exactly, as long as no row is longer than the longest row
+    of training may be: half of what the coordinates of a query are clipped at, see
+    `train.projection.coordinate_bits`.
+    """
+    clip = graph.makers[coordinates_of(graph, task)]
+    clipped_at = clip.inputs[2]
+    longest = []
+    for point in range(len(z)):
+        inputs = {"decision_point": np.array([point])}
+        longest.append(0.5 * graph.run([clipped_at], inputs)[0])
+    lengths = (z**2).sum(axis=2)
+    most = np.square(np.reshape(longest, (len(z), 1)))
+    return np.asarray((lengths <= most).all(axis=0))
 
 
 def _check_labels(info: ModelInfo, name: str, labels: Mapping[str, str]) -> None:

@@ -1,12 +1,14 @@
 """Constants of a model's neighbours, and labels that follow."""
 
 from dataclasses import replace
+from math import isqrt
 
 import numpy as np
 import pytest
 
 from edge.errors import InputError
 from edge.model import onnx_file
+from edge.model.graph import Graph, coordinates_of
 from edge.model.model import Model
 from edge.tools.rewriting import rewritten
 from edge.tools.teaching import (
@@ -16,6 +18,7 @@ from edge.tools.teaching import (
     spelled_like,
     unknown_labels,
     with_labels,
+    within_reach,
 )
 
 
@@ -108,3 +111,20 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
     vectors = np.random.default_rng(0).normal(size=(5, model.info.width))
     before, after = model.run(vectors), Model(tmp_path / "model.onnx").run(vectors)
     assert all((values == before[key]).all() for key, values in after.items())
+
+
+def test_a_row_is_taught_only_as_far_out_as_its_distances_are_exact(model):
+    """The bound in whole numbers: a query at the corner of what it is clipped at, and a
+    row as long as is accepted on the other side."""
+    graph = Graph(model.contents)
+    for task in model.info.tasks:
+        clipped_at = graph.makers[coordinates_of(graph, task)].inputs[2]
+        first = {"decision_point": np.array([0])}
+        limit = int(graph.run([clipped_at], first)[0].item())
+        components = graph.constants[f"columns of {task}"].shape[-2]
+        row = np.zeros((len(model.decision_points_s), 1, components))
+        row[:, 0, 0] = limit // 2
+        assert within_reach(graph, task, row).tolist() == [True]
+        assert (isqrt(components * limit**2) + 1 + limit // 2) ** 2 < 2**53
+        row[:, 0, 0] += 1
+        assert within_reach(graph, task, row).tolist() == [False]
