@@ -95,8 +95,10 @@ ifeq ($(origin DATA),command line)
 ifeq ($(strip $(DATA)),)
 $(error DATA is empty; name a folder of recordings)
 endif
+ifeq ($(findstring n,$(firstword -$(MAKEFLAGS))),)  # a dry run says what it would do
 $(foreach part,$(DATA),$(if $(wildcard $(part)),,$(error DATA names $(part), which does not \
   exist; a name with a space is for `edge-classify export --data` alone)))
+endif
 endif
 
 ifdef DATA
