@@ -160,3 +160,24 @@ def test_the_sketch_agrees_with_the_example_skin():
     assert "taxels::Registers<kRows * kCols, 12>" in sketch
     assert (len(chip.taxels), chip.option("bits")) == (100, 12)
     assert f"Serial.begin({bus.clock_hz})" in sketch
+
+
+@pytest.mark.parametrize("board", ["-D__AVR__", "-DARDUINO_ARCH_RP2040"])
+def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
+    """Checked against the declarations of Arduino's core, without a board's compiler."""
+    shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
+    subprocess.run(
+        [
+            "g++",
+            "-std=c++11",
+            "-fsyntax-only",
+            "-Wall",
+            "-Werror",
+            board,
+            f"-I{tmp_path}",
+            f"-I{MATRIX}",
+            "-xc++",
+            str(MATRIX / "matrix.ino"),
+        ],
+        check=True,
+    )

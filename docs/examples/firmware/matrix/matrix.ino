@@ -1,5 +1,6 @@
-// A 10 x 10 matrix of force-sensitive resistors on an RP2040 or any Arduino with 12-bit inputs,
-// for edge-classify: frames over I2C, and the same frames over the USB serial port.
+// A 10 x 10 matrix of force-sensitive resistors on an RP2040 or another Arduino, for edge-classify:
+// frames over I2C, and the same frames over the USB serial port. An AVR (Uno, Nano) has inputs of
+// 10 bits and an I2C buffer of 32 bytes: read it over the serial port.
 //
 // One CD74HC4067 connects the row under test to 3.3 V, another connects the column under test to
 // the analogue input, which a resistor of 10 kOhm pulls to ground. The skin file is
@@ -11,6 +12,11 @@
 constexpr uint8_t kRows = 10, kCols = 10, kAddress = 0x28;
 constexpr uint8_t kRowPins[4] = {2, 3, 6, 7}, kColPins[4] = {8, 9, 10, 11};
 constexpr uint8_t kInput = A0;
+#ifdef __AVR__
+constexpr uint8_t kMissingBits = 2;  // of 12
+#else
+constexpr uint8_t kMissingBits = 0;
+#endif
 constexpr uint32_t kPeriodUs = 10000;  // 100 frames a second
 constexpr uint32_t kSettleUs = 5;
 
@@ -33,7 +39,9 @@ void onRequest() {
 
 void setup() {
   for (uint8_t i = 0; i < 4; i++) pinMode(kRowPins[i], OUTPUT), pinMode(kColPins[i], OUTPUT);
+#ifndef __AVR__
   analogReadResolution(12);
+#endif
   Wire.begin(kAddress);
   Wire.onReceive(onPointer);
   Wire.onRequest(onRequest);
@@ -51,7 +59,7 @@ void loop() {
     for (uint8_t col = 0; col < kCols; col++) {
       select(kColPins, col);
       delayMicroseconds(kSettleUs);
-      values[row * kCols + col] = analogRead(kInput);
+      values[row * kCols + col] = analogRead(kInput) << kMissingBits;
     }
   }
   registers.publish(values);

@@ -1,0 +1,25 @@
+// What the sketch needs of Arduino's core, as declared there: for a check of its syntax alone.
+#pragma once
+#include <stddef.h>
+#include <stdint.h>
+
+constexpr uint8_t A0 = 14, OUTPUT = 1;
+void pinMode(uint8_t pin, uint8_t mode);
+void digitalWrite(uint8_t pin, uint8_t value);
+int analogRead(uint8_t pin);
+#ifndef __AVR__
+void analogReadResolution(int bits);
+#endif
+unsigned long micros();
+void delayMicroseconds(unsigned int us);
+
+struct Stream {
+  void begin(unsigned long);
+  int available();
+  int read();
+  size_t write(uint8_t);
+  size_t write(const uint8_t*, size_t);
+  void onReceive(void (*)(int));
+  void onRequest(void (*)());
+};
+extern Stream Serial, Wire;
