@@ -272,3 +272,25 @@ def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
         InputError, match=r"out_of_range has the shape \(\)\); copy or export it"
     ):
         model.decide(np.zeros(model.info.width))
+
+
+@pytest.mark.parametrize(
+    ("shares", "tie"),
+    [
+        ([1.0, 0.0, 0.0, 0.0], False),
+        ([0.5, 0.25, 0.25, 0.0], False),
+        ([0.5, 0.5, 0.0, 0.0], True),
+        ([0.25, 0.375, 0.375, 0.0], True),
+        ([1 / 3, 1 / 3, 1 / 3, 0.0], True),
+    ],
+)
+def test_a_tie_is_of_two_labels_or_more_with_the_most_votes(
+    model, monkeypatch, shares, tie
+):
+    vector = np.zeros(model.info.width)
+    outputs = model.run(vector[None])
+    label = np.array([int(np.argmax(shares))])
+    outputs |= {"object_scores": np.array([shares]), "object_label": label}
+    monkeypatch.setattr(model, "run", lambda *arguments: outputs)
+    decision = model.decide(vector)["object"]
+    assert (decision.tie, decision.votes) == (tie, max(shares))
