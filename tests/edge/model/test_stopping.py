@@ -194,3 +194,13 @@ def test_a_rate_lies_inside_0_to_1(value):
 def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
     usual = {"log_max_force@5": (0.0, 10.0), "sqrt_skin_area@20": (0.5, 1.5)}
     assert unusual(means, usual) == phrase
+
+
+@pytest.mark.parametrize(
+    ("confidence", "fixed"),
+    [(0.9, False), (1.0, False), (math.nextafter(1.0, 2.0), True)],
+)
+def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
+    confidence, fixed
+):
+    assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
