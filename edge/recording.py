@@ -28,7 +28,7 @@ MAX_COUNTS = 65535
 SLOWEST_HZ, FASTEST_HZ = 2.0, 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
-KEYS = ("t", "frames", "joints", "valid", "meta")
+KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,8 @@ class Recording:
             if all could.
         meta: `labels` {task: label}, `skin` (see `SkinLayout`), `joint_names` [name of
             each column of `joints`], `source`, `trial`, and any other facts.
+        shear: (n, rows, cols, 2) counts along the rows (elbow to wrist) and around the
+            columns, of the scale of `frames`; None on a skin of one axis.
     """
 
     t: NDArray[np.float64]
@@ -57,6 +59,7 @@ class Recording:
     joints: NDArray[np.float64] | None = None
     valid: NDArray[np.bool_] | None = None
     meta: dict[str, Any] = field(default_factory=dict)
+    shear: NDArray[np.int16] | None = None
 
     @property
     def labels(self) -> dict[str, str]:
@@ -67,7 +70,10 @@ class Recording:
     def layout(self) -> SkinLayout:
         """The skin with which the trial was recorded."""
         skin = {"rows": self.frames.shape[1], "cols": self.frames.shape[2]}
-        return SkinLayout.from_dict({**skin, **self.meta.get("skin", {})})
+        skin |= self.meta.get("skin", {})
+        if self.shear is not None:
+            skin["axes"] = 3
+        return SkinLayout.from_dict(skin)
 
     @property
     def joint_names(self) -> tuple[str, ...] | None:
@@ -107,7 +113,8 @@ class Recording:
             joints = None if self.joints is None else self.joints[i]
             if joints is not None and np.isnan(joints[0]):
                 joints = None
-            yield Frame(t=t, counts=self.frames[i], valid=valid, joints=joints)
+            shear = None if self.shear is None else self.shear[i]
+            yield Frame(t, self.frames[i], valid, joints=joints, shear=shear)
 
 
 def _checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
@@ -145,12 +152,16 @@ def _checked(path: str, recording: Recording, scale: float | None = None) -> Rec
         joints = _joints(recording.joints, len(frames))
         if recording.valid is not None:
             _typed("valid", recording.valid, np.bool_, (rows, cols), frames.shape)
+        if recording.shear is not None:
+            _typed("shear", recording.shear, np.int16, (*frames.shape, 2))
+        elif layout.axes:
+            raise InputError("meta.skin says axes = 3, but shear is missing")
         labels = _labels(meta.get("labels", {}))
         if labels:
             meta["labels"] = labels
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
-    return Recording(t, frames, joints, recording.valid, meta)
+    return Recording(t, frames, joints, recording.valid, meta, recording.shear)
 
 
 def _typed(
@@ -448,6 +459,12 @@ def save(
     why = doubt(recording.t, recording.frames, skin, recording.layout.onset)
     if why is not None:
         LOG.warning(f"{name}: {why}")
+    if recording.shear is not None:
+        from edge.touch import shear  # few skins have three axes
+
+        still = shear.doubt(recording.shear)
+        if still is not None:
+            LOG.warning(f"{name}: {still}")
     arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
     arrays = {key: array for key, array in arrays.items() if array is not None}
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)

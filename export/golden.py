@@ -47,6 +47,7 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
         t=recording.t[kept],
         frames=recording.frames[kept],
         joints=None if recording.joints is None else recording.joints[kept],
+        shear=None if recording.shear is None else recording.shear[kept],
         valid=np.broadcast_to(valid, recording.frames.shape)[kept],
     )
 
@@ -90,6 +91,10 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     if info.dof is not None:
         arrays["joints"] = np.concatenate(
             [r.joints for r in recordings if r.joints is not None]
+        )
+    if info.layout.axes:
+        arrays["shear"] = np.concatenate(
+            [r.shear for r in recordings if r.shear is not None]
         )
     if info.decision_points_s:
         windows = info.decision_points_s

@@ -41,6 +41,12 @@ WITH_JOINTS = (
 )
 """Those for recordings with joint angles, whose changes show how far the thing gave
 way."""
+WITH_SHEAR = (
+    ("contact", "shear"),
+    ("moments", "shear"),
+)
+"""Those that recordings of a skin of three axes have besides, with or without joint
+angles."""
 DRAWN, DRAWN_WITH_JOINTS = ("contact",), ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
 (`kinds_of`). Joint angles at onset and single taxels say how the scene is built.
@@ -97,6 +103,7 @@ def candidates(
     k: int | None = None,
     *,
     joints: bool = False,
+    shear: bool = False,
     drawn: bool = False,
     quick: bool = False,
 ) -> list[Candidate]:
@@ -113,7 +120,7 @@ def candidates(
     fixed = Fixed(features, projection, scaling, components, k)
     mode = Mode.of(drawn=drawn, quick=quick)
     tried = []
-    for sets in _combinations(fixed, mode, joints=joints):
+    for sets in _combinations(fixed, mode, joints=joints, shear=shear):
         for kind in KINDS if projection is None else (projection,):
             if fixed.asks or mode.tries(kind, sets):
                 grid = _grid(sets, kind, fixed, mode)
@@ -148,6 +155,7 @@ class Mode:
 
     Attributes:
         combinations, with_joints: feature sets without and with joint angles.
+        with_shear: further ones of a skin of three axes.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -157,6 +165,7 @@ class Mode:
 
     combinations: Sequence[tuple[str, ...]]
     with_joints: Sequence[tuple[str, ...]]
+    with_shear: Sequence[tuple[str, ...]]
     shrinkages: Sequence[float]
     components: Sequence[int]
     most_directions: int | None
@@ -170,6 +179,7 @@ class Mode:
             return cls(
                 combinations=(DRAWN,),
                 with_joints=(DRAWN_WITH_JOINTS,),
+                with_shear=(),
                 shrinkages=DRAWN_SHRINKAGES,
                 components=DRAWN_COMPONENTS,
                 most_directions=DRAWN_COMPONENTS[-1],
@@ -180,6 +190,7 @@ class Mode:
         return cls(
             combinations=PLAIN[:number],
             with_joints=WITH_JOINTS[:number],
+            with_shear=WITH_SHEAR,
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
             most_directions=None,
@@ -201,12 +212,16 @@ class Mode:
 
 
 def _combinations(
-    fixed: Fixed, mode: Mode, *, joints: bool
+    fixed: Fixed, mode: Mode, *, joints: bool, shear: bool
 ) -> Sequence[tuple[str, ...]]:
     """The feature sets that are tried together."""
     if fixed.features is not None:
         return [tuple(fixed.features)]
-    return mode.with_joints if joints else mode.combinations
+    if not shear:
+        return mode.with_joints if joints else mode.combinations
+    angles = ("joints",) if joints else ()
+    sheared = [(*sets, *angles) for sets in mode.with_shear]
+    return [*_combinations(fixed, mode, joints=joints, shear=False), *sheared]
 
 
 def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:

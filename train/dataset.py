@@ -6,6 +6,7 @@ import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 from train.arms import arm_of, joint_angles
-from train.feature_sets import moves, unit
+from train.feature_sets import axes, moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
@@ -65,6 +66,12 @@ class Recordings:
         return 2 * sum(recording.joints is not None for recording in self.own) > len(
             self.own
         )
+
+    @property
+    def shear(self) -> bool:
+        """Whether most of the owner's have shear."""
+        sheared = sum(recording.shear is not None for recording in self.own)
+        return 2 * sheared > len(self.own)
 
 
 @dataclass(frozen=True)
@@ -205,6 +212,7 @@ class DataSet:
         return replace(
             self,
             names=taken,
+            layout=replace(self.layout, axes=axes(types)),
             chain=self.chain if any(map(moves, types)) else None,
             joints=self.joints if any(feature.of_joints for feature in types) else 0,
             kernels={
@@ -289,7 +297,8 @@ def load_trials(
     types = measures.features(tuple(features))
     recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
     layout = with_thresholds(recordings.own[0].layout, threshold, onset)
-    layout = replace(layout, dead=_dead(recordings.recordings))
+    layout = replace(layout, dead=_dead(recordings.recordings), axes=axes(types))
+    recordings, without_shear = with_shear(recordings, layout)
     posed = with_poses(recordings, types, arm)
     follow = {
         "chain": posed.chain,
@@ -309,7 +318,11 @@ def load_trials(
     )
     touched = collect(posed.recordings, shown, layout)
     labelled = complete(touched, partial=partial)
-    left_out = {**labelled.lacking, "joint angles": posed.without_joints}
+    left_out = {
+        **labelled.lacking,
+        "joint angles": posed.without_joints,
+        "shear": without_shear,
+    }
     return DataSet(
         trials=labelled.trials,
         layout=layout,
@@ -326,6 +339,27 @@ def load_trials(
 
 Named = tuple[Recording, Path]
 """A recording and its file."""
+
+
+def with_shear(
+    data: Recordings, layout: SkinLayout
+) -> tuple[Recordings, tuple[Path, ...]]:
+    """The recordings that have the shear that a layout asks for, and the other files.
+
+    Raises:
+        InputError: none has it.
+    """
+    if layout.axes is None:
+        return data, ()
+    has = [recording.shear is not None for recording in data.recordings]
+    if not any(has):
+        raise InputError("no recording has shear, which the features need")
+    kept = replace(
+        data,
+        paths=tuple(compress(data.paths, has)),
+        recordings=tuple(compress(data.recordings, has)),
+    )
+    return kept, tuple(path for path in data.paths if path not in kept.paths)
 
 
 @dataclass(frozen=True)

@@ -64,12 +64,22 @@ that room only.
 | `joint_change`, at ten times | radian | the recording's angles, from onset on |
 | `joint_change_rate` | radian/s | the same |
 | `joint_angle`, at ten times | radian | the angles themselves |
+
+`shear`, of recordings of three axes: how large the tangential force is, and which part
+of the normal one. It nears the coefficient of friction before a contact slides.
+
+| feature, of the contact | unit | from |
+|---|---|---|
+| `log_contact_shear_size`, its rate | log(newton) | the sums of both components |
+| `contact_shear_ratio`, its rate | 1, 1/s | the same, over the sum of counts |
+| `sqrt_contact_shear_along`, `_around` | newton under the root | each of the sums |
+| `sqrt_contact_twist` | newton metre under the root | and their moments |
 """
 
 from collections.abc import Sequence
 
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import KERNELS, PAPER, QUANTITIES, Feature
+from edge.touch.measures import KERNELS, PAPER, QUANTITIES, SHEAR, Feature
 
 _TAXELS = (
     "taxel_force@10",
@@ -104,6 +114,15 @@ SETS: dict[str, tuple[str, ...]] = {
     "zone_kernels": ("zone_kernels",),
     "joints": ("joint_change@10", "joint_change_rate@10"),
     "posture": ("joint_angle@10",),
+    "shear": (
+        "log_contact_shear_size@5",
+        "log_contact_shear_size_rate@5",
+        "contact_shear_ratio@5",
+        "contact_shear_ratio_rate@5",
+        "sqrt_contact_shear_along@5",
+        "sqrt_contact_shear_around@5",
+        "sqrt_contact_twist@5",
+    ),
 }
 """{set: names of its features, see `edge.touch.measures`}."""
 
@@ -120,6 +139,11 @@ def moves(feature: Feature) -> bool:
     return feature.quantity in ("motion", "force_motion", "stiffness")
 
 
+def axes(types: Sequence[Feature]) -> int | None:
+    """3 where a feature needs shear, else None, as `SkinLayout.axes` says it."""
+    return 3 if any(feature.quantity in SHEAR for feature in types) else None
+
+
 def unit(feature: Feature, layout: SkinLayout) -> str:
     """The unit of a feature's values on a skin."""
     text = {
@@ -131,6 +155,11 @@ def unit(feature: Feature, layout: SkinLayout) -> str:
         "force_motion": layout.length_unit,
         "stiffness": f"{layout.force_unit}/{layout.length_unit}",
         "slant": "taxel^2",
+        "shear_along": layout.force_unit,
+        "shear_around": layout.force_unit,
+        "shear_size": layout.force_unit,
+        "shear_ratio": "1",
+        "twist": f"{layout.force_unit} {layout.length_unit}",
         "joint_change": "radian",
         "joint_angle": "radian",
         **dict.fromkeys(KERNELS, "1"),

@@ -111,7 +111,9 @@ class FitOptions:
             return self.decision_points_s[-1]
         return self.window_s
 
-    def candidates(self, y: Labels, *, joints: bool, drawn: bool) -> list[Candidate]:
+    def candidates(
+        self, y: Labels, *, joints: bool, shear: bool, drawn: bool
+    ) -> list[Candidate]:
         """The candidates for some labels."""
         return candidates(
             y,
@@ -121,13 +123,19 @@ class FitOptions:
             self.components,
             self.k,
             joints=joints,
+            shear=shear,
             drawn=drawn,
             quick=self.quick,
         )
 
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
         """The choice of the settings of some trials."""
-        tried = self.candidates(y, joints=dataset.joints > 0, drawn=drawn)
+        tried = self.candidates(
+            y,
+            joints=dataset.joints > 0,
+            shear=dataset.layout.axes is not None,
+            drawn=drawn,
+        )
         return Choosing(
             dataset,
             y,
@@ -287,7 +295,9 @@ def _with_thresholds(
 ) -> DataSet:
     """The trials, by thresholds that are given, saved, proposed or chosen."""
     drawn = recordings.mixed or kinds_of(recordings.recordings) is not None
-    tried = options.candidates({}, joints=recordings.joints, drawn=drawn)
+    tried = options.candidates(
+        {}, joints=recordings.joints, shear=recordings.shear, drawn=drawn
+    )
     names = [name for candidate in tried for name in candidate.sets]
 
     def by(threshold: int | None, onset: int | None) -> DataSet:

@@ -147,7 +147,7 @@ def answered_key(key: str) -> str:
 def _trials(
     arrays: dict[str, NDArray[Any]], meta: dict[str, Any]
 ) -> Iterator[Recording]:
-    keys = [key for key in ("t", "frames", "joints", "valid") if key in arrays]
+    keys = [key for key in ("t", "frames", "joints", "valid", "shear") if key in arrays]
     for first, end in pairwise(arrays["start"].tolist()):
         if not 0 <= first < end <= len(arrays["t"]):
             raise ValueError("a trial has no frames")

@@ -143,7 +143,13 @@ def touch(model: Model, seconds: float) -> list[Frame]:
         )
         joints = None if dof is None else np.full(dof, 0.1 * age)
         valid = np.ones(layout.shape, dtype=bool)
-        frames.append(Frame(age, counts.astype(np.uint16), valid, joints=joints))
+        whole = counts.astype(np.uint16)
+        shear = np.stack([whole // 4] * 2, axis=2).astype(np.int16)
+        frames.append(
+            Frame(
+                age, whole, valid, joints=joints, shear=shear if layout.axes else None
+            )
+        )
     return frames
 
 

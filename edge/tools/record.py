@@ -141,7 +141,14 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
         joints=_angles(frames),
         valid=None if valid.all() else valid,
         meta=meta,
+        shear=_shear(frames),
     )
+
+
+def _shear(frames: list[Frame]) -> NDArray[np.int16] | None:
+    """(n, rows, cols, 2) shear of a skin of three axes."""
+    shear = [frame.shear for frame in frames if frame.shear is not None]
+    return np.array(shear) if shear else None
 
 
 def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:

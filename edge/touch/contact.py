@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONE_WIDTH, Measurer
+from edge.touch.measures import Measurer
 from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ class FeatureSeries:
             for.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
-        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`.
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`; 12
+            with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
         taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`),
             or None.
@@ -163,7 +164,7 @@ class Contact:
             self._forget_last()
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
-        zones = measurer.measure(active, region)
+        zones = measurer.measure(active, region, frame.shear)
         plain = [0] * PLAIN
         row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
         before = self._before
@@ -272,7 +273,8 @@ class Contact:
         }
         counted = measured.pop("counted")
         zones = self._measurer.zones
-        sums = counted[:, PLAIN:].reshape(len(counted), len(zones), ZONE_WIDTH)
+        width = self._measurer.width
+        sums = counted[:, PLAIN:].reshape(len(counted), len(zones), width)
         return FeatureSeries(
             **measured,
             peak=counted[:, 0],

@@ -14,7 +14,7 @@ from edge.errors import InputError, OutOfRange
 from edge.touch import measures
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import KERNELS, Cells, Feature, not_measured
+from edge.touch.measures import KERNELS, ZONE_WIDTH, Cells, Feature, not_measured
 
 if TYPE_CHECKING:
     from edge.touch.kernels import KernelTable
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 FEATURES = measures.PAPER
 SAMPLES = 40
 WINDOW_S = 1.2
+FORCES = ("max_force", "force", "pressure", "taxel_force", "shear_size")
+"""Quantities whose logarithm takes the smallest force of a taxel in contact as
+floor."""
 MOTION_FLOOR = 0.1
 """Motion that counts as noise of the centroid, in distances between rows."""
 
@@ -238,7 +241,7 @@ class _Course:
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
 
     def _floor(self, feature: Feature) -> float:
-        if feature.quantity in ("max_force", "force", "pressure", "taxel_force"):
+        if feature.quantity in FORCES:
             return self._force_floor
         if feature.quantity in ("motion", "force_motion"):
             return self._length_floor
@@ -256,7 +259,7 @@ class _Course:
         elif (name, quantity) == ("contact", "area"):
             values = series.area
         elif zone is not None and quantity != "stiffness":
-            values = zone[quantity]
+            values = zone.get(quantity)
         elif zone is not None and series.force_motion is not None:
             force = zone["force"] + self._force_floor
             values = force / (series.force_motion + self._length_floor)
@@ -266,10 +269,16 @@ class _Course:
 
 
 def _quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:
-    """{quantity: (n,)} of a zone, from its whole numbers (n, 8).
+    """{quantity: (n,)} of a zone, from its whole numbers, those of shear included.
 
     The centroid of an empty zone is NaN, everything else of it 0.
     """
+    if sums.shape[1] > ZONE_WIDTH:
+        from edge.touch import shear  # few skins have three axes
+
+        return shear.quantities(sums, layout) | _quantities(
+            sums[:, :ZONE_WIDTH], layout
+        )
     scale = layout.counts_per_newton or 1.0
     peak, area, force, row_sum, col_sum, *_ = sums.T
     along, around = np.full((2, len(sums)), np.nan)

@@ -24,3 +24,6 @@ class Frame:
     `t`."""
     joints: NDArray[np.float64] | None = None
     """(dof,) radians at `t`; None where unknown."""
+    shear: NDArray[np.int16] | None = None
+    """(rows, cols, 2) tangential counts along the rows and around the columns; None on
+    a skin of one axis."""

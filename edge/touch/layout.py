@@ -56,6 +56,8 @@ class SkinLayout:
     """Flat indices (row * cols + col) of taxels that can never be read."""
     release_s: float = RELEASE_S
     """A contact ends after this many seconds with no taxel above the threshold."""
+    axes: int | None = None
+    """3 on a skin whose taxels give shear too, or for a model that needs it."""
 
     def __post_init__(self) -> None:
         if any(not 0 <= i < self.rows * self.cols for i in self.dead):
@@ -173,6 +175,8 @@ class SkinLayout:
             values["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
         elif table.has("pitch_m"):
             values["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
+        if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:
+            values["axes"] = 3
         if table.has("column_angles_deg"):
             values["column_angles_deg"] = table.numbers(
                 "column_angles_deg", values["cols"]
@@ -202,6 +206,11 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
     if of_device != of_model:
         raise InputError(
             f"this skin has {of_device}, but the model was made for {of_model}"
+        )
+    if model.axes and not device.axes:
+        raise InputError(
+            "the model needs shear, which this skin does not give; export a model "
+            "without it"
         )
     # Both scales are known or neither is, as the units are equal.
     ratio = (device.counts_per_newton or 1.0) / (model.counts_per_newton or 1.0)
@@ -240,6 +249,8 @@ def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
                 f"the skin's {name} is {own} counts, but the model's of {trained} is "
                 "used"
             )
+    if device.axes and not model.axes:
+        sentences.append("the skin gives shear, which the model does not use")
     if not _alike(device.pitch, model.pitch):
         sentences.append(
             f"taxels are {_millimetres(device.pitch)} apart, and "

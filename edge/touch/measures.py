@@ -15,7 +15,7 @@ zones that some feature needs are measured.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -59,7 +59,17 @@ of all zones."""
 WIDE = ("taxel_force", *KERNELS, "joint_change", "joint_angle")
 """Quantities of many values: one for each cell of the skin (`Cells`), kernel or
 joint."""
-SIGNED = ("around", "slant", "joint_change", "joint_angle")
+SHEAR = ("shear_along", "shear_around", "shear_size", "shear_ratio", "twist")
+"""Quantities of a zone of a skin of three axes, see `edge.touch.shear`."""
+SIGNED = (
+    "around",
+    "slant",
+    "joint_change",
+    "joint_angle",
+    "shear_along",
+    "shear_around",
+    "twist",
+)
 """Quantities that may be negative, and so have no logarithm."""
 
 TRANSFORMS = ("log", "sqrt", "relative")
@@ -90,7 +100,7 @@ class Feature:
     Attributes:
         name: users select it by this name.
         zone: one of `ZONES`, or `arm`.
-        quantity: one of `QUANTITIES`, or of those of `ALONE`.
+        quantity: one of `QUANTITIES` or `SHEAR`, or of those of `ALONE`.
         transforms: of its value, in the order in which they are applied.
         summary: one of `SUMMARIES`, or empty for its course.
         samples: times at which it is taken; 0 for the model's number.
@@ -128,12 +138,17 @@ class Feature:
         if self.quantity == "zone_kernels":
             return ZONES
         with_region = self.zone == "contact" and self.quantity in ("max_force", "area")
-        return () if with_region or self.quantity not in QUANTITIES else (self.zone,)
+        of_zone = self.quantity in QUANTITIES + SHEAR
+        return () if with_region or not of_zone else (self.zone,)
 
 
-def names() -> list[str]:
-    """All feature types without transforms and summaries, the paper's first."""
-    zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in QUANTITIES]
+def names(quantities: Sequence[str] = QUANTITIES) -> list[str]:
+    """All feature types without transforms and summaries, the paper's first.
+
+    Args:
+        quantities: of the zones; with those of `SHEAR` for a skin of three axes.
+    """
+    zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in quantities]
     others = [name for name in (*ALONE, *zones) if name not in PAPER]
     return [*PAPER, *(name for name in others if name != "contact_max_force")]
 
@@ -176,7 +191,8 @@ def _zone_and_quantity(name: str, base: str) -> tuple[str, str]:
     if base in ALONE:
         return ALONE[base]
     zone, _, quantity = base.partition("_")
-    if zone not in ZONES or quantity not in QUANTITIES or base == "contact_max_force":
+    exists = zone in ZONES and quantity in QUANTITIES + SHEAR
+    if not exists or base == "contact_max_force":
         raise _no_feature(name, base)
     return zone, quantity
 
@@ -184,7 +200,8 @@ def _zone_and_quantity(name: str, base: str) -> tuple[str, str]:
 def _no_feature(name: str, base: str) -> InputError:
     import difflib  # a slow board starts sooner without it
 
-    nearest = difflib.get_close_matches(base, names(), 3) or names()[:3]
+    types = names(QUANTITIES + SHEAR)
+    nearest = difflib.get_close_matches(base, types, 3) or types[:3]
     return InputError(
         f"there is no feature {name!r}; the nearest are {', '.join(nearest)}"
     )
@@ -256,6 +273,8 @@ class Measurer:
         kernel_cells: the larger cells that kernels take, likewise.
         joints: number of joint angles kept of each frame; 0 where no feature needs
             them.
+        width: whole numbers of a zone, those of its shear included where a feature
+            needs them.
     """
 
     def __init__(
@@ -271,6 +290,13 @@ class Measurer:
             Cells(layout, KERNEL_CELLS) if "taxel_kernels" in quantities else None
         )
         self.joints = joints if any(f.of_joints for f in types) else 0
+        self.width = ZONE_WIDTH
+        self._shear_sums: Callable[..., list[int]] | None = None
+        if not quantities.isdisjoint(SHEAR):
+            from edge.touch import shear  # few skins have three axes
+
+            self.width += shear.WIDTH
+            self._shear_sums = shear.sums
         self.zones = tuple(
             zone for zone in ZONES if any(zone in f.zones for f in types)
         )
@@ -282,15 +308,21 @@ class Measurer:
         turned = np.where(cols < cols[:, None], cols + layout.cols, cols)
         self._cols = np.stack([turned**0, turned, turned**2], axis=2)
 
-    def measure(self, active: ActiveTaxels, contact: Region | None) -> list[int]:
-        """`ZONE_WIDTH` whole numbers of each zone.
+    def measure(
+        self,
+        active: ActiveTaxels,
+        contact: Region | None,
+        shear: NDArray[np.int16] | None = None,
+    ) -> list[int]:
+        """`width` whole numbers of each zone.
 
         Args:
             active: the frame's active taxels.
             contact: the region followed; None where no taxel of it is active.
+            shear: of the frame, where a feature needs it.
         """
         if contact is None:
-            return [0] * (ZONE_WIDTH * len(self.zones))
+            return [0] * (self.width * len(self.zones))
         row: list[int] = []
         for zone in self.zones:
             half = self._halves.get(zone, slice(None))
@@ -306,4 +338,7 @@ class Measurer:
             ).tolist()
             row += int(counts.max(initial=0)), int(np.count_nonzero(counts))
             row += force, rows, cols, rows_rows, rows_cols, cols_cols
+            if self._shear_sums is not None:
+                turned = self._cols[cut, half, 1]
+                row += self._shear_sums(shear, mask, half, turned)
         return row

@@ -292,3 +292,67 @@ def test_arrays_that_unpack_to_more_than_the_limit_are_refused(tmp_path):
         InputError, match="claims arrays of more than 134217728 bytes; split it"
     ):
         load(path)
+
+
+def sheared(recording: Recording) -> Recording:
+    """The recording of a skin of three axes, whose shear is a quarter of its counts."""
+    quarter = (recording.frames // 4).astype(np.int16)
+    return replace(recording, shear=np.stack([quarter, -quarter], axis=3))
+
+
+def test_shear_is_saved_and_each_frame_has_its_own(make_touch, tmp_path):
+    touch = sheared(make_touch())
+    save(tmp_path / "a.npz", touch)
+    back = load(tmp_path / "a.npz")
+    assert back.shear.dtype == np.int16
+    assert back.shear.tobytes() == touch.shear.tobytes()
+    assert back.layout.axes == 3
+    assert list(back)[5].shear.tobytes() == touch.shear[5].tobytes()
+
+
+def test_a_recording_without_shear_has_no_array_for_it(make_touch, tmp_path):
+    save(tmp_path / "a.npz", make_touch())
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        assert "shear.npy" not in archive.namelist()
+    back = load(tmp_path / "a.npz")
+    assert back.layout.axes is None
+    assert next(iter(back)).shear is None
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda s: s.astype(np.float64), "shear must be int16"),
+        (lambda s: s * np.nan, "shear must be int16"),
+        (lambda s: s[..., 0], "shear must be int16"),
+        (lambda s: s[1:], "shear must be int16"),
+    ],
+)
+def test_shear_of_another_form_is_refused(make_touch, tmp_path, change, sentence):
+    touch = sheared(make_touch())
+    wrong = replace(touch, shear=change(touch.shear))
+    with pytest.raises(InputError, match=f"a.npz: {sentence}"):
+        save(tmp_path / "a.npz", wrong)
+
+
+def test_a_skin_of_three_axes_without_shear_is_refused(make_touch, tmp_path):
+    touch = make_touch()
+    skin = {**touch.meta.get("skin", {}), "axes": 3}
+    wrong = replace(touch, meta={**touch.meta, "skin": skin})
+    with pytest.raises(InputError, match="axes = 3, but shear is missing"):
+        save(tmp_path / "a.npz", wrong)
+
+
+def test_shear_without_counts_is_refused(make_touch, tmp_path):
+    touch = sheared(make_touch())
+    np.savez(tmp_path / "a.npz", t=touch.t, shear=touch.shear, meta=np.array("{}"))
+    with pytest.raises(InputError, match="frames is missing; it holds t, shear"):
+        load(tmp_path / "a.npz")
+
+
+def test_an_axis_that_never_changes_is_said(make_touch, tmp_path, caplog):
+    touch = sheared(make_touch())
+    still = touch.shear.copy()
+    still[..., 1] = 0
+    save(tmp_path / "a.npz", replace(touch, shear=still))
+    assert "a.npz: its shear around the columns never changes" in caplog.text

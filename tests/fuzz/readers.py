@@ -280,9 +280,10 @@ READERS = (
         files("train/scenes/*.toml"),
         mutate.of_text,
         load_scene,
-        lambda path: shutil.copy(
-            ROOT / "train" / "scenes" / "cody18.toml", path.parent
-        ),
+        lambda path: [
+            shutil.copy(ROOT / "train" / "scenes" / name, path.parent)
+            for name in ("cody18.toml", "household.toml")
+        ],
     ),
     Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),

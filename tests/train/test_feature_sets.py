@@ -35,12 +35,15 @@ def series_of(frames, wanted, joints=0):
 
 
 def touch(peaks, step=0.25, joints=None):
-    """A touch of two taxels, one of them half as strong."""
+    """A touch of two taxels, one of them half as strong; shear grows with each
+    frame."""
     joints = [None] * len(peaks) if joints is None else joints
-    return [
-        pressed(SKIN, i * step, {(1, 1): peak, (1, 2): peak // 2}, joints=angles)
-        for i, (peak, angles) in enumerate(zip(peaks, joints, strict=True))
-    ]
+    frames = []
+    for i, (peak, angles) in enumerate(zip(peaks, joints, strict=True)):
+        taxels = {(1, 1): peak, (1, 2): peak // 2}
+        shear = np.full((*SKIN.shape, 2), 10 * i, dtype=np.int16)
+        frames.append(pressed(SKIN, i * step, taxels, joints=angles, shear=shear))
+    return frames
 
 
 def vector_of(frames, *wanted, samples=5, window=1.0, **options):
@@ -70,6 +73,9 @@ def test_units_are_those_of_the_skin():
         "sqrt_relative_taxel_force_rate": "sqrt(1)/s",
         "log_skin_force_mean": "log(newton)",
         "joint_change_rate@10": "radian/s",
+        "sqrt_contact_twist": "sqrt(newton metre)",
+        "contact_shear_ratio_rate": "1/s",
+        "log_skin_shear_size": "log(newton)",
     }
     assert {name: unit(feature(name), metric) for name in units} == units
     assert unit(feature("skin_force"), SkinLayout(rows=6, cols=8)) == "count"

@@ -67,6 +67,7 @@ def split(recording: Recording) -> list[Recording]:
                 joints=None if joints is None else joints[span],
                 valid=valid[span] if valid is not None and valid.ndim == 3 else valid,
                 meta={**meta, "labels": own},
+                shear=None if recording.shear is None else recording.shear[span],
             )
         )
         previous_end_s = end_s

@@ -141,6 +141,8 @@ class PhysicsRun:
         traces: {name: (n, frames)} that effects keep, such as `slide_m`.
         window: (n, frames, rows, C) counts on the columns that can touch; no frames
             where the run made no images.
+        images: {effect: (n, frames, rows, C, images)} likewise, of effects that have
+            `IMAGES`.
         trials: their state after the last step.
     """
 
@@ -149,6 +151,7 @@ class PhysicsRun:
     force: Array
     traces: dict[str, Array]
     window: NDArray[np.float32]
+    images: dict[str, NDArray[np.float32]]
     trials: Trials
 
 
@@ -181,6 +184,11 @@ def run_physics(
         (t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32
     )
     joints[:, 0] = t.q.T
+    further = images_of(t) if images else {}
+    more = {
+        effect: np.zeros((*window.shape, len(names)), dtype=np.float32)
+        for effect, names in further.items()
+    }
     scale, active = scene.skin.counts_per_newton, np.arange(t.n)
     while active.size:
         starts = active[t.left[active] == 0]
@@ -206,6 +214,10 @@ def run_physics(
             window[ends[touched], k[touched]] = np.moveaxis(
                 np.minimum(counts, FULL), -1, 0
             )
+        for effect, names in further.items():
+            for place, name in enumerate(names):
+                loads = getattr(t.own[effect], name).take(ends, -1)
+                more[effect][ends, k, ..., place] = np.moveaxis(loads * scale, -1, 0)
         if (k == frames - 1).any():
             active = active[t.frame[active] < frames - 1]
     if t.lost.any():
@@ -217,7 +229,17 @@ def run_physics(
         )
     times = np.arange(frames) / scene.trials["rate_hz"]
     check_energy(t, joints, times)
-    return PhysicsRun(times, joints, force, traces, window, t)
+    return PhysicsRun(times, joints, force, traces, window, more, t)
+
+
+def images_of(t: Trials) -> dict[str, tuple[str, ...]]:
+    """{effect: the attributes of its state that are images of their own}."""
+    modules = {effect: module_of(effect) for effect in t.plan.calls}
+    return {
+        effect: module.IMAGES
+        for effect, module in modules.items()
+        if hasattr(module, "IMAGES")
+    }
 
 
 def start_frames(t: Trials, starts: Places) -> None:
@@ -296,6 +318,10 @@ def readings(
     for i in every.tolist():
         counts = np.zeros((len(physics.t), *t.skin.shape), dtype=np.float32)
         counts[:, :, t.columns[:, i]] = physics.window[i]
+        images = {}
+        for effect, window in physics.images.items():
+            images[effect] = np.zeros((*counts.shape, window.shape[-1]), np.float32)
+            images[effect][:, :, t.columns[:, i]] = window[i]
         seen = Readings(
             scene=scene,
             trial=t.specs[i],
@@ -304,6 +330,7 @@ def readings(
             t=physics.t,
             counts=counts,
             joints=physics.joints[i].copy(),
+            images=images,
         )
         for stage in SENSOR:
             for call in plan.stages[stage]:

@@ -51,6 +51,7 @@ SAMPLE = (
     "lean",  # further force on the skin
     "image",  # the load on the taxels
     "pass_on",  # how the load spreads, and the bubbles that it bursts
+    "traction",  # the taxels' tangential load
 )
 SENSOR = (
     "clock",  # the frames' times
@@ -158,6 +159,9 @@ def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[st
     for name, info in EFFECTS.items():
         if info.condition == condition:
             required[name] = condition
+        elif info.axes:
+            if info.axes == scene.skin.axes:
+                required[name] = f"skin.axes = {info.axes}"
         elif info.keys and item.given.issuperset(info.keys):
             required[name] = " and ".join(info.keys)
         elif (
@@ -217,6 +221,8 @@ def check_supported(scene: Scene, where: str) -> None:
             continue
         info = EFFECTS[name]
         needs = []
+        if info.axes:
+            needs.append(f"skin.axes = {info.axes}")
         if info.families:
             needs.append(f"an object of family {' or '.join(info.families)}")
         if info.keys:

@@ -1,6 +1,6 @@
 """A trial's sensor readings on the way from the load to whole counts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from train.simulate.scene_model import Scene, TrialSpec
 
 FULL = 65535.0
 """The converter's highest reading."""
+HALF = 32767.0
+"""The highest reading of an axis that is positive and negative."""
 
 
 @dataclass
@@ -28,6 +30,8 @@ class Readings:
         times: (frames,) seconds, if a clock effect shifts them.
         kept: (frames,) whether each frame arrives, if some are lost.
         valid: (rows, cols) whether each taxel works, if dead ones are known.
+        images: {effect: (frames, rows, cols, images) further counts of each taxel} of
+            the effects that have `IMAGES`.
     """
 
     scene: Scene
@@ -40,6 +44,7 @@ class Readings:
     times: Array | None = None
     kept: Mask | None = None
     valid: Mask | None = None
+    images: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def stream(self, effect: str) -> np.random.Generator:
         """An effect's random numbers in this trial."""
@@ -50,3 +55,11 @@ class Readings:
     def frames(self) -> NDArray[np.uint16]:
         """(frames, rows, cols) whole counts within the converter's range."""
         return np.clip(np.rint(self.counts), 0.0, FULL).astype(np.uint16)
+
+    def shear(self) -> NDArray[np.int16] | None:
+        """(frames, rows, cols, 2) whole counts of both tangential axes, if there are
+        any; 0 of taxels that are known to be dead."""
+        if "shear" not in self.images:
+            return None
+        counts = np.clip(np.rint(self.images["shear"]), -HALF, HALF).astype(np.int16)
+        return counts if self.valid is None else counts * self.valid[:, :, None]

@@ -84,11 +84,16 @@ def recordings(
                 "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
             },
         }
-        frames, joints = seen.frames()[kept], seen.joints[kept]
+        shear = seen.shear()
         yield (
             file,
             Recording(
-                t=t[kept], frames=frames, joints=joints, valid=seen.valid, meta=meta
+                t=t[kept],
+                frames=seen.frames()[kept],
+                joints=seen.joints[kept],
+                valid=seen.valid,
+                meta=meta,
+                shear=None if shear is None else shear[kept],
             ),
         )
 

@@ -244,6 +244,8 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
         "counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True
     )
     taxel = table.value("taxel_n_m", schema.TAXEL)
+    if table.has("axes"):
+        given["axes"] = table.whole("axes", 1, (1, 3))
     table.done()
     skin = Cylinder.from_dict(given, where=table.where)
     if not skin.wraps:

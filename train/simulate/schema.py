@@ -36,6 +36,8 @@ class Effect:
     """Object keys that it needs; an object with all of them calls for it."""
     condition: str = ""
     """The condition whose objects call for it, and no others can."""
+    axes: int = 0
+    """The axes of a skin that calls for it, whatever the object."""
 
 
 CONDITIONS = ("fixed", "movable")
@@ -204,6 +206,7 @@ EFFECTS: dict[str, Effect] = {
     "turning": Effect("contact", needs=("sliding",), keys=("aside_m", "foot_m")),
     "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
     "tipping": Effect("contact", needs=("sliding",), keys=("base_m", "height_m")),
+    "shear": Effect("contact", axes=3),
     "crosstalk": Effect(
         "sensor", {"part": Field(0.0, 0.2, 0.02, "of each of four neighbours")}
     ),

@@ -59,6 +59,8 @@ class Trials:
         row_z: (rows, 1) metres of each row in the skin's link.
         columns, column_gaps, reach: (C, n) the skin's columns that can touch, the gap
             of each in metres at zero depth, and the part of it that the face can touch.
+        column_angle: (C, n) radians from the push to each of these columns, positive
+            towards higher columns.
         taxel_k: (n,) newtons a metre of a taxel with the springs in series.
         gaps, stiffness: (S, n) the springs of a row: metres at which each is touched,
             and newtons a metre. A trial of fewer springs has some at infinity, of no
@@ -114,7 +116,7 @@ class Trials:
             skin.row0_z_m - skin.pitch[0] * np.arange(skin.rows, dtype=float)[:, None]
         )
         self.columns = zeros((window, n), dtype=np.intp)
-        self.column_gaps, self.reach = zeros((2, window, n))
+        self.column_gaps, self.reach, self.column_angle = zeros((3, window, n))
         self.gaps, self.stiffness = zeros((2, 0, n))
         self.weight, self.line_gap, self.line_depth, self.row_force = zeros(
             (4, skin.rows, n)

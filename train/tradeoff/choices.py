@@ -27,7 +27,7 @@ def followed(
     """The trials of recordings, with the features of all candidates and further ones by
     name."""
     drawn = kinds_of(raw.recordings) is not None
-    tried = candidates({}, joints=raw.joints, drawn=drawn, quick=quick)
+    tried = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
     sets = [name for candidate in tried for name in candidate.sets]
     return load_trials(
         raw,

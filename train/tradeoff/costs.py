@@ -64,6 +64,7 @@ def every_nth(recording: Recording, n: int) -> Recording:
         frames=recording.frames[::n],
         joints=None if joints is None else joints[::n],
         valid=valid[::n] if valid is not None and valid.ndim == 3 else valid,
+        shear=None if recording.shear is None else recording.shear[::n],
     )
 
 

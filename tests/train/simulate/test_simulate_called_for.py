@@ -28,7 +28,7 @@ from train.simulate.schema import EFFECTS
 MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
 
-def scene(*add, leave_out=(), objects=None, **trials):
+def scene(*add, leave_out=(), objects=None, axes=1, **trials):
     box = {
         "name": "box",
         "family": "rigid",
@@ -41,6 +41,7 @@ def scene(*add, leave_out=(), objects=None, **trials):
         trials={"count": 3, "after_s": 0.6, **trials},
         spread={"place_m": 0.01, "roll_deg": 5.0, "friction": 0.1},
         effects={"add": list(add), "leave_out": list(leave_out)},
+        skin={"axes": axes},
     )
 
 
@@ -142,8 +143,10 @@ def test_4_adding_an_effect_leaves_the_others_draws():
 
 
 def test_5_each_trial_runs_its_own_hooks_and_no_other():
-    implied = ("foundation", "lateral", "bottoming", "relaxation", "pop", "stems")
-    trial_scene = scene(*[n for n in EFFECTS if n not in implied], objects=everything())
+    layers = ("foundation", "lateral", "bottoming", "relaxation")
+    implied = (*layers, "pop", "stems", "shear")
+    added = [name for name in EFFECTS if name not in implied]
+    trial_scene = scene(*added, objects=everything(), axes=3)
     specs = tuple(specs[0] for specs in kinds(trial_scene).values())
     plan, seen = make_plan(trial_scene, specs), set()
     for i, effects in enumerate(plan.effects):

@@ -154,7 +154,8 @@ def pair_scene(first, second):
         [{**thing, **OWN_RANGES.get(family, {})}],
         trials={"count": 6, "lead_s": 0.1, "after_s": 0.7},
         spread={"place_m": 0.02, "yaw_deg": 3.0},
-        effects={"add": sorted(pair), "leave_out": sorted(own - pair)},
+        effects={"add": sorted(pair - {"shear"}), "leave_out": sorted(own - pair)},
+        skin={"axes": 3 if "shear" in pair else 1},
     )
     assert pair <= set(next(iter(kinds(trial_scene)))), pair
     return trial_scene

@@ -74,13 +74,13 @@ def place(t: Trials, i: Index) -> None:
     t.face[:] = point + skin.radius_m * normal
     angles = np.radians(np.array(skin.column_angles_deg))[:, None]
     met = np.arctan2(dot(speed, pose.rotation[1]), dot(speed, pose.rotation[0]))
-    away = np.abs(
-        angles - met - 2.0 * math.pi * np.rint((angles - met) / (2.0 * math.pi))
-    )
+    beside = angles - met - 2.0 * math.pi * np.rint((angles - met) / (2.0 * math.pi))
+    away = np.abs(beside)
     window = len(t.columns)
     first = np.argmin(away, axis=0) - window // 2
     t.columns[:] = (first + np.arange(window)[:, None]) % skin.cols
     theta = np.take_along_axis(away, t.columns, axis=0)
+    t.column_angle[:] = np.take_along_axis(beside, t.columns, axis=0)
     t.column_gaps[:] = skin.radius_m * (1.0 - np.cos(theta))
     # A narrow face ends between the columns.
     pitch = skin.radius_m * 2.0 * math.pi / skin.cols

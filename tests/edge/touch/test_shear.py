@@ -1,0 +1,237 @@
+"""Shear of a contact: whole numbers against plain loops, quantities against fractions,
+and what turns with the skin."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from edge.touch import shear
+from edge.touch.features import feature_vector
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.measures import SHEAR, ZONE_WIDTH, ZONES, Measurer, feature
+from edge.touch.region import ActiveTaxels, best_cut
+from tests.edge.touch.pressed import followed
+
+THRESHOLD = 10
+LAYOUT = SkinLayout(
+    5,
+    7,
+    threshold_counts=THRESHOLD,
+    counts_per_newton=100.0,
+    pitch_m=(0.01, 0.02),
+    axes=3,
+)
+ALL = [f"{zone}_{quantity}" for zone in ZONES for quantity in SHEAR]
+WIDTH = ZONE_WIDTH + shear.WIDTH
+
+
+def sheared_frame(seed, shape, high=32767, t=0.0) -> Frame:
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(0, 65535, shape, endpoint=True) * (rng.random(shape) < 0.4)
+    tangential = rng.integers(-high - 1, high, (*shape, 2), endpoint=True)
+    valid = rng.random(shape) < 0.9
+    return Frame(t, counts.astype(np.uint16), valid, shear=tangential.astype(np.int16))
+
+
+def measured(layout, frame) -> tuple[dict[str, list[int]], ActiveTaxels]:
+    """The whole numbers of every zone, and the frame's active taxels."""
+    active = ActiveTaxels(
+        frame.counts, THRESHOLD, valid=frame.valid, wraps=layout.wraps
+    )
+    row = Measurer(layout, ALL).measure(active, active.largest(), frame.shear)
+    return {
+        zone: row[WIDTH * i : WIDTH * (i + 1)] for i, zone in enumerate(ZONES)
+    }, active
+
+
+def looped(layout, frame, zone, active) -> list[int]:
+    """The sums of a zone's shear, taxel by taxel."""
+    mask = active.largest().mask if zone == "contact" else active.mask
+    half = layout.cols // 2
+    inside = {"left": range(half), "right": range(half, layout.cols)}
+    columns = inside.get(zone, range(layout.cols))
+    weights = [int((frame.counts * mask)[:, col].sum()) for col in range(layout.cols)]
+    cut = best_cut(weights) if layout.wraps and zone not in inside else 0
+    along = around = rows_around = cols_along = 0
+    for row in range(layout.rows):
+        for col in columns:
+            if mask[row, col]:
+                s, c = frame.shear[row, col].tolist()
+                along += s
+                around += c
+                rows_around += row * c
+                cols_along += (col + layout.cols if col < cut else col) * s
+    return [along, around, rows_around, cols_along]
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 1 << 32),
+    wraps=st.booleans(),
+    shape=st.sampled_from([(5, 7), (1, 6), (6, 1), (16, 24)]),
+)
+def test_sums_are_those_of_plain_loops(seed, wraps, shape):
+    layout = SkinLayout(*shape, wraps=wraps, threshold_counts=THRESHOLD, axes=3)
+    frame = sheared_frame(seed, shape)
+    if not ((frame.counts > THRESHOLD) & frame.valid).any():
+        return
+    zones, active = measured(layout, frame)
+    for zone in ZONES:
+        assert zones[zone][ZONE_WIDTH:] == looped(layout, frame, zone, active)
+
+
+def test_the_normal_numbers_are_the_same_with_and_without_shear():
+    frame = sheared_frame(3, LAYOUT.shape)
+    active = ActiveTaxels(frame.counts, THRESHOLD, valid=frame.valid, wraps=False)
+    plain = Measurer(LAYOUT, ["contact_force"]).measure(active, active.largest())
+    zones, _ = measured(LAYOUT, frame)
+    assert zones["contact"][:ZONE_WIDTH] == plain
+
+
+def test_a_skin_turned_by_half_gives_turned_sums():
+    frame = sheared_frame(8, LAYOUT.shape)
+    turned = Frame(
+        0.0,
+        frame.counts[::-1, ::-1],
+        frame.valid[::-1, ::-1],
+        shear=-np.maximum(frame.shear, -32767)[::-1, ::-1],
+    )
+    straight = replace(frame, shear=np.maximum(frame.shear, -32767))
+    before, after = (
+        quantities_of(measured(LAYOUT, f)[0]["skin"]) for f in (straight, turned)
+    )
+    assert after["shear_along"] == -before["shear_along"]
+    assert after["shear_around"] == -before["shear_around"]
+    assert after["shear_size"] == before["shear_size"]
+    assert after["twist"] == pytest.approx(before["twist"], rel=1e-14)
+
+
+def test_a_contact_moved_across_the_seam_keeps_its_twist():
+    layout = replace(LAYOUT, wraps=True)
+    frame = sheared_frame(8, LAYOUT.shape)
+    frame.counts[:, 4:] = 0
+    twists = []
+    for step in range(7):
+        rolled = Frame(
+            0.0,
+            np.roll(frame.counts, step, 1),
+            np.roll(frame.valid, step, 1),
+            shear=np.roll(frame.shear, step, 1),
+        )
+        twists.append(quantities_of(measured(layout, rolled)[0]["skin"])["twist"])
+    assert twists == pytest.approx(twists[:1] * 7, rel=1e-12)
+
+
+def quantities_of(row: list[int]) -> dict[str, float]:
+    values = shear.quantities(np.array([row]), LAYOUT)
+    return {name: float(value[0]) for name, value in values.items()}
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 1 << 32))
+def test_quantities_are_those_of_fractions(seed):
+    frame = sheared_frame(seed, LAYOUT.shape)
+    if not ((frame.counts > THRESHOLD) & frame.valid).any():
+        return
+    row = measured(LAYOUT, frame)[0]["skin"]
+    _, _, force, rows, cols, *_ = row
+    along, around, rows_around, cols_along = row[ZONE_WIDTH:]
+    seen = quantities_of(row)
+    assert seen["shear_along"] == along / 100.0
+    assert seen["shear_around"] == around / 100.0
+    size = Fraction(along) ** 2 + Fraction(around) ** 2
+    assert seen["shear_size"] == pytest.approx(float(size) ** 0.5 / 100.0, rel=1e-15)
+    assert seen["shear_ratio"] == pytest.approx(float(size) ** 0.5 / force, rel=1e-15)
+    first = Fraction(rows_around) - Fraction(rows, force) * around
+    second = Fraction(cols_along) - Fraction(cols, force) * along
+    twist = first * Fraction(0.01) / 100 - second * Fraction(0.02) / 100
+    scale = float(abs(first) * Fraction(0.01) + abs(second) * Fraction(0.02)) / 100
+    assert abs(seen["twist"] - float(twist)) <= 1e-15 * scale
+
+
+def test_opposite_pulls_are_a_twist_without_a_sum():
+    # A newton up on column 2, a newton down on column 4: a couple of two columns, 0.04
+    # m.
+    row = [100, 2, 200, 2 * 200, 3 * 200, 0, 0, 0, 0, 0, 0, (2 - 4) * 100]
+    assert quantities_of(row) == {
+        "shear_along": 0.0,
+        "shear_around": 0.0,
+        "shear_size": 0.0,
+        "shear_ratio": 0.0,
+        "twist": pytest.approx(0.04, rel=1e-15),
+    }
+
+
+def test_an_empty_zone_has_no_shear():
+    assert set(quantities_of([0] * WIDTH).values()) == {0.0}
+
+
+@pytest.mark.parametrize("wraps", [False, True])
+def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
+    side = 1024
+    layout = SkinLayout(side, side, wraps=wraps, axes=3)
+    tangential = np.full((side, side, 2), -32768, dtype=np.int16)
+    frame = Frame(0.0, np.full((side, side), 65535, np.uint16), shear=tangential)
+    active = ActiveTaxels(frame.counts, 0)
+    measurer = Measurer(layout, ["skin_twist"])
+    row = measurer.measure(active, active.largest(), frame.shear)
+    line = side * sum(range(side))
+    assert row[ZONE_WIDTH:] == [
+        -32768 * v for v in (side * side, side * side, line, line)
+    ]
+    # An even field has no moment about its centroid.
+    assert shear.quantities(np.array([row]), layout)["twist"].tolist() == [0.0]
+
+
+def test_features_follow_the_shear_of_a_contact():
+    frames = []
+    for step in range(3):
+        counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+        counts[2, 3] = 200
+        tangential = np.zeros((*LAYOUT.shape, 2), dtype=np.int16)
+        tangential[2, 3] = 30 * step, 40 * step
+        tangential[0, 0] = 1000  # beside the contact
+        frames.append(Frame(0.5 * step, counts, shear=tangential))
+    names = ["contact_shear_size", "contact_shear_ratio_rate", "skin_shear_around"]
+    series = followed(LAYOUT, frames, features=names).series()
+    vector = feature_vector(series, 1.0, 3, names)
+    assert vector[:3] == pytest.approx([0.0, 0.5, 1.0], rel=1e-15)
+    assert vector[3:6] == pytest.approx([0.5, 0.5, 0.5], rel=1e-15)
+    assert vector[6:] == pytest.approx([0.0, 0.4, 0.8], rel=1e-15)
+
+
+def test_a_frame_without_shear_is_named():
+    frame = replace(sheared_frame(1, LAYOUT.shape), shear=None)
+    active = ActiveTaxels(frame.counts, THRESHOLD, wraps=False)
+    with pytest.raises(InputError, match="need shear, which a frame lacks"):
+        Measurer(LAYOUT, ALL).measure(active, active.largest(), None)
+
+
+def test_components_have_no_logarithm_and_the_size_has():
+    assert feature("log_contact_shear_size").quantity == "shear_size"
+    with pytest.raises(InputError, match="may be negative"):
+        feature("log_contact_shear_along")
+    with pytest.raises(InputError, match="nearest are contact_shear_size"):
+        feature("contact_shear_sizes")
+
+
+@pytest.mark.parametrize(
+    ("still", "sentence"),
+    [
+        ((), None),
+        ((0,), "along the rows never changes"),
+        ((1,), "around the columns never changes"),
+        ((0, 1), "its shear never changes"),
+    ],
+)
+def test_an_axis_that_never_changes_is_named(still, sentence):
+    tangential = np.arange(4 * 6 * 2, dtype=np.int16).reshape(4, 2, 3, 2)
+    tangential[..., list(still)] = 7
+    said = shear.doubt(tangential)
+    assert (said is None) if sentence is None else (sentence in said)

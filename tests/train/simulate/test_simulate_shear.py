@@ -1,0 +1,170 @@
+"""The tangential load of taxels: the laws of stick, slip and partial slip, a face that
+turns, and that nothing else changes."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from tests.train.simulate.scenes import movable, one_object, run, scene
+from train.simulate.effects import shear
+from train.simulate.effects.shear import shared
+from train.simulate.run import recordings
+from train.simulate.trials import ALL
+
+SETTINGS = {"trials": {"count": 2, "after_s": 1.0}}
+THREE = {"skin": {"axes": 3}}
+STICKY_FOAM = one_object(family="foam", skin_friction=5.0, width_m=0.2)
+BRIEF = {"trials": {"count": 2, "after_s": 0.3}}
+
+
+def box(mu, **keys):
+    return one_object(skin_friction=mu, width_m=0.05, **keys)
+
+
+def water_level(pull: int, limits: list[int]) -> list[Fraction]:
+    """Pulls shared by springs, one spring at a time, in fractions."""
+    borne = [Fraction(0)] * len(limits)
+    left = Fraction(pull)
+    open_springs = [i for i, limit in enumerate(limits) if limit]
+    while open_springs and left:
+        step = min(
+            left / len(open_springs), min(limits[i] - borne[i] for i in open_springs)
+        )
+        for i in open_springs:
+            borne[i] += step
+            left -= step
+        open_springs = [i for i in open_springs if borne[i] < limits[i]]
+    return borne
+
+
+@settings(max_examples=200)
+@given(
+    limits=st.lists(st.integers(0, 50), min_size=1, max_size=9),
+    part=st.fractions(0, 1),
+)
+def test_springs_share_a_pull_until_each_slips(limits, part):
+    pull = int(part * sum(limits))
+    seen = shared(np.array([float(pull)]), np.array(limits, float)[:, None])[:, 0]
+    expected = [float(value) for value in water_level(pull, limits)]
+    assert seen.tolist() == pytest.approx(expected, abs=1e-12)
+    assert seen.sum() == pytest.approx(pull, rel=1e-14)
+
+
+def test_a_pull_beyond_all_limits_is_shared_by_them():
+    seen = shared(np.array([9.0]), np.array([[1.0], [2.0], [0.0]]))[:, 0]
+    assert seen.tolist() == pytest.approx([3.0, 6.0, 0.0], rel=1e-15)
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.4, 5.0])
+@pytest.mark.parametrize("add", [(), ("tilt",)])
+def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
+    batch = run(scene(box(mu), effects={"add": list(add)}, **SETTINGS, **THREE))
+    along = batch.trials.own["shear"].along.sum(axis=(0, 1))
+    pull = batch.trials.own["friction"].pull
+    assert (np.abs(pull) > 0.01).all()
+    np.testing.assert_allclose(along, -pull, rtol=1e-9)
+
+
+def test_taxels_that_all_stick_bear_alike():
+    t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
+    along = t.own["shear"].along
+    loaded = t.image > 0.0
+    assert loaded.sum() > 10
+    alike = t.own["friction"].pull / loaded.sum(axis=(0, 1))
+    expected = np.where(loaded, -alike, 0.0)
+    np.testing.assert_allclose(along, expected, rtol=1e-12)
+
+
+def test_taxels_that_all_slip_bear_friction_times_their_load():
+    slow = {"trials": {"count": 2, "after_s": 4.0}}
+    t = run(scene(box(0.05), **slow, **THREE)).trials
+    along = np.abs(t.own["shear"].along)
+    assert (t.force > 10.0).all()
+    # The pull obeys the load of the step before, which is less by its growth.
+    np.testing.assert_allclose(along, 0.05 * t.image, rtol=5e-3)
+
+
+def test_no_taxel_leaves_its_cone():
+    batch = run(scene(box(0.4), effects={"add": ["tilt"]}, **SETTINGS, **THREE))
+    t = batch.trials
+    size = np.hypot(t.own["shear"].along, t.own["shear"].around)
+    slack = np.maximum(np.abs(t.own["friction"].pull) / (0.4 * t.force), 1.0)
+    assert (size <= 0.4 * t.image * slack * (1.0 + 1e-12)).all()
+
+
+def test_around_the_forearm_a_load_acts_along_the_faces_normal():
+    t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
+    around = t.own["shear"].around
+    assert (t.image.any(axis=0).sum(axis=0) > 1).all()
+    expected = t.image * np.sin(t.column_angle)
+    np.testing.assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
+    # The skin is pressed away from the middle of the contact.
+    assert (around.min(axis=(0, 1)) < 0.0).all()
+    assert (around.max(axis=(0, 1)) > 0.0).all()
+
+
+def test_a_face_that_turns_takes_the_normal_with_it():
+    foam = {"family": "foam", "skin_friction": 1.0, "width_m": 0.2}
+    thing = movable(0.3, 0.2, 0.2, aside_m=0.05, foot_m=0.1, **foam)
+    t = run(scene(thing, **SETTINGS, **THREE)).trials
+    turned = t.own["turning"].turned
+    assert (turned > 0.1).all()
+    t.own["friction"].pull[:] = 0.0
+    shear.traction(t, ALL)
+    around = t.own["shear"].around
+    expected = t.image * np.sin(t.column_angle - turned)
+    assert np.count_nonzero(expected) > 20
+    np.testing.assert_allclose(around, expected, rtol=1e-12)
+    assert not t.own["shear"].along.any()
+
+
+def test_without_skin_friction_there_is_no_shear():
+    t = run(scene(one_object(), **SETTINGS, **THREE)).trials
+    assert not t.own["shear"].along.any()
+    assert not t.own["shear"].around.any()
+
+
+def test_nothing_but_the_shear_differs_from_the_scene_without_it():
+    add = {"effects": {"add": ["tilt", "noise", "dead_band"]}}
+    plain = recordings(run(scene(box(0.4), **add, **SETTINGS)))
+    three = recordings(run(scene(box(0.4), **add, **SETTINGS, **THREE)))
+    pairs = list(zip(plain, three, strict=True))
+    assert len(pairs) == 2
+    for (_, without), (_, sheared) in pairs:
+        assert without.frames.tobytes() == sheared.frames.tobytes()
+        assert without.joints.tobytes() == sheared.joints.tobytes()
+        assert without.shear is None
+        assert sheared.shear.shape == (*without.frames.shape, 2)
+        assert sheared.layout.axes == 3
+
+
+def test_both_axes_have_the_taxels_noise_and_dead_band():
+    quiet = {"add": ["noise"], "noise": {"counts": 5.0}}
+    still = scene(box(0.0), effects=quiet, **SETTINGS, **THREE)
+    (_, noisy), _ = recordings(run(still))
+    spread = noisy.shear.reshape(-1, 2).std(axis=0)
+    assert spread == pytest.approx([5.0, 5.0], rel=0.02)
+    banded = {**quiet, "add": ["noise", "dead_band"], "dead_band": {"counts": 30.0}}
+    (_, calm), _ = recordings(run(scene(box(0.0), effects=banded, **SETTINGS, **THREE)))
+    untouched = calm.frames == 0
+    assert untouched.sum() > 1000
+    assert not calm.shear[untouched].any()
+
+
+def test_a_dead_taxel_has_no_shear():
+    add = {"add": ["noise", "dead_taxels"], "dead_taxels": {"part": 0.2}}
+    (_, recording), _ = recordings(
+        run(scene(box(0.4), effects=add, **SETTINGS, **THREE))
+    )
+    assert not recording.valid.all()
+    assert not recording.shear[:, ~recording.valid].any()
+    assert recording.shear[:, recording.valid].any()
+
+
+def test_a_skin_of_one_axis_cannot_have_it():
+    with pytest.raises(InputError, match=r"it needs skin.axes = 3"):
+        scene(box(0.4), effects={"add": ["shear"]})

@@ -1,0 +1,102 @@
+"""The tangential load of each taxel, on a skin of three axes.
+
+The loads are those that the contact knows; the shear adds none and moves nothing, so a
+scene with it has the motion and the normal counts of the same scene without it.
+
+Along the forearm the taxels share the pull of skin friction (`friction`). Loaded taxels
+are springs of one stiffness that the object's face moves together, and each slips at
+Coulomb's limit, mu times its normal load. So the contact slips first where it is
+pressed least, as in Mindlin's contact (J. Applied Mechanics 16, 1949), here for springs
+side by side. Their sum is the pull.
+
+Around the forearm a taxel's load acts along the normal of the object's face, which
+differs from the taxel's own by its angle theta: load times sin(theta), as far as
+friction holds it. A face that turns takes the angle with it. An object without
+`skin_friction` leaves no shear.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from train.simulate import streams
+from train.simulate.readings import Readings
+from train.simulate.trials import Array, Index, Trials, pick, total
+
+
+@dataclass
+class Traction:
+    """Newtons on each taxel, (rows, C, n): along the rows, from elbow to wrist, and
+    around the columns."""
+
+    along: Array
+    around: Array
+
+
+IMAGES = ("along", "around")
+
+
+def stand(t: Trials, i: Index) -> None:
+    """Begin without load."""
+    empty = {name: np.zeros_like(t.image) for name in IMAGES}
+    t.keep("shear", Traction, **empty)
+
+
+def shared(pull: Array, limits: Array) -> Array:
+    """Pulls (n,) of at least 0, shared by springs (S, n) of one stiffness.
+
+    A spring bears at most its limit: min(u, limit) for the u at which all of them bear
+    the pull. A pull beyond the sum of the limits is shared in proportion to them.
+
+    Args:
+        pull: (n,) newtons.
+        limits: (S, n) newtons; 0 for a taxel without load.
+    """
+    springs = len(limits)
+    rising = np.sort(limits, axis=0)
+    below = np.add.accumulate(rising, axis=0)
+    # The pull at which the s-th weakest spring slips: all stronger ones bear as much.
+    stronger = np.arange(springs - 1, -1, -1.0)[:, None]
+    slips = below + stronger * rising
+    held = np.maximum((slips < pull).sum(axis=0), 0)
+    slipped = np.minimum(held, springs - 1)
+    lost = np.where(held > 0, np.take_along_axis(below, (held - 1)[None], axis=0)[0], 0)
+    level = (pull - lost) / (springs - slipped)
+    borne = np.minimum(limits, level)
+    whole = below[-1]
+    excess = np.where(pull > whole, pull / np.where(whole > 0.0, whole, 1.0), 1.0)
+    return np.asarray(np.where(pull > whole, limits * excess, borne))
+
+
+def traction(t: Trials, i: Index) -> None:
+    """Find the tangential load of each taxel from its normal load."""
+    state: Traction = t.own["shear"]
+    image = pick(t.image, i)
+    rubs = t.plan.also("friction", i)
+    friction = np.where(rubs, pick(t.values.get("skin_friction", t.force), i), 0.0)
+    limits = friction * image
+    pull = np.zeros(limits.shape[-1])
+    if rubs.any():
+        # Rows go from elbow to wrist, against the direction along the face.
+        pull = np.where(rubs, -pick(t.own["friction"].pull, i), 0.0)
+        pull = np.where(total(total(image)) > 0.0, pull, 0.0)
+    flat = limits.reshape(-1, limits.shape[-1])
+    along = np.sign(pull) * shared(np.abs(pull), flat).reshape(limits.shape)
+    angle = pick(t.column_angle, i)
+    if "turning" in t.own:
+        angle = angle - pick(t.own["turning"].turned, i)
+    room = np.sqrt(np.maximum(limits * limits - along * along, 0.0))
+    state.along[:, :, i] = along
+    state.around[:, :, i] = np.clip(image * np.sin(angle), -room, room)
+
+
+def sensor(readings: Readings) -> None:
+    """Read both axes as the normal one: with its noise, and its dead band."""
+    counts = readings.images["shear"]
+    scene = readings.scene
+    if "noise" in readings.effects:
+        deviation = scene.setting("noise", "counts")
+        streams.add_normal(readings.stream("shear"), deviation, counts)
+    if "dead_band" in readings.effects:
+        band = np.float32(scene.setting("dead_band", "counts"))
+        counts *= np.abs(counts) >= band
