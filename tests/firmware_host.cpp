@@ -5,13 +5,16 @@
 
 #include "protocol.h"
 
+#ifndef AXIS_COUNT
+#define AXIS_COUNT 1
+#endif
 constexpr uint16_t kTaxels = 100;
-taxels::Registers<kTaxels, WIDTH> registers;
-taxels::Link<kTaxels, WIDTH> serial_link(registers);
+taxels::Registers<kTaxels, WIDTH, AXIS_COUNT> registers;
+taxels::Link<kTaxels, WIDTH, AXIS_COUNT> serial_link(registers);
 
 static void sample() {
-  static uint16_t n = 0, values[kTaxels];
-  for (uint16_t i = 0; i < kTaxels; i++) values[i] = (i * 41 + n) & ((1u << WIDTH) - 1);
+  static uint16_t n = 0, values[registers.kValues];
+  for (uint16_t i = 0; i < registers.kValues; i++) values[i] = (i * 41 + n) & ((1u << WIDTH) - 1);
   n++;
   registers.publish(values);
 }

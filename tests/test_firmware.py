@@ -6,6 +6,7 @@ import pty
 import shutil
 import subprocess
 import tty
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from edge.bus.serial_bus import SerialBus
 from edge.chips.block import Block
 from edge.chips.chip import ChipSpec, WrongChip
+from edge.chips.three_axes import ZERO, ThreeAxisBlock, axes
 from edge.fake.bus import FakeBus
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
@@ -33,12 +35,12 @@ def spec(bits):
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory):
-    """Builds the firmware's protocol for this machine, with the given bits per
+    """Builds the firmware's protocol for this machine, with bits and axes per
     taxel."""
     folder = tmp_path_factory.mktemp("firmware")
 
-    def build(bits):
-        program = folder / f"host{bits}"
+    def build(bits, axes=1):
+        program = folder / f"host{bits}-{axes}"
         if not program.exists():
             command = [
                 "g++",
@@ -48,6 +50,7 @@ def host(tmp_path_factory):
                 "-Wextra",
                 "-Werror",
                 f"-DWIDTH={bits}",
+                f"-DAXIS_COUNT={axes}",
             ]
             source = str(ROOT / "tests" / "firmware_host.cpp")
             subprocess.run(
@@ -100,6 +103,27 @@ def test_the_driver_reads_its_registers_over_i2c(host, bits):
         assert unknown == b""
 
 
+def test_the_three_axis_driver_reads_signed_numbers(host):
+    dump = subprocess.run(
+        [host(16, 3), "dump"], capture_output=True, text=True, check=True
+    )
+    identity, _, _, _, frame, *_ = map(bytes.fromhex, dump.stdout.split("\n")[:-1])
+    assert identity[5] == 0x90
+    bus = FakeBus(chips={0x28: Registers({0x00: identity, 0x10: frame})})
+    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
+    bus.transfer(chip.frame)
+    data = chip.frame.buffer[None]
+    three = spec(16)
+    taxels, intact = ThreeAxisBlock.parse(data, replace(three, kind=ThreeAxisBlock))
+    assert intact.all()
+    sent = np.arange(3 * TAXELS).reshape(TAXELS, 3) * 41
+    assert (taxels[0].astype(int) - ZERO).tolist() == sent[:, 0].tolist()
+    shear = axes(data, TAXELS)[0, :, 1:].astype(int) - ZERO
+    assert shear.tolist() == sent[:, 1:].tolist()
+    with pytest.raises(WrongChip, match="100 taxels of 16 bits on three axes, not 100"):
+        Block(bus, 0x28, taxels=TAXELS)
+
+
 @pytest.fixture
 def plugged(host):
     """A pseudo-terminal with the firmware at its other end; gives the port's path."""
@@ -132,7 +156,9 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
 
 def test_another_shape_than_the_skin_file_says_is_named(plugged):
     bus = SerialBus(plugged[0], timeout_s=5.0)
-    with pytest.raises(WrongChip, match="serves 100 taxels of 12 bits, not 100 of 16"):
+    with pytest.raises(
+        WrongChip, match="serves 100 taxels of 12 bits, not 100 taxels of 16"
+    ):
         Block(bus, 0, taxels=TAXELS, bits=16)
     bus.close()
 

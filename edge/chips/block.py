@@ -22,6 +22,9 @@ from edge.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
 IDENTITY, FRAME = b"\x00", b"\x10"
 MAGIC = b"TAXL\x01"
 BITS = (8, 12, 16)
+THREE_AXES = 0x80
+"""The bit of the identity's bits per taxel that says that a taxel has three values, see
+`edge.chips.three_axes`."""
 UNCHANGED_FRAMES = 25
 """Readings with one sequence number after which the microcontroller hangs."""
 REST = 20946
@@ -63,6 +66,13 @@ def identity(taxels: int, bits: int) -> bytes:
     return sealed(MAGIC + bytes([bits]) + taxels.to_bytes(2, "big"))
 
 
+def described(identity: bytes) -> str:
+    """The taxels of an identity register in words."""
+    taxels = int.from_bytes(identity[6:8], "big")
+    axes = " on three axes" if identity[5] & THREE_AXES else ""
+    return f"{taxels} taxels of {identity[5] & ~THREE_AXES} bits{axes}"
+
+
 class Block(Chip):
     """One microcontroller.
 
@@ -97,19 +107,28 @@ class Block(Chip):
             WrongChip: it serves something else.
             BusError: it does not answer.
         """
-        size = 4 + data_bytes(taxels, bits)
+        size = 4 + data_bytes(self.values(taxels), bits)
         super().__init__(bus, address, FRAME, size if into is None else into)
-        self._expected = identity(taxels, bits)
+        self._expected = self.register(taxels, bits)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
         served = fetch(bus, address, IDENTITY, 10)
         if served == self._expected:
             return
         if served[:5] == MAGIC and served == sealed(served[:8]):
-            number = int.from_bytes(served[6:8], "big")
             raise self.wrong(
-                f"serves {number} taxels of {served[5]} bits, not {taxels} of {bits}"
+                f"serves {described(served)}, not {described(self._expected)}"
             )
         raise self.wrong("not a microcontroller that serves frames")
+
+    @staticmethod
+    def register(taxels: int, bits: int) -> bytes:
+        """The identity register that it must serve."""
+        return identity(taxels, bits)
+
+    @staticmethod
+    def values(taxels: int) -> int:
+        """Numbers of a frame."""
+        return taxels
 
     @classmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:

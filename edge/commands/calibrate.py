@@ -76,19 +76,45 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
         frames: the number of frames to read.
         lasts_s: the greatest time to read for.
     """
-    n, total, squares = np.zeros((3, *skin.layout.shape), dtype=np.int64)
+    normal = Sums(skin.layout.shape)
+    tangential = Sums((*skin.layout.shape, 2))
     count = 0
     for count, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
         raw, valid = skin.raw()
-        # Squares of 16 bits over 2**31 frames still fit 63 bits.
-        values = np.where(valid, raw, 0).astype(np.int64)
-        n += valid
-        total += values
-        squares += values * values
+        normal.add(raw, valid)
+        shear = skin.raw_shear()
+        if shear is not None:
+            tangential.add(shear, valid[:, :, None])
         if count == frames:
             break
-    mean, deviation = mean_and_deviation(n, total, squares)
-    return Measurement(TaxelCalibration(mean, deviation), n, count)
+    calibration = TaxelCalibration(*normal.mean_and_deviation())
+    if skin.layout.axes:
+        mean, deviation = tangential.mean_and_deviation()
+        calibration = replace(calibration, shear_baseline=mean, shear_noise=deviation)
+    return Measurement(calibration, normal.n, count)
+
+
+class Sums:
+    """Sums of valid values, in whole numbers.
+
+    Attributes:
+        n: (shape) number of valid values.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.n, self._total, self._squares = np.zeros((3, *shape), dtype=np.int64)
+
+    def add(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
+        """Add the values of a frame."""
+        # Squares of 16 bits over 2**31 frames still fit 63 bits.
+        values = np.where(valid, raw, 0).astype(np.int64)
+        self.n += valid
+        self._total += values
+        self._squares += values * values
+
+    def mean_and_deviation(self) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
+        """Rounded means and sample standard deviations."""
+        return mean_and_deviation(self.n, self._total, self._squares)
 
 
 def mean_and_deviation(

@@ -6,8 +6,9 @@ from typing import Self
 import numpy as np
 
 from edge.bus.crc import sealed
-from edge.chips.block import FRAME, IDENTITY, identity, pack
+from edge.chips.block import FRAME, IDENTITY, THREE_AXES, identity, pack
 from edge.chips.chip import ChipSpec
+from edge.chips.three_axes import AXES, ZERO, ThreeAxisBlock
 from edge.clock import TIME_ROUNDING_S
 from edge.fake.chip import FakeChip, Sense
 
@@ -18,22 +19,27 @@ RATE_HZ = 100.0
 class FakeBlock(FakeChip):
     """A model of a microcontroller that serves frames."""
 
-    def __init__(self, sense: Sense, *, taxels: int, bits: int = 16) -> None:
+    def __init__(
+        self, sense: Sense, *, taxels: int, bits: int = 16, axes: int = 1
+    ) -> None:
         """Model one.
 
         Args:
             sense: raw values at a time.
-            taxels: number of taxels that it serves.
-            bits: of one taxel.
+            taxels: number of values that it serves.
+            bits: of one value.
+            axes: values of a taxel; those of three axes go out as signed numbers.
         """
-        self._sense, self._taxels, self._bits = sense, taxels, bits
+        self._sense, self._taxels, self._bits, self._axes = sense, taxels, bits, axes
         self._pointer = 0
 
     @classmethod
     def of(
         cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
     ) -> Self:
-        """The model of a skin's chip."""
+        """The model of a skin's chip, with the axes that its driver reads."""
+        if spec.kind is ThreeAxisBlock:
+            return cls(sense, taxels=AXES * len(spec.taxels), axes=AXES)
         return cls(sense, taxels=len(spec.taxels), bits=spec.option("bits"))
 
     def reset(self) -> None:
@@ -48,10 +54,13 @@ class FakeBlock(FakeChip):
         """The identity or the frame, then zeros."""
         out = b""
         if self._pointer == IDENTITY[0]:
-            out = identity(self._taxels, self._bits)
+            flag = THREE_AXES if self._axes == AXES else 0
+            out = identity(self._taxels // self._axes, self._bits | flag)
         elif self._pointer == FRAME[0]:
             sample = int((t + TIME_ROUNDING_S) * RATE_HZ)
             values = np.minimum(self._sense(t), (1 << self._bits) - 1).astype(np.uint16)
+            if self._axes == AXES:
+                values ^= ZERO
             out = sealed(
                 (sample & 0xFFFF).to_bytes(2, "big") + pack(values, self._bits)
             )

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from edge.bus.protocol import Message, wire_bits
 from edge.chips import kinds
-from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
+from edge.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
+from edge.chips.three_axes import ZERO, ThreeAxisBlock
 from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
@@ -71,6 +72,10 @@ class Playback:
         """Counts above baseline (rows, cols) at `t`."""
         return self._frames[self._index(t)].counts
 
+    def shear(self, t: float) -> NDArray[np.int16] | None:
+        """Shear (rows, cols, 2) at `t`; None where the recording has none."""
+        return self._frames[self._index(t)].shear
+
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].joints
@@ -84,7 +89,14 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     for chip in file.chips:
         baseline.flat[chip.served] = chip.traits.rest
     noise = np.full(baseline.shape, noise_counts)
-    return replace(file, calibration=TaxelCalibration(baseline, noise))
+    calibration = TaxelCalibration(baseline, noise)
+    if file.layout.axes:
+        calibration = replace(
+            calibration,
+            shear_baseline=np.full((*baseline.shape, 2), ZERO, dtype=np.uint16),
+            shear_noise=np.full((*baseline.shape, 2), noise_counts),
+        )
+    return replace(file, calibration=calibration)
 
 
 def fake_buses(
@@ -131,6 +143,8 @@ def fake_buses(
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
             sense = _sense(chip, scene, calibration.baseline.ravel(), noise)
+            if chip.kind is ThreeAxisBlock:
+                sense = _three_axes(sense, chip, scene, calibration, noise)
             fake: type[FakeChip] = kinds.load(kinds.KINDS[chip.kind.name].model)
             model = fake.of(chip, sense, timed=timed, power_up=power_up)
             if chip.mux is None or chip.channel is None:
@@ -166,6 +180,34 @@ def _sense(
         noisy = noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(noise)]
         raw = at_rest + used * (chip.sign * counts + noisy[taxels])
         return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
+
+    return sense
+
+
+def _three_axes(
+    normal: Sense,
+    chip: ChipSpec,
+    scene: Scene,
+    calibration: TaxelCalibration,
+    noise: NDArray[np.int64],
+) -> Sense:
+    """The function that gives a chip of three axes its raw values, taxel by taxel."""
+    taxels = np.array(chip.taxels)
+    rest = np.full((len(taxels), 2), ZERO, dtype=np.int64)
+    if calibration.shear_baseline is not None:
+        rest = calibration.shear_baseline.reshape(-1, 2)[taxels].astype(np.int64)
+    shear_of = getattr(scene, "shear", lambda t: None)
+
+    def sense(t: float) -> NDArray[np.uint16]:
+        shear = shear_of(t)
+        # Other rows of the noise than the normal axis has.
+        step = int((t + TIME_ROUNDING_S) / NOISE_STEP_S)
+        rows = [noise[(step + shift) % len(noise)][taxels] for shift in (31, 62)]
+        raw = rest + np.stack(rows, axis=1)
+        if shear is not None:
+            raw += shear.reshape(-1, 2)[taxels]
+        three = np.column_stack([normal(t), np.clip(raw, 0, chip.traits.highest)])
+        return three.reshape(-1).astype(np.uint16)
 
     return sense
 
@@ -247,15 +289,16 @@ def skin_file(layout: SkinLayout) -> SkinFile:
     """Fake wiring for a skin that has only a layout: Cody's chips where its shape is
     Cody's.
 
-    Else microcontrollers that serve 16-bit frames, one for each 4000 taxels.
+    Else microcontrollers that serve 16-bit frames, one for each 4000 values.
     """
     cody = skinfile.load(skinfile.shipped("cody"))
-    if layout.shape == cody.layout.shape:
+    if layout.shape == cody.layout.shape and not layout.axes:
         return replace(cody, name="fake", layout=layout)
+    kind: type[Chip] = ThreeAxisBlock if layout.axes else kinds.driver("block")
+    most = MOST_TAXELS // (layout.axes or 1)
     taxels = range(layout.rows * layout.cols)
-    shares = [taxels[first : first + MOST_TAXELS] for first in taxels[::MOST_TAXELS]]
+    shares = [taxels[first : first + most] for first in taxels[::most]]
     chips = tuple(
-        ChipSpec(kinds.driver("block"), 0x08 + i, tuple(share))
-        for i, share in enumerate(shares)
+        ChipSpec(kind, 0x08 + i, tuple(share)) for i, share in enumerate(shares)
     )
     return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

@@ -29,6 +29,9 @@ LEAD_S = 0.3
 TAIL_S = 0.3
 """Time after it, during which its last forces go on: no touch ends within a decision's
 window."""
+LARGEST_RATIO = 0.4
+"""Tangential over normal force at the end of a touch of a skin of three axes."""
+GOLDEN_ANGLE = 2.39996
 WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
 """Where counts per newton are unknown, the strongest taxel of the weakest contact has
 the counts of this many onsets; an onset below the second number is taken to be that
@@ -73,8 +76,26 @@ def touches(
                 "source": f"a simulated touch of the demo ({path.stem}), mapped onto this skin",
                 "trial": name,
             }
-            valid = None if covered.all() else covered
-            yield name, Recording(t, counts.astype(np.uint16), valid=valid, meta=meta)
+            yield (
+                name,
+                Recording(
+                    t,
+                    counts.astype(np.uint16),
+                    valid=None if covered.all() else covered,
+                    meta=meta,
+                    shear=_shear(counts, number) if file.layout.axes else None,
+                ),
+            )
+
+
+def _shear(counts: NDArray[np.float64], number: int) -> NDArray[np.int16]:
+    """A pull of each taxel in proportion to its force, which grows and turns from trial
+    to trial: it only shows where the arrows point."""
+    grows = np.linspace(0.0, LARGEST_RATIO, len(counts))[:, None, None]
+    pull = np.minimum(grows * counts, 32767.0)
+    angle = (number + 0.5) * GOLDEN_ANGLE
+    parts = [pull * math.cos(angle), pull * math.sin(angle)]
+    return np.rint(np.stack(parts, axis=3)).astype(np.int16)
 
 
 def still(file: SkinFile, seconds: float) -> Recording:
@@ -86,7 +107,9 @@ def still(file: SkinFile, seconds: float) -> Recording:
         "source": "nothing touches",
         "trial": 0,
     }
-    return Recording(t, np.zeros((len(t), *file.layout.shape), np.uint16), meta=meta)
+    frames = np.zeros((len(t), *file.layout.shape), np.uint16)
+    shear = np.zeros((*frames.shape, 2), np.int16) if file.layout.axes else None
+    return Recording(t, frames, meta=meta, shear=shear)
 
 
 def reach(file: SkinFile) -> int:

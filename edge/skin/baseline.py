@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from edge.skin.file import SkinFile
+    from edge.skin.file import Signal, SkinFile
 
 SCALE_BITS = 12
 """The baseline is kept in 1/4096 counts, so that a slow drift is not lost to
@@ -85,10 +85,23 @@ def deaf_taxels(skin: "SkinFile") -> list[tuple[int, int]]:
 
 
 def dead_band(skin: "SkinFile") -> NDArray[np.int32]:
-    """(taxels,) counts under which a taxel reads 0; at least 1, as none is negative."""
-    least = max(1, skin.signal.dead_band_counts)
-    if skin.calibration is None:
-        return np.full(skin.layout.rows * skin.layout.cols, least, dtype=np.int32)
-    noise = skin.calibration.noise.ravel()
-    sigma = np.ceil(np.minimum(skin.signal.dead_band_sigma * noise, 65535.0))
+    """(taxels,) counts under which a taxel reads 0."""
+    noise = None if skin.calibration is None else skin.calibration.noise.ravel()
+    return dead_band_of(skin.signal, noise, skin.layout.rows * skin.layout.cols)
+
+
+def dead_band_of(
+    signal: "Signal", noise: NDArray[np.float64] | None, values: int
+) -> NDArray[np.int32]:
+    """(values,) counts under which a value reads 0; at least 1, as none is negative.
+
+    Args:
+        signal: of the skin.
+        noise: (values,) standard deviations; None without a calibration.
+        values: number of them.
+    """
+    least = max(1, signal.dead_band_counts)
+    if noise is None:
+        return np.full(values, least, dtype=np.int32)
+    sigma = np.ceil(np.minimum(signal.dead_band_sigma * noise, 65535.0))
     return np.maximum(least, sigma.astype(np.int32))

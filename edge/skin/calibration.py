@@ -26,6 +26,10 @@ def calibration_text(calibration: TaxelCalibration) -> str:
         "baseline": calibration.baseline.tolist(),
         "noise": calibration.noise.round(3).tolist(),
     }
+    if calibration.shear_baseline is not None:
+        arrays["shear_baseline"] = calibration.shear_baseline.tolist()
+    if calibration.shear_noise is not None:
+        arrays["shear_noise"] = calibration.shear_noise.round(3).tolist()
     for key, rows in arrays.items():
         lines.append(f"{key} = [\n")
         for row in rows:

@@ -72,11 +72,15 @@ class TaxelCalibration:
             read.
         noise: (rows, cols) raw counts, standard deviations.
         taken: time of measurement (UTC), or None where unknown.
+        shear_baseline, shear_noise: (rows, cols, 2) likewise of both tangential axes;
+            None on a skin of one axis.
     """
 
     baseline: NDArray[np.uint16]
     noise: NDArray[np.float64]
     taken: datetime | None = None
+    shear_baseline: NDArray[np.uint16] | None = None
+    shear_noise: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -198,6 +202,10 @@ def _calibration(
     taken = table.get("taken", None)
     if taken is not None and not isinstance(taken, datetime):
         raise table.fail("taken", "a date and time")
+    shear_rest = shear_noise = None
+    if layout.axes:
+        shear_rest = _array(table, "shear_baseline", layout, "pairs").astype(np.uint16)
+        shear_noise = _array(table, "shear_noise", layout, "pairs")
     table.done()
     baseline = rest.astype(np.uint16)
     for chip in chips:
@@ -209,7 +217,7 @@ def _calibration(
                 f"{chip.kind.name}, which tells at most {chip.traits.highest}; delete "
                 "[calibration], and calibrate again"
             )
-    return TaxelCalibration(baseline, noise, taken)
+    return TaxelCalibration(baseline, noise, taken, shear_rest, shear_noise)
 
 
 def _array(
@@ -221,7 +229,8 @@ def _array(
     except (TypeError, ValueError, OverflowError):
         # No numbers, or rows of different lengths.
         raise _no_array(table, key, layout, numbers) from None
-    if array.shape != layout.shape or not ((array >= 0) & (array <= 65535)).all():
+    shape = (*layout.shape, 2) if key.startswith("shear") else layout.shape
+    if array.shape != shape or not ((array >= 0) & (array <= 65535)).all():
         raise _no_array(table, key, layout, numbers)
     return array
 

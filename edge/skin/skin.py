@@ -102,6 +102,11 @@ class Skin:
             step_counts=file.signal.drift_counts_per_s * self.period_s,
             limit=file.signal.drift_limit_counts,
         )
+        self._shear = None
+        if file.layout.axes:
+            from edge.skin.shear import ShearReader  # few skins have three axes
+
+            self._shear = ShearReader(file, self._decoder.rows)
         self._valid = np.zeros(taxels, dtype=np.bool_)
         self._invalid_for = np.zeros(taxels, dtype=np.int64)
         """Frames in a row without a valid value of each taxel."""
@@ -245,6 +250,12 @@ class Skin:
         shape = self.layout.shape
         return self._decoder.values.reshape(shape), self._valid.reshape(shape)
 
+    def raw_shear(self) -> NDArray[np.uint16] | None:
+        """The last frame's raw shear (rows, cols, 2) of a skin of three axes."""
+        if self._shear is None:
+            return None
+        return self._shear.raw.reshape(*self.layout.shape, 2)
+
     def _assemble(self, t: float) -> Frame:
         decoder = self._decoder
         valid = decoder.decode(self._slots, t, t - self.oldest_s)
@@ -257,11 +268,16 @@ class Skin:
         if int(counts.max()) > self.touch_counts:
             self._touched_at = t
         settled = t - self._touched_at >= self.file.signal.settle_s
-        if settled and self.file.calibration is not None:
+        settled &= self.file.calibration is not None
+        if settled:
             self.baseline.follow(decoder.values, valid)
+        shear = None
+        if self._shear is not None:
+            shear = self._shear.read(valid, settled=settled)
         shape = self.layout.shape
         times = decoder.times.reshape(shape)
-        return Frame(t, counts.reshape(shape), valid.reshape(shape), times)
+        counts = counts.reshape(shape)
+        return Frame(t, counts, valid.reshape(shape), times, shear=shear)
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""

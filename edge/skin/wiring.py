@@ -57,6 +57,10 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
         _kind(table)
     tables = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     kinds = [_kind(_shared(chip, table, ("kind",))) for chip in tables]
+    if layout.axes:
+        from edge.chips.three_axes import three_axes  # few skins have them
+
+        kinds = [three_axes(kind, table) for kind in kinds]
     options = {name for kind in kinds for name in kind.options}
     for key in ("kind", "mux", "block", *options):
         table.has(key)

@@ -128,6 +128,8 @@ class Page:
             "notices": list(self._notices),
             "undo": None if self._undo is None else self._undo[0],
         }
+        if frame.shear is not None:
+            picture["shear"] = frame.shear.reshape(-1, 2).tolist()
         if schedule is not None:
             picture["missed"] = schedule.missed_ticks
             picture["rate_hz"] = round(1.0 / schedule.periods.percentile(50), 1)

@@ -31,6 +31,8 @@ REST = tuple(range(233, 242))
 """256-colour greys by force, for taxels outside every region."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 """Dark red to white by force, for the taxels of a region."""
+INK = 16
+"""Black, for arrows."""
 LOST = 18
 """Dark blue, for a taxel that cannot be read."""
 LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be read   q quits"
@@ -66,21 +68,34 @@ def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> NDArray[np.ui
     return shades
 
 
-def picture(colour: NDArray[np.uint8], *, wide: int = 2) -> str:
+def picture(
+    colour: NDArray[np.uint8],
+    *,
+    wide: int = 2,
+    arrows: Sequence[Sequence[str]] | None = None,
+) -> str:
     """Lines of half-blocks, with an escape sequence wherever the colour changes.
 
     Args:
         colour: (rows, cols) numbers in the 256-colour palette.
         wide: characters per taxel.
+        arrows: for each column of each line, an arrow that stands on the upper taxel's
+            colour in place of its half-blocks, or an empty text.
     """
     lines = []
-    for top in range(0, len(colour), 2):
+    for number, top in enumerate(range(0, len(colour), 2)):
         line = ""
-        for (upper, *lower), taxels in groupby(
-            zip(*colour[top : top + 2].tolist(), strict=True)
-        ):
+        cells = zip(*colour[top : top + 2].tolist(), strict=True)
+        signs = [""] * colour.shape[1] if arrows is None else arrows[number]
+        pairs = zip(cells, signs, strict=False)
+        for ((upper, *lower), sign), taxels in groupby(pairs):
             background = f"48;5;{lower[0]}" if lower else "49"
-            line += f"\x1b[38;5;{upper};{background}m" + "▀" * wide * len(list(taxels))
+            escape = f"\x1b[38;5;{upper};{background}m"
+            text = "▀" * wide
+            if sign:
+                escape = f"\x1b[38;5;{INK};48;5;{upper}m"
+                text = sign.ljust(wide)
+            line += escape + text * len(list(taxels))
         lines.append(line + PLAIN)
     return "\n".join(lines)
 

@@ -9,16 +9,20 @@ import numpy as np
 from edge.errors import InputError
 from edge.files import parsing, write_whole
 from edge.recording import Recording
+from edge.tools.arrows import region_shear
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
+from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import largest_region
+from edge.touch.region import Region, largest_region
 from edge.touch.track import ContactTracker, first_contact
 from train.arms import arm_of
 from train.dataset import with_thresholds
 from train.draw.sketch import draw_side
 
 FRAMES = 6
+ARROW = 2.0
+"""Taxels that the longest arrow of shear spans."""
 HORIZON_S = 2.0
 UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 
@@ -102,6 +106,16 @@ def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
     }
 
 
+def _shear(axis: Any, frame: Frame, region: Region, counts: float) -> None:
+    """Draw the shear of a region's taxels as arrows; one of `counts` spans a taxel."""
+    shear = region_shear(frame, [region])
+    assert shear is not None
+    rows, cols = np.nonzero(region.mask)
+    along, around = shear[rows, cols].T / counts
+    style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.012}
+    axis.quiver(cols, rows, around, along, color="white", **style)
+
+
 def _frames(
     figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float
 ) -> None:
@@ -112,6 +126,9 @@ def _frames(
     shown = np.searchsorted(t, times).clip(0, len(t) - 1)
     scale = layout.counts_per_newton or 1.0
     top = max(int(recording.frames[shown].max()), 1) / scale
+    longest = 1.0
+    if recording.shear is not None:
+        longest = max(float(np.abs(recording.shear[shown].astype(float)).max()), 1.0)
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     for axis, k in zip(axes, shown, strict=True):
         counts, valid = frames[k].counts, frames[k].valid
@@ -123,6 +140,8 @@ def _frames(
             counts, layout.threshold_counts, valid=valid, wraps=layout.wraps
         )
         title = f"{t[k] - onset:+.2f} s"
+        if region is not None and frames[k].shear is not None:
+            _shear(axis, frames[k], region, longest / ARROW)
         if region is not None:
             axis.contour(
                 region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2

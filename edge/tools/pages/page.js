@@ -85,8 +85,30 @@ function drawSkin(picture) {
     if (col === cols - 1 || !touched.has(i + 1)) { pen.moveTo(x + side, y); pen.lineTo(x + side, y + side); }
   }
   pen.stroke();
+  if (picture.shear) drawShear(pen, picture, touched, left, side);
   $("seam").textContent = "Rows run down, from elbow to wrist." +
     (picture.wraps ? " The last column touches the first." : "");
+}
+
+// A line from the middle of each taxel in contact: its shear, half a taxel for the strongest.
+function drawShear(pen, { cols, shear }, touched, left, side) {
+  let longest = 1;
+  for (const i of touched) longest = Math.max(longest, Math.hypot(...shear[i]));
+  pen.strokeStyle = colour("--arrow");
+  pen.fillStyle = colour("--arrow");
+  pen.lineWidth = Math.max(1, side / 12);
+  for (const i of touched) {
+    const x = left + ((i % cols) + 0.5) * side;
+    const y = (Math.floor(i / cols) + 0.5) * side;
+    const [along, around] = shear[i].map((value) => (value / longest) * 0.5 * side);
+    pen.beginPath();
+    pen.arc(x, y, pen.lineWidth, 0, 2 * Math.PI);
+    pen.fill();
+    pen.beginPath();
+    pen.moveTo(x, y);
+    pen.lineTo(x + around, y + along);
+    pen.stroke();
+  }
 }
 
 function drawCurve(id, name, unit, t, values) {

@@ -67,6 +67,14 @@ def test_a_picture_has_the_skin_and_the_contact_since_onset(page, pictures):
     assert picture["contact"]["t"][0] == 0.0
 
 
+def test_a_picture_has_shear_where_the_skin_gives_it(page, pictures):
+    for frame in frames(12):
+        page.push(replace(frame, shear=np.full((4, 6, 2), (3, -4), np.int16)))
+    assert pictures[-1]["shear"] == [[3, -4]] * 24
+    page.push(replace(frame, t=9.0))
+    assert "shear" not in pictures[-1]
+
+
 def test_pictures_come_ten_times_a_second(page, pictures):
     for frame in frames(41):
         page.push(frame)

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from edge import demo
 from edge.errors import InputError
@@ -18,6 +20,18 @@ def test_the_sketch_is_drawn_below_the_curves(tmp_path):
     assert main(["show", str(TOUCH), "--out", str(plain)]) == 0
     assert main(["show", str(TOUCH), "--scene", "--out", str(sketched)]) == 0
     assert sketched.stat().st_size > plain.stat().st_size
+
+
+def test_shear_adds_arrows(tmp_path):
+    touch = load(TOUCH)
+    quarter = (touch.frames // 4).astype(np.int16)
+    sheared = replace(touch, shear=np.stack([quarter, -quarter], axis=3))
+    draw(touch, tmp_path / "plain.png")
+    draw(sheared, tmp_path / "arrows.png")
+    plain, arrows = (imread(tmp_path / name) for name in ("plain.png", "arrows.png"))
+    assert plain.shape == arrows.shape
+    white = (arrows == 1.0).all(axis=2).sum() - (plain == 1.0).all(axis=2).sum()
+    assert white > 100
 
 
 def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(

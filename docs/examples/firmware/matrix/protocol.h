@@ -22,26 +22,30 @@ inline size_t seal(uint8_t *data, size_t n) {
   return n + 2;
 }
 
-// The registers: what a pointer selects. TAXELS up to 4000, BITS 8, 12 or 16.
-template <uint16_t TAXELS, uint8_t BITS>
+// The registers: what a pointer selects. TAXELS * AXES up to 4000, BITS 8, 12 or 16. With AXES 3, a
+// taxel is three int16: its normal force, and its shear along the rows and around the columns.
+template <uint16_t TAXELS, uint8_t BITS, uint8_t AXES = 1>
 class Registers {
  public:
-  static constexpr size_t kFrame = 2 + (static_cast<size_t>(TAXELS) * BITS + 7) / 8 + 2;
+  static_assert(AXES == 1 || (AXES == 3 && BITS == 16), "three axes have 16 bits each");
+  static constexpr uint16_t kValues = TAXELS * AXES;
+  static constexpr size_t kFrame = 2 + (static_cast<size_t>(kValues) * BITS + 7) / 8 + 2;
 
   Registers() {
-    const uint8_t identity[8] = {'T', 'A', 'X', 'L', 1, BITS, TAXELS >> 8, TAXELS & 255};
+    constexpr uint8_t bits = AXES == 3 ? BITS | 0x80 : BITS;
+    const uint8_t identity[8] = {'T', 'A', 'X', 'L', 1, bits, TAXELS >> 8, TAXELS & 255};
     memcpy(identity_, identity, 8);
     seal(identity_, 8);
     seal(frame_[0], kFrame - 2);
   }
 
-  // A new sample. An interrupt may read meanwhile: it gets the sample before, whole.
+  // A new sample of kValues numbers, signed ones as their bits. An interrupt may read meanwhile: it gets the sample before, whole.
   void publish(const uint16_t *values) {
     uint8_t *out = frame_[1 - front_];
     sequence_++;
     out[0] = sequence_ >> 8, out[1] = sequence_ & 255;
     size_t at = 2;
-    for (uint16_t i = 0; i < TAXELS; i++) {
+    for (uint16_t i = 0; i < kValues; i++) {
       const uint16_t v = values[i];
       if (BITS == 8) {
         out[at++] = static_cast<uint8_t>(v);
@@ -73,10 +77,10 @@ class Registers {
 
 // The same registers over a serial port. A request is COBS(pointer, tag, CRC-16), an answer
 // COBS(tag, register); a zero ends each.
-template <uint16_t TAXELS, uint8_t BITS>
+template <uint16_t TAXELS, uint8_t BITS, uint8_t AXES = 1>
 class Link {
  public:
-  explicit Link(const Registers<TAXELS, BITS> &registers) : registers_(registers) {}
+  explicit Link(const Registers<TAXELS, BITS, AXES> &registers) : registers_(registers) {}
 
   // Takes in a byte; calls put(byte) with the answer when a request is complete.
   template <class Put>
@@ -120,8 +124,8 @@ class Link {
     put(0);
   }
 
-  const Registers<TAXELS, BITS> &registers_;
-  uint8_t packet_[8], answer_[1 + Registers<TAXELS, BITS>::kFrame];
+  const Registers<TAXELS, BITS, AXES> &registers_;
+  uint8_t packet_[8], answer_[1 + Registers<TAXELS, BITS, AXES>::kFrame];
   size_t n_ = 0;
 };
 

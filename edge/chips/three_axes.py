@@ -1,0 +1,81 @@
+"""A microcontroller that serves frames of three axes: a `block` whose taxels have three
+values each.
+
+The highest bit of the identity's bits per taxel says so; firmware of one axis never
+sets it. A taxel is three signed numbers of 16 bits: its normal force, and its shear
+along the rows (elbow to wrist) and around the columns.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.chips.block import THREE_AXES, Block, data_bytes, identity, unpack
+from edge.chips.chip import MOST_TAXELS, Chip, ChipSpec, Option, Parsed, Traits
+from edge.config import ConfigTable
+from edge.errors import InputError
+
+AXES = 3
+BITS = 16
+ZERO = 1 << 15
+"""Added to a signed number, so that raw values are from 0 to 65535 on every chip."""
+
+
+class ThreeAxisBlock(Block):
+    """One microcontroller of three axes."""
+
+    options: ClassVar[Mapping[str, Option]] = {"bits": Option(BITS, (BITS,))}
+    rests_at_zero = False
+
+    @staticmethod
+    def register(taxels: int, bits: int) -> bytes:
+        """The identity register that it must serve."""
+        return identity(taxels, bits | THREE_AXES)
+
+    @staticmethod
+    def values(taxels: int) -> int:
+        """Numbers of a frame."""
+        return AXES * taxels
+
+    @staticmethod
+    def traits(taxels: int, options: Mapping[str, int]) -> Traits:
+        """Every signed number of 16 bits may be a taxel's.
+
+        Raises:
+            InputError: the frame of so many taxels does not fit into a message.
+        """
+        if AXES * taxels > MOST_TAXELS:
+            raise InputError(
+                f"a block of three axes serves at most {MOST_TAXELS // AXES} taxels, "
+                f"not {taxels}; use several"
+            )
+        size = 4 + data_bytes(AXES * taxels, BITS)
+        return Traits(size, (1 << BITS) - 1, rest=ZERO)
+
+    @staticmethod
+    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+        """Normal values of n microcontrollers, and which of them are intact."""
+        _, intact = Block.parse(data, spec)
+        return axes(data, len(spec.taxels))[:, :, 0], intact
+
+
+def axes(data: NDArray[np.uint8], taxels: int) -> NDArray[np.uint16]:
+    """(n, taxels, 3) raw values of n frames (n, bytes): normal, along, around."""
+    numbers = unpack(data[:, 2:-2], AXES * taxels, BITS)
+    return (numbers ^ ZERO).astype(np.uint16).reshape(len(data), taxels, AXES)
+
+
+def three_axes(kind: type[Chip], table: ConfigTable) -> type[Chip]:
+    """The driver that reads three axes of a kind of chip.
+
+    Raises:
+        InputError: the kind has one axis.
+    """
+    if kind is Block:
+        return ThreeAxisBlock
+    raise InputError(
+        f"{table.called('kind')} is {kind.name}, which gives one axis; axes = 3 needs "
+        'kind = "block"'
+    )

@@ -1,0 +1,74 @@
+"""The shear of a skin of three axes: from its chips' bytes to counts above rest."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.chips.three_axes import ZERO, axes
+from edge.skin.baseline import Baseline, dead_band_of
+from edge.skin.file import SkinFile, TaxelCalibration
+
+LARGEST = 32767
+
+
+class SignedBaseline(Baseline):
+    """The rest values of axes on which a force has two directions."""
+
+    def away(self, raw: NDArray[np.uint16]) -> NDArray[np.int16]:
+        """Counts away from the baseline (n,); 0 within the dead band."""
+        counts = raw.astype(np.int32) - self.counts
+        counts *= np.abs(counts) >= self._dead
+        return np.asarray(np.clip(counts, -LARGEST, LARGEST), dtype=np.int16)
+
+
+class ShearReader:
+    """Decodes the shear that stands beside the normal values in the chips' bytes.
+
+    Attributes:
+        raw: (taxels, 2) values of the last frame; of a taxel without a chip at rest.
+    """
+
+    def __init__(self, file: SkinFile, rows: Sequence[NDArray[np.uint8]]) -> None:
+        """Take the chips' buffers, in the file's order."""
+        self._chips = list(zip(file.chips, rows, strict=True))
+        self._shape = file.layout.shape
+        self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
+        noise = None
+        if file.calibration is not None and file.calibration.shear_noise is not None:
+            noise = file.calibration.shear_noise.ravel()
+        rest = rest_of(file.calibration, self.raw)
+        self._baseline = SignedBaseline(
+            rest.ravel(),
+            dead_band=dead_band_of(file.signal, noise, rest.size),
+            step_counts=file.signal.drift_counts_per_s / file.reading.rate_hz,
+            limit=file.signal.drift_limit_counts,
+        )
+
+    def read(self, valid: NDArray[np.bool_], *, settled: bool) -> NDArray[np.int16]:
+        """The frame's shear (rows, cols, 2); 0 of taxels that are not valid.
+
+        Args:
+            valid: (taxels,) which values of this frame are valid.
+            settled: whether the baseline follows drift in this frame.
+        """
+        for chip, data in self._chips:
+            parsed = axes(data[None], len(chip.taxels))[0, :, 1:]
+            for stage, taxel in enumerate(chip.taxels):
+                if taxel >= 0:
+                    self.raw[taxel] = parsed[stage]
+        flat = self.raw.ravel()
+        both = np.repeat(valid, 2)
+        counts = self._baseline.away(flat) * both
+        if settled:
+            self._baseline.follow(flat, both)
+        return np.asarray(counts.reshape(*self._shape, 2))
+
+
+def rest_of(
+    calibration: TaxelCalibration | None, zero: NDArray[np.uint16]
+) -> NDArray[np.uint16]:
+    """(taxels, 2) rest values; the middle of the range without a calibration."""
+    if calibration is None or calibration.shear_baseline is None:
+        return zero.copy()
+    return calibration.shear_baseline.reshape(zero.shape)

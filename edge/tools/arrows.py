@@ -1,0 +1,41 @@
+"""Shear as short arrows, for pictures of a skin of three axes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.frame import Frame
+from edge.touch.region import Region
+
+WAYS = "→↘↓↙←↖↑↗"
+"""Eighths of a turn from the columns' direction towards that of the rows, which run
+down."""
+SHORTEST = 0.2
+"""Arrows are left out below this part of the frame's longest one."""
+
+
+def region_shear(frame: Frame, regions: Sequence[Region]) -> NDArray[np.int64] | None:
+    """(rows, cols, 2) the shear of the taxels in contact; None on a skin of one axis."""
+    if frame.shear is None:
+        return None
+    touched = np.zeros(frame.counts.shape, dtype=np.bool_)
+    for region in regions:
+        touched |= region.mask
+    return np.asarray(frame.shear.astype(np.int64) * touched[:, :, None])
+
+
+def characters(shear: NDArray[np.int64]) -> list[list[str]]:
+    """An arrow, or an empty text, for each column of each two rows of taxels."""
+    lines = []
+    longest = np.hypot(shear[..., 0], shear[..., 1]).max(initial=0.0)
+    for top in range(0, len(shear), 2):
+        along, around = shear[top : top + 2].sum(axis=0).T
+        sizes = np.hypot(along, around)
+        eighths = np.rint(np.arctan2(along, around) / (np.pi / 4)).astype(int) % 8
+        shown = sizes > SHORTEST * longest
+        line = []
+        for eighth, visible in zip(eighths.tolist(), shown.tolist(), strict=True):
+            line.append(WAYS[eighth] if visible else "")
+        lines.append(line)
+    return lines

@@ -1,0 +1,100 @@
+"""A microcontroller of three axes: signed numbers on the wire, its flag, and the chips
+that cannot be one."""
+
+import numpy as np
+import pytest
+
+from edge.chips.block import Block, pack
+from edge.chips.chip import ChipSpec, WrongChip
+from edge.chips.three_axes import ZERO, ThreeAxisBlock, axes
+from edge.errors import InputError
+from edge.fake.block import FakeBlock
+from edge.fake.bus import FakeBus
+from edge.skin.file import parse
+
+TAXELS = 5
+SPEC = ChipSpec(ThreeAxisBlock, 0x28, tuple(range(TAXELS)))
+PAD = """
+[skin]
+rows = 2
+cols = 3
+axes = 3
+[[bus]]
+device = 1
+kind = "{kind}"
+chips = [{{ address = {address}, {taxels} }}]
+"""
+
+
+def numbers() -> np.ndarray:
+    """(taxels, 3) signed numbers, with both ends of the range."""
+    values = np.random.default_rng(7).integers(-(1 << 15), 1 << 15, (TAXELS, 3))
+    values[0] = -32768, 32767, 0
+    return values
+
+
+def served() -> FakeBus:
+    raw = (numbers() + ZERO).reshape(-1).astype(np.uint16)
+    fake = FakeBlock(lambda t: raw, taxels=3 * TAXELS, axes=3)
+    return FakeBus(chips={0x28: fake})
+
+
+def test_each_taxel_is_three_signed_numbers_on_the_wire():
+    bus = served()
+    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
+    bus.transfer(chip.frame)
+    wire = pack(numbers().reshape(-1).astype(np.uint16), 16)
+    assert chip.frame.buffer[2:-2].tobytes() == wire
+
+
+def test_the_normal_values_are_parsed_apart_from_the_shear():
+    bus = served()
+    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
+    bus.transfer(chip.frame)
+    values, intact = ThreeAxisBlock.parse(chip.frame.buffer[None], SPEC)
+    assert intact.all()
+    assert (values[0].astype(int) - ZERO).tolist() == numbers()[:, 0].tolist()
+    shear = axes(chip.frame.buffer[None], TAXELS)[0, :, 1:]
+    assert (shear.astype(int) - ZERO).tolist() == numbers()[:, 1:].tolist()
+
+
+def test_a_flipped_bit_spoils_the_frame():
+    bus = served()
+    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
+    bus.transfer(chip.frame)
+    data = chip.frame.buffer[None].copy()
+    data[0, 9] ^= 1
+    assert not ThreeAxisBlock.parse(data, SPEC)[1].any()
+
+
+def test_firmware_of_one_axis_is_not_taken_for_three():
+    bus = FakeBus(
+        chips={0x28: FakeBlock(lambda t: np.zeros(TAXELS, np.uint16), taxels=TAXELS)}
+    )
+    with pytest.raises(WrongChip, match="serves 5 taxels of 16 bits, not 5 taxels of"):
+        ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
+    with pytest.raises(WrongChip, match="16 bits on three axes, not 5 taxels of 16"):
+        Block(served(), 0x28, taxels=TAXELS)
+
+
+def test_a_skin_of_three_axes_reads_its_blocks_so():
+    block = PAD.format(kind="block", address="0x28", taxels="first=[0,0], block=[2,3]")
+    (chip,) = parse(block).chips
+    assert chip.kind is ThreeAxisBlock
+    assert chip.traits.frame_bytes == 4 + 6 * 6
+    one = parse(block.replace("axes = 3", "axes = 1"))
+    assert one.chips[0].kind is Block
+    assert one.layout.axes is None
+
+
+def test_a_chip_of_one_axis_is_refused():
+    text = PAD.format(kind="mpr121", address="0x5a", taxels="first=[0,0], block=[2,3]")
+    with pytest.raises(InputError, match=r"is mpr121, which gives one axis; axes = 3"):
+        parse(text)
+
+
+def test_more_taxels_than_a_message_holds_are_refused():
+    text = PAD.format(kind="block", address="0x28", taxels="first=[0,0], block=[40,40]")
+    large = text.replace("rows = 2", "rows = 40").replace("cols = 3", "cols = 40")
+    with pytest.raises(InputError, match="serves at most 1333 taxels, not 1600"):
+        parse(large)
