@@ -459,7 +459,7 @@ def save(
     why = doubt(recording.t, recording.frames, skin, recording.layout.onset)
     if why is not None:
         LOG.warning(f"{name}: {why}")
-    if recording.shear is not None:
+    if recording.shear is not None and "simulation" not in recording.meta:
         from edge.touch import shear  # few skins have three axes
 
         still = shear.doubt(recording.shear)

@@ -97,6 +97,8 @@ class Rub:
 
     def __init__(self, model: Any, friction: float) -> None:
         self.model, self.friction, self.stretch = model, friction, 0.0
+        self.pull = 0.0
+        """Newtons on the arm from elbow to wrist in the last step."""
         self.pads = [
             i for i in range(model.nbody) if model.body(i).name.startswith("pad")
         ]
@@ -107,7 +109,7 @@ class Rub:
         data.qfrc_applied[:] = 0.0
         most = self.friction * float(loads.sum())
         if most == 0.0:
-            self.stretch = 0.0
+            self.stretch = self.pull = 0.0
             return
         point = loads @ data.xpos[self.pads] / loads.sum()
         along = data.xmat[self.arm].reshape(3, 3)[:, 2]
@@ -116,6 +118,7 @@ class Rub:
         )
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
         pull = min(max(pull, -most), most)
+        self.pull = pull
         stretch, longest = (
             self.stretch + slips * self.model.opt.timestep,
             most / SHEAR_N_M,

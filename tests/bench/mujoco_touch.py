@@ -24,6 +24,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from tests.bench import mujoco_layer
 from tests.bench.mujoco_layer import ABOVE_FLOOR_M
+from tests.bench.mujoco_shear import Tangents
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
 MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
@@ -284,11 +285,14 @@ def simulate(
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
     loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
+    tangents = Tangents(model, where)
+    pulls = np.zeros((*loads.shape, 2))
     joints, places = np.zeros((len(t), dof)), np.zeros((len(t), 3))
     row, column = np.array(where).T
     body = data.body("thing")
     for i in range(len(t)):
         loads[i, row, column] = pressed()
+        pulls[i, row, column] = tangents.read(data, pressed(), rub)
         joints[i] = data.qpos[:dof]
         places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
         for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
@@ -297,9 +301,12 @@ def simulate(
                 rub.hold(data, pressed())
             mujoco.mj_step(model, data)
     counts = loads * COUNTS_PER_NEWTON
+    sheared = pulls * COUNTS_PER_NEWTON
     if touch.noise is not None:
         size, generator = touch.noise
         counts += generator.normal(0.0, size, counts.shape)
+        sheared += generator.spawn(1)[0].normal(0.0, size, sheared.shape)
+    shear = np.where(np.abs(sheared) < 35.0, 0.0, np.clip(sheared, -17e3, 17e3))
     frames = np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16)
     condition = "fixed" if touch.fixed else "movable"
     soft = "soft" if thing.soft else "rigid"
@@ -309,6 +316,7 @@ def simulate(
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
     source = "MuJoCo, tests/bench/mujoco_touch.py"
     meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
-    recording = Recording(t, frames, joints=joints, meta=meta)
+    whole = np.rint(shear).astype(np.int16)
+    recording = Recording(t, frames, joints=joints, meta=meta, shear=whole)
     moved_m = np.hypot(*(places - places[0])[:, :2].T)
     return recording, loads.sum(axis=(1, 2)), moved_m

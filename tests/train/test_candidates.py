@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.train.test_agreement import TASKS
-from train.candidates import PLAIN, WITH_JOINTS, candidates, costs
+from train.candidates import PLAIN, WITH_JOINTS, WITH_SHEAR, candidates, costs
 from train.feature_sets import expand
 from train.pipeline import Choice
 
@@ -44,6 +44,22 @@ def test_features_of_joints_are_candidates_where_recordings_have_them():
         WITH_JOINTS
     )
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
+
+
+def test_features_of_shear_are_candidates_where_recordings_have_it():
+    plain = {c.sets for c in candidates(TASKS, joints=True)}
+    sheared = {c.sets for c in candidates(TASKS, joints=True, shear=True)}
+    assert sheared - plain == {(*sets, "joints") for sets in WITH_SHEAR}
+    assert plain <= sheared
+    without_joints = {c.sets for c in candidates(TASKS, shear=True)}
+    assert without_joints == {*PLAIN, *WITH_SHEAR}
+    quick = {c.sets for c in candidates(TASKS, shear=True, quick=True)}
+    assert quick == {*PLAIN[:3], *WITH_SHEAR}
+
+
+def test_simulated_things_of_several_kinds_are_decided_without_shear():
+    drawn = {c.sets for c in candidates(TASKS, shear=True, drawn=True)}
+    assert drawn == {("contact",)}
 
 
 def test_every_feature_set_but_the_papers_is_tried_with_both_projections():

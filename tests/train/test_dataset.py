@@ -9,10 +9,11 @@ import pytest
 from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
+from edge.model.verify import verify
 from edge.recording import load, save
 from edge.touch.arm import Chain, Joint
 from edge.touch.features import feature_vector
-from tests.conftest import in_a_row
+from tests.conftest import export, in_a_row
 from train.dataset import load_trials
 
 
@@ -45,6 +46,52 @@ def test_several_processes_follow_the_contacts_as_one_does(recordings, folder):
         InputError, match=r"soft_9.npz: meta.contacts labels 2 contacts, 1 "
     ):
         load_trials([folder], jobs=2)
+
+
+@pytest.fixture(scope="module")
+def sheared(recordings, tmp_path_factory):
+    """The recordings of a skin of three axes, whose shear is part of their counts."""
+    folder = tmp_path_factory.mktemp("sheared")
+    for number, path in enumerate(sorted(recordings.glob("*.npz"))):
+        touch = load(path)
+        along = (touch.frames // (2 + number % 3)).astype(np.int16)
+        shear = np.stack([along, -along // 2], axis=3)
+        save(folder / path.name, replace(touch, shear=shear))
+    return folder
+
+
+def test_features_of_shear_are_measured_where_recordings_have_it(sheared):
+    names = ["max_force", "contact_shear_ratio"]
+    data = load_trials([sheared], features=names)
+    assert data.layout.axes == 3
+    assert data.features(0.5, 5).shape == (16, 10)
+    assert data.of(["max_force"]).layout.axes is None
+    assert load_trials([sheared]).layout.axes is None
+
+
+def test_recordings_without_shear_are_left_out_and_named(sheared, recordings, tmp_path):
+    shutil.copytree(sheared, tmp_path / "data")
+    shutil.copy(recordings / "hard_0.npz", tmp_path / "data" / "plain.npz")
+    data = load_trials([tmp_path / "data"], features=["skin_shear_size"])
+    assert [path.name for path in data.left_out["shear"]] == ["plain.npz"]
+    assert len(data.trials) == 16
+    with pytest.raises(InputError, match="no recording has shear"):
+        load_trials([recordings], features=["skin_shear_size"])
+
+
+def test_a_model_of_shear_is_verified_and_refuses_a_skin_without_it(
+    sheared, recordings, tmp_path, capsys
+):
+    features = ("--features", "contact", "shear", "--projection", "pca")
+    export(tmp_path, "--data", sheared, "--quick", *features)
+    model = Model(tmp_path / "model.onnx")
+    assert model.info.layout.axes == 3
+    checks = verify(model, tmp_path / "golden.npz")
+    assert len(checks) > 5
+    assert all(check.passed for check in checks)
+    plain = load(recordings / "hard_0.npz")
+    with pytest.raises(InputError, match="needs shear, which this skin does not give"):
+        Classifier(model, plain.layout)
 
 
 def test_training_and_the_board_compute_the_same_bits(recordings, exported):

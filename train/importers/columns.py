@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from edge.config import shown
 from edge.errors import InputError
+from train.importers.axes import lettered
 from train.importers.reading import Table, numbers_of
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -248,9 +249,10 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
             f"{table.path}: are the taxels {groups}? Name them by --taxels, and joint "
             "angles by --joints"
         )
+    three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
     raise InputError(
         f"{table.path}: no columns are named as taxels, such as s1 to s16; name them "
-        f"by --taxels, among {shown(list(rest))}"
+        f"by --taxels{three}, among {shown(list(rest))}"
     )
 
 

@@ -11,7 +11,8 @@ and `value` with a row for each value; its columns of text are labels. COLS are 
 ranges or numbers from 1, such as `s1-s9,force` or `3-5`. `skin.json` in the folder is
 the `skin` of the recordings. With `--frames`, a folder holds a folder for each trial,
 with a file for each frame: a line a row. A file that cannot be used is named and left
-out.
+out. Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see
+--axes.
 """
 
 import argparse
@@ -32,6 +33,15 @@ from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers import arrays
+from train.importers.axes import (
+    Axes,
+    Parted,
+    axis_letters,
+    counts_of,
+    flipped_letters,
+    parted,
+    shear_of,
+)
 from train.importers.columns import (
     UNITS,
     Meaning,
@@ -124,6 +134,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="object",
         help="the task of these labels (default: %(default)s)",
     )
+    add(
+        "--axes",
+        type=axis_letters,
+        metavar="XYZ",
+        help="columns such as s1_x, s1_y, s1_z: the letters of the axes along the rows, "
+        "around the columns, and of the normal force",
+    )
+    add(
+        "--flip",
+        type=flipped_letters,
+        metavar="XYZ",
+        help="letters of the axes whose sign is turned round",
+    )
     add("--strict", action="store_true", help="stop at the first file that is unusable")
 
 
@@ -156,6 +179,7 @@ class Measured:
         values: (n, taxels); NaN where one is missing.
         joints: (n, dof) radians, or None.
         meaning: of the columns.
+        shear: (n, taxels, 2) values of the other two axes, or None.
     """
 
     source: Source
@@ -163,6 +187,7 @@ class Measured:
     values: NDArray[np.float64]
     joints: NDArray[np.float64] | None
     meaning: Meaning
+    shear: NDArray[np.float64] | None = None
 
 
 def trials(
@@ -176,6 +201,7 @@ def trials(
         InputError: no file can be used, or one cannot with `--strict`.
     """
     options.skipped = []
+    axes = Axes.of(options)
     folder = path if path.is_dir() else path.parent
     measured = list(_understood(_collected(path, folder, options), options))
     if not measured:
@@ -189,6 +215,8 @@ def trials(
     first = measured[0]
     shape = _shape(options.shape, first, skin)
     _announce(first, shape, beside is not None)
+    if axes is not None:
+        say(axes.text)
     rest = _rest(measured, options)
     missing = 0
     imported = 0
@@ -222,9 +250,7 @@ def _others(labels: dict[str, str], task: str) -> dict[str, str]:
 
 
 def _with_meta(recording: Recording, meta: dict[str, Any]) -> Recording:
-    return Recording(
-        recording.t, recording.frames, recording.joints, recording.valid, meta
-    )
+    return replace(recording, meta=meta)
 
 
 def _more(skipped: Sequence[str]) -> str:
@@ -509,11 +535,21 @@ def _compare(trial: Measured, first: Measured) -> None:
 
 def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Measured:
     """The numbers of a trial."""
-    table = source.table
+    axes = Axes.of(options)
+    whole = source.table
+    part = Parted(whole, {}) if axes is None else parted(whole, axes)
+    table = part.table
+    source = replace(source, table=table)
+    if axes is not None:
+        source = replace(source, names=table.names)
     if table.shape and not wishes.taxels:
         wishes = _all_of_the_array(table, wishes)
     taken = meaning(table, source.names if table.named else table.names, wishes)
     values = np.column_stack([numbers_of(table, name) for name in taken.taxels])
+    shear = None
+    if axes is not None:
+        values *= axes.sign(axes.normal)
+        shear = shear_of(whole, part, taken.taxels, axes)
     values[~np.isfinite(values)] = np.nan
     if np.isnan(values).all():
         raise InputError(f"{table.path}: none of its values is a finite number")
@@ -527,7 +563,7 @@ def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Me
         angles = [numbers_of(table, name) for name in taken.joints]
         joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
     head = replace(table, data=table.data.iloc[:0])
-    return Measured(replace(source, table=head), t, values, joints, taken)
+    return Measured(replace(source, table=head), t, values, joints, taken, shear)
 
 
 def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
@@ -551,11 +587,13 @@ class Rest:
         values: (taxels,) at rest; None where they are counts as they stand.
         sign: of the pressure; 0 where both directions count.
         scale: counts a unit of value.
+        shear: (taxels, 2) shear at rest, or None.
     """
 
     values: NDArray[np.float64] | None
     sign: int
     scale: float
+    shear: NDArray[np.float64] | None = None
 
     def counts(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values as counts, not rounded."""
@@ -575,15 +613,25 @@ def _rest(measured: Sequence[Measured], options: argparse.Namespace) -> Rest:
         return Rest(None, 1, options.scale)
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in measured])
     if options.falls:
-        return Rest(max(starts, key=np.nansum), -1, options.scale)
+        quietest = int(np.nansum(starts, axis=1).argmax())
+        shear = _shear_at_rest(measured[quietest])
+        return Rest(starts[quietest], -1, options.scale, shear)
     middle = np.nanmedian(starts, axis=0)
     unrest = np.nansum(np.abs(starts - middle), axis=1)
-    values = starts[int(unrest.argmin())]
+    quietest = int(unrest.argmin())
+    values = starts[quietest]
     largest = max(float(np.nanmax(np.abs(m.values - values))) for m in measured)
     scale = options.scale
     if scale == 1.0 and largest > 0.0:
         scale = _finest([m.values - values for m in measured], largest)
-    return Rest(values, 0, scale)
+    return Rest(values, 0, scale, _shear_at_rest(measured[quietest]))
+
+
+def _shear_at_rest(trial: Measured) -> NDArray[np.float64] | None:
+    """(taxels, 2) shear at the start of a trial."""
+    if trial.shear is None:
+        return None
+    return np.asarray(np.median(trial.shear[:START], axis=0))
 
 
 def _finest(deviations: Sequence[NDArray[np.float64]], largest: float) -> float:
@@ -627,7 +675,13 @@ def _recording(
         frames[rows] = np.rint(counts)
     seen = None if valid.all() else valid.reshape(-1, *shape)
     t = trial.t - trial.t[0]
-    return Recording(t, frames.reshape(-1, *shape), trial.joints, seen, meta)
+    shear = None
+    if trial.shear is not None:
+        unloaded = np.float64(0.0) if rest.shear is None else rest.shear
+        tangential = counts_of(path, trial.shear - unloaded, rest.scale)
+        shear = tangential.reshape(-1, *shape, 2)
+        meta["skin"]["axes"] = 3
+    return Recording(t, frames.reshape(-1, *shape), trial.joints, seen, meta, shear)
 
 
 def _check_counts(path: Path, counts: NDArray[np.float64], exact: bool) -> None:

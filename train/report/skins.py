@@ -84,7 +84,12 @@ def pooled(recording: Recording, layout: SkinLayout) -> Recording:
         valid = pool(valid, np.logical_or)
     counts = np.minimum(pool(frames), 65535).astype(np.uint16)
     meta = {**recording.meta, "skin": layout.to_dict()}
-    return replace(recording, frames=counts, valid=valid, meta=meta)
+    shear = None
+    if recording.shear is not None:
+        axes = np.moveaxis(recording.shear.astype(np.int32), -1, 0)
+        sums = np.stack([pool(axis) for axis in axes], axis=-1)
+        shear = np.clip(sums, -32767, 32767).astype(np.int16)
+    return replace(recording, frames=counts, valid=valid, meta=meta, shear=shear)
 
 
 def coarser(

@@ -18,6 +18,7 @@ from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
 from train.report.work import Workers
+from train.tradeoff import shear
 from train.tradeoff.board import ESTIMATED, estimated_s
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
@@ -107,6 +108,8 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
             given={"features": ["paper"]},
         )
     )
+    if dataset.layout.axes:
+        cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
     y = {task: dataset.labels(task) for task in dataset.tasks}
     for part in PARTS:
         kept = dataset.part(stratified_folds(y[finest(y)], part) == 0)

@@ -8,6 +8,7 @@ from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.early import StoppingComparison
+from train.tradeoff.shear import Compared
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Measured:
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
         formats: the number formats (`board.read_formats`); empty if unknown.
+        shear: the choices with shear and without; None of recordings without it.
     """
 
     y: Labels
@@ -39,6 +41,7 @@ class Measured:
     wrong: float = 10.0
     second: float = 1.0
     formats: Sequence[Mapping[str, str | float]] = ()
+    shear: Compared | None = None
 
     @property
     def after_s(self) -> float:

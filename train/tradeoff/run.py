@@ -14,7 +14,7 @@ from train.report.page import write
 from train.report.section import Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
-from train.tradeoff import answer, costs, early
+from train.tradeoff import answer, costs, early, shear
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import WINDOWS_S, chosen, followed
@@ -101,17 +101,23 @@ def tradeoff(
     made = workers.map("windows", chosen, [(dataset, window) for window in WINDOWS_S])
     points = dict(zip(WINDOWS_S, made, strict=True))
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
+    comparisons = early.compare_stopping(dataset, WINDOWS_S, jobs=jobs)
+    sheared = None
+    if dataset.layout.axes:
+        measured_with = shear.Answers(points, comparisons)
+        sheared = shear.compared(dataset, measured_with, workers)
     measured = Measured(
         y=y,
         board=board,
         wire_s=waited_s(dataset.layout, rate),
         breakaways={} if scene is None else breakaway_times(scene),
         points=points,
-        comparisons=early.compare_stopping(dataset, WINDOWS_S, jobs=jobs),
+        comparisons=comparisons,
         costs=costs.measure(raw, dataset, points, rate, workers),
         wrong=wrong,
         second=second,
         formats=formats,
+        shear=sheared,
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     lead = [
@@ -122,6 +128,8 @@ def tradeoff(
         f"{counted(len(dataset.trials), 'contact')}{simulated}."
     ]
     sections = [make(measured) for make in SECTIONS]
+    if sheared is not None:
+        sections.insert(1, shear.section(sheared))
     report = write(out, "Accuracy against time", lead, sections)
     best = ParetoFront.of(points, main, measured.after_s).to_dict(dataset.digest)
     with write_whole(out / "front.json") as file:

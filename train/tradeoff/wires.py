@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from edge.chips.ad7147 import AD7147
 from edge.chips.block import Block
 from edge.chips.chip import UNUSED, ChipSpec
+from edge.chips.three_axes import ThreeAxisBlock
 from edge.fake.player import frame_bits
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
@@ -81,8 +82,11 @@ def wires(layout: SkinLayout) -> list[Wire]:
 
     They are AD7147 on one to three buses, as far as the skin has chips for them and
     they fit; MPR121 as in the shipped skin file, for a skin of its shape; and a
-    microcontroller that serves 16-bit frames at 1 MHz.
+    microcontroller that serves 16-bit frames at 1 MHz. The last is the only one that
+    carries three axes; the others then stand for a skin without shear.
     """
+    last = microcontroller(layout)
+    layout = replace(layout, axes=None)
     taxels = layout.rows * layout.cols
     chips = -(-taxels // STAGES)
     choices = []
@@ -92,10 +96,15 @@ def wires(layout: SkinLayout) -> list[Wire]:
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     if shipped.layout.shape == layout.shape:
         choices.append(wire("MPR121", replace(shipped, layout=layout)))
-    chip = ChipSpec(Block, 0x08, tuple(range(taxels)))
+    return [*choices, last]
+
+
+def microcontroller(layout: SkinLayout) -> Wire:
+    """A microcontroller that serves 16-bit frames at 1 MHz, of all axes of the skin."""
+    kind = ThreeAxisBlock if layout.axes else Block
+    chip = ChipSpec(kind, 0x08, tuple(range(layout.rows * layout.cols)))
     served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
-    choices.append(wire("microcontroller", served))
-    return choices
+    return wire("microcontroller", served)
 
 
 def waited_s(layout: SkinLayout, rate_hz: float) -> float:
@@ -103,9 +112,9 @@ def waited_s(layout: SkinLayout, rate_hz: float) -> float:
 
     The next frame begins after half a period on average, and takes the wire's time. The
     wire is that of AD7147 on three buses, which carry the paper's 100 frames a second,
-    or else the fastest.
+    or else the fastest; of three axes that of the microcontroller.
     """
-    choices = wires(layout)
+    choices = [microcontroller(layout)] if layout.axes else wires(layout)
     fastest = min(choices, key=lambda choice: choice.frame_s)
     used = next(
         (choice for choice in choices if choice.name.startswith("AD7147, 3")), fastest

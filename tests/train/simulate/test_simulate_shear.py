@@ -66,7 +66,18 @@ def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
     along = batch.trials.own["shear"].along.sum(axis=(0, 1))
     pull = batch.trials.own["friction"].pull
     assert (np.abs(pull) > 0.01).all()
-    np.testing.assert_allclose(along, -pull, rtol=1e-9)
+    np.testing.assert_allclose(along, pull, rtol=1e-9)
+
+
+def test_the_skin_is_drawn_against_its_own_motion():
+    t = run(scene(box(0.4), **SETTINGS, **THREE)).trials
+    stretch = t.own["friction"].stretch
+    assert (stretch < 0.0).all()  # the skin has moved against the face's direction
+    forearm = t.kinematics.pose(t.q).rotation[2]
+    towards_wrist = -(t.along_face * forearm).sum(axis=0)
+    moved = np.sign(stretch * towards_wrist)
+    pulled = np.sign(t.own["shear"].along.sum(axis=(0, 1)))
+    assert (moved == -pulled).all()
 
 
 def test_taxels_that_all_stick_bear_alike():
@@ -75,7 +86,7 @@ def test_taxels_that_all_stick_bear_alike():
     loaded = t.image > 0.0
     assert loaded.sum() > 10
     alike = t.own["friction"].pull / loaded.sum(axis=(0, 1))
-    expected = np.where(loaded, -alike, 0.0)
+    expected = np.where(loaded, alike, 0.0)
     np.testing.assert_allclose(along, expected, rtol=1e-12)
 
 

@@ -11,8 +11,9 @@ side by side. Their sum is the pull.
 
 Around the forearm a taxel's load acts along the normal of the object's face, which
 differs from the taxel's own by its angle theta: load times sin(theta), as far as
-friction holds it. A face that turns takes the angle with it. An object without
-`skin_friction` leaves no shear.
+friction holds it. A face that turns takes the angle with it. Friction against a motion
+around the forearm is left out, as the arm does not feel it either (`make matched` has
+its size). An object without `skin_friction` leaves no shear.
 """
 
 from dataclasses import dataclass
@@ -77,8 +78,9 @@ def traction(t: Trials, i: Index) -> None:
     limits = friction * image
     pull = np.zeros(limits.shape[-1])
     if rubs.any():
-        # Rows go from elbow to wrist, against the direction along the face.
-        pull = np.where(rubs, -pick(t.own["friction"].pull, i), 0.0)
+        # The face draws the skin against the skin's own motion, and the rows run
+        # against the direction along the face.
+        pull = np.where(rubs, pick(t.own["friction"].pull, i), 0.0)
         pull = np.where(total(total(image)) > 0.0, pull, 0.0)
     flat = limits.reshape(-1, limits.shape[-1])
     along = np.sign(pull) * shared(np.abs(pull), flat).reshape(limits.shape)

@@ -1,0 +1,88 @@
+"""What shear buys: times to an accuracy, paired gains, and its price on the wire."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from train.choose import Chosen
+from train.evaluate import Promise
+from train.pipeline import Choice
+from train.tradeoff import shear
+from train.tradeoff.shear import KNOWN, UNMET, Answers, Compared
+from train.tradeoff.wires import microcontroller, waited_s
+
+
+def chosen(right: int, unmet: int | None = None) -> Chosen:
+    """A choice that answers so many of 10 trials rightly."""
+
+    def result(count: int) -> Promise:
+        return Promise(count, 10, hits=np.arange(10) < count)
+
+    left_out = "trial" if unmet is None else "object"
+    other = result(right if unmet is None else unmet)
+    return Chosen(Choice("IV", 1, 1), other, result(right), left_out)
+
+
+def answers(shares, unmet=None, early=()) -> Answers:
+    """Answers about mobility at windows of 0.2, 0.4, ... s."""
+    unmet = unmet or [None] * len(shares)
+    points = {}
+    for i, (share, other) in enumerate(zip(shares, unmet, strict=True)):
+        points[round(0.2 * (i + 1), 1)] = {"mobility": chosen(share, other)}
+    rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
+    return Answers(points, {"mobility": SimpleNamespace(certified=rules)})
+
+
+def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
+    made = answers([9, 7, 9, 8])
+    assert shear.reached_s(made, "mobility", KNOWN, 0.9) is None
+    assert shear.reached_s(made, "mobility", KNOWN, 0.8) == 0.6
+    assert shear.reached_s(made, "mobility", KNOWN, 0.7) == 0.2
+
+
+def test_objects_never_met_have_times_of_their_own():
+    made = answers([9, 9], unmet=[5, 8])
+    assert shear.reached_s(made, "mobility", UNMET, 0.8) == 0.4
+    assert shear.reached_s(answers([9, 9]), "mobility", UNMET, 0.1) is None
+
+
+def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
+    made = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
+    assert shear.early_s(made, "mobility", 0.9) == 0.5
+    assert shear.early_s(made, "mobility", 0.95) == 0.8
+    assert shear.early_s(made, "mobility", 0.99) is None
+
+
+def test_gains_are_paired_differences():
+    pair = Compared(answers([9, 9], [7, 7]), answers([8, 9], [8, 7]))
+    first, second = shear.gains(pair)
+    assert first["without %, known objects"] == 80.0
+    assert first["with %, known objects"] == 90.0
+    assert first["points, known objects"].startswith("+10 (")
+    assert first["points, objects never met"].startswith("-10 (")
+    assert second["points, known objects"].startswith("+0 (")
+
+
+def test_times_say_never_with_a_dash():
+    pair = Compared(answers([9], early=[(0.1, 0.0)]), answers([7]))
+    rows = {(row["right"], row["decision"]): row for row in shear.times(pair)}
+    fixed = rows["90%", "fixed, known objects"]
+    assert (fixed["without s"], fixed["with s"]) == ("-", "0.20")
+    early = rows["95%", "early, known objects"]
+    assert (early["without s"], early["with s"]) == ("-", "0.10")
+
+
+def test_three_axes_take_three_times_the_bits(forearm):
+    three = replace(forearm, axes=3)
+    slower = microcontroller(three).frame_s / microcontroller(forearm).frame_s
+    assert slower == pytest.approx(3.0, rel=0.01)
+    assert waited_s(three, 100.0) > microcontroller(three).frame_s
+
+
+def test_the_section_draws_every_task():
+    made = answers([9, 9], [7, 8], early=[(0.3, 0.05)])
+    section = shear.section(Compared(made, made))
+    assert [table.name for table in section.tables] == ["shear_times", "shear"]
+    assert section.figures[0].png.startswith(b"\x89PNG")

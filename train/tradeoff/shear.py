@@ -1,0 +1,220 @@
+"""What shear buys and costs: each task with it and without, on the same trials."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.measures import SHEAR, feature
+from train.choose import Chosen
+from train.dataset import DataSet
+from train.report.figures import PHONE, STROKES, legend, picture
+from train.report.score import paired, percent, points
+from train.report.section import Figure, Row, Section, Table
+from train.report.work import Workers
+from train.tradeoff.choices import Points, chosen, unseen
+from train.tradeoff.early import StoppingComparison, compare_stopping
+from train.tradeoff.wires import microcontroller
+
+LEVELS = (0.8, 0.9, 0.95)
+"""Accuracies for which the time is told."""
+KNOWN, UNMET = "known objects", "objects never met"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The answers of one choice of features.
+
+    Attributes:
+        points: the choices at each window.
+        early: {task: early decisions}.
+    """
+
+    points: Points
+    early: Mapping[str, StoppingComparison]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The same trials with shear and without.
+
+    Attributes:
+        sheared, plain: the answers with all features, and without those of shear.
+    """
+
+    sheared: Answers
+    plain: Answers
+
+    @property
+    def tasks(self) -> list[str]:
+        """The tasks, in the order of the answers."""
+        return list(self.sheared.early)
+
+
+def without(dataset: DataSet) -> DataSet:
+    """The same trials without the features of shear."""
+    names = [name for name in dataset.names if feature(name).quantity not in SHEAR]
+    return dataset.of(names)
+
+
+def answers(dataset: DataSet, windows: Sequence[float], workers: Workers) -> Answers:
+    """The quick choice at each window, and early decisions."""
+    cases = [(dataset, window) for window in windows]
+    made = workers.map("windows", chosen, cases)
+    return Answers(
+        dict(zip(windows, made, strict=True)),
+        compare_stopping(dataset, windows, jobs=workers.jobs),
+    )
+
+
+def compared(dataset: DataSet, sheared: Answers, workers: Workers) -> Compared:
+    """The answers with shear beside those without."""
+    return Compared(sheared, answers(without(dataset), list(sheared.points), workers))
+
+
+def right(choice: Chosen, kind: str) -> NDArray[np.bool_] | None:
+    """(n,) whether each trial is answered rightly; None if no group was left out."""
+    result = choice.by_trial if kind == KNOWN else unseen(choice)
+    return None if result is None else np.asarray(result.hits)
+
+
+def share(choice: Chosen, kind: str) -> float | None:
+    """The accuracy, likewise."""
+    hits = right(choice, kind)
+    return None if hits is None else float(hits.mean())
+
+
+def reached_s(answers: Answers, task: str, kind: str, level: float) -> float | None:
+    """The first window from which on an accuracy is kept; None if there is none."""
+    first = None
+    for window, tasks in answers.points.items():
+        accuracy = share(tasks[task], kind)
+        if accuracy is None or accuracy < level:
+            first = None
+        elif first is None:
+            first = window
+    return first
+
+
+def early_s(answers: Answers, task: str, level: float) -> float | None:
+    """The shortest mean time of early decisions of an accuracy."""
+    times = [
+        rule.mean_s
+        for rule in answers.early[task].certified
+        if 1.0 - rule.wrong >= level
+    ]
+    return min(times, default=None)
+
+
+def seconds(value: float | None) -> str:
+    """A time as text; a dash where it is never reached."""
+    return "-" if value is None else f"{value:.2f}"
+
+
+def times(compared: Compared) -> list[Row]:
+    """The time at which each task reaches each level, with shear and without."""
+    both = {"without s": compared.plain, "with s": compared.sheared}
+    rows: list[Row] = []
+    for task in compared.tasks:
+        for level in LEVELS:
+            start = {"task": task, "right": f"{level:.0%}"}
+            for kind in (KNOWN, UNMET):
+                cells = {
+                    name: seconds(reached_s(answers, task, kind, level))
+                    for name, answers in both.items()
+                }
+                rows.append({**start, "decision": f"fixed, {kind}", **cells})
+            cells = {
+                name: seconds(early_s(answers, task, level))
+                for name, answers in both.items()
+            }
+            rows.append({**start, "decision": f"early, {KNOWN}", **cells})
+    return rows
+
+
+def gains(compared: Compared) -> list[Row]:
+    """The accuracy at each window, with shear and without, and the paired
+    difference."""
+    rows: list[Row] = []
+    for task in compared.tasks:
+        for window, tasks in compared.sheared.points.items():
+            row: Row = {"task": task, "window s": window}
+            for kind in (KNOWN, UNMET):
+                before = right(compared.plain.points[window][task], kind)
+                after = right(tasks[task], kind)
+                if before is not None and after is not None:
+                    row[f"without %, {kind}"] = percent(before.mean())
+                    row[f"with %, {kind}"] = percent(after.mean())
+                    row[f"points, {kind}"] = points(paired(before, after))
+            rows.append(row)
+    return rows
+
+
+def price(dataset: DataSet) -> str:
+    """What three axes cost on the wire."""
+    three = microcontroller(replace(dataset.layout, axes=3))
+    one = microcontroller(replace(dataset.layout, axes=None))
+    return (
+        f"{dataset.layout.rows * dataset.layout.cols * 4} bytes a frame fewer: "
+        f"{1.0 / one.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
+        f"{1.0 / three.frame_s:.0f}"
+    )
+
+
+def section(compared: Compared) -> Section:
+    """The section on shear."""
+    return Section(
+        "What shear buys",
+        [
+            "The recordings have shear. Each task is decided here with the features of "
+            "shear among the candidates, and without them, on the same trials. A time is "
+            "the first window from which on the accuracy is kept; that of early "
+            "decisions is their shortest mean time. A dash is never.",
+        ],
+        [
+            Table("shear_times", "The time to an accuracy", times(compared), narrow=5),
+            Table(
+                "shear", "Accuracy with shear and without", gains(compared), narrow=5
+            ),
+        ],
+        [drawn(compared)],
+    )
+
+
+def drawn(compared: Compared) -> Figure:
+    """The picture: accuracy against time, with shear and without."""
+    tasks = compared.tasks
+    heights = 2.9, 2.4 * len(tasks) + 0.8
+
+    def draw(canvas: Any, phone: bool) -> None:
+        across = 1 if phone else len(tasks)
+        grid = canvas.subplots(-(-len(tasks) // across), across, squeeze=False)
+        for axes, task in zip(grid.flat, tasks, strict=True):
+            draw_task(axes, compared, task)
+        grid[0, 0].set_ylabel("decisions that are right, %")
+        legend(canvas, grid[0, 0], 2)
+
+    title = "Accuracy against time with shear and without"
+    return picture("shear", title, draw, heights, max(PHONE * len(tasks), PHONE))
+
+
+def draw_task(axes: Any, compared: Compared, task: str) -> None:
+    """Draw the accuracy of one task."""
+    series = {"with shear": compared.sheared, "without": compared.plain}
+    for number, (name, answers) in enumerate(series.items()):
+        colour, marker, _ = STROKES[number]
+        for kind, dashes in ((KNOWN, "-"), (UNMET, ":")):
+            shares = {w: share(made[task], kind) for w, made in answers.points.items()}
+            drawn = {w: 100.0 * s for w, s in shares.items() if s is not None}
+            axes.plot(
+                list(drawn),
+                list(drawn.values()),
+                color=colour,
+                marker=marker,
+                ms=3,
+                ls=dashes,
+                label=f"{name}, {kind}",
+            )
+    axes.set(title=task, xlabel="seconds from first contact", ylim=(0, 103))
