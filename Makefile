@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz accuracy bench transfer matched shear docs faults risk \
+  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz accuracy bench transfer matched shear shear-transfer docs faults risk \
   stopping soak soak-day constraints clean
 
 help:
@@ -38,6 +38,7 @@ help:
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
 	@echo "  make matched       four touches in MuJoCo and in our simulator"
 	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
+	@echo "  make shear-transfer   models with shear and without on trials from another engine (MuJoCo)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
@@ -183,6 +184,9 @@ matched: $(BENCHVENV)
 
 shear: $(DEV)
 	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
+
+shear-transfer: $(BENCHVENV)
+	$(BIN)/python -m tests.bench.shear_transfer --out $(OUT)/shear_transfer $(SHEAR)
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made

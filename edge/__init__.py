@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from edge.model.model import Model as Model
     from edge.recording import Recording as Recording
     from edge.recording import load as load
-    from edge.recording import save as save
+    from edge.saving import save as save
     from edge.skin.skin import Skin as Skin
     from edge.touch.arm import Chain as Chain
     from edge.touch.features import feature_vector as feature_vector
@@ -35,7 +35,8 @@ _PUBLIC = {
     "edge.errors": ["EdgeError", "InputError"],
     "edge.events": ["Decided", "Onset", "Release"],
     "edge.model.model": ["Decision", "Model"],
-    "edge.recording": ["Recording", "load", "save"],
+    "edge.recording": ["Recording", "load"],
+    "edge.saving": ["save"],
     "edge.skin.skin": ["Skin"],
     "edge.touch.arm": ["Chain"],
     "edge.touch.features": ["feature_vector"],

@@ -1,14 +1,12 @@
 """A recording: the frames, joint angles and metadata of one trial, in one `.npz`
 file."""
 
-import json
 import logging
 import os
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
@@ -16,10 +14,9 @@ from numpy.typing import NDArray
 
 from edge.config import parse_json, shown
 from edge.errors import InputError, about
-from edge.files import open_regular, parsing, write_whole
+from edge.files import open_regular, parsing
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.thresholds import doubt
 
 LARGEST_BYTES = 1 << 27
 """Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111
@@ -117,7 +114,7 @@ class Recording:
             yield Frame(t, self.frames[i], valid, joints=joints, shear=shear)
 
 
-def _checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
+def checked(path: str, recording: Recording, scale: float | None = None) -> Recording:
     """The recording in the types of the contract.
 
     Whole numbers of any type become uint16 counts, flat frames get the skin's rows and
@@ -395,12 +392,12 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
                 f"{name}: {key} is missing; it holds {', '.join(arrays) or 'nothing'}"
             )
     fields: dict[str, Any] = {**arrays, "meta": load_meta(name, arrays)}
-    recording = _checked(name, Recording(**fields))
-    _warn_of_another_unit(name, recording.t)
+    recording = checked(name, Recording(**fields))
+    warn_of_another_unit(name, recording.t)
     return recording
 
 
-def _warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
+def warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
     """Name the likely unit of times that do not seem to be in seconds."""
     steps = np.diff(t)
     rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
@@ -416,96 +413,3 @@ def _warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
             f"{name}: has a median of {rate_hz:g} frames a second; t is in "
             f"seconds{guess}"
         )
-
-
-def save(
-    path: str | os.PathLike[str],
-    recording: Recording,
-    *,
-    scale: float | None = None,
-    overwrite: bool = True,
-    lasting: bool = True,
-) -> None:
-    """Write a recording, whole or not at all; the same recording gives the same bytes.
-
-    >>> import edge, numpy as np, tempfile
-    >>> recording = edge.Recording(
-    ...     np.array([0.0]), np.zeros((1, 16, 24), np.uint16), meta={"labels": {"object": "cup"}}
-    ... )
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     edge.save(f"{folder}/cup.npz", recording)
-    ...     edge.load(f"{folder}/cup.npz").labels
-    {'object': 'cup'}
-
-    Args:
-        path: of the `.npz`.
-        recording: frames of whole numbers of any type; flat ones (n, rows * cols) where
-            `meta.skin` says the rows and columns.
-        scale: counts of a unit of `frames` that are no counts; it is kept in
-            `meta.scale`. Give all recordings of a data set the same.
-        overwrite, lasting: see `write_whole`.
-
-    A warning names the likely unit of times that do not seem to be in seconds, and
-    thresholds for a recording that has none, or whose first frame is above its onset.
-
-    Raises:
-        InputError: the recording breaks the contract, `path` cannot be written, or it
-            exists and `overwrite` is False.
-    """
-    name = os.fspath(path)
-    recording = _checked(name, recording, scale)
-    _warn_of_another_unit(name, recording.t)
-    skin = recording.meta.get("skin", {})
-    why = doubt(recording.t, recording.frames, skin, recording.layout.onset)
-    if why is not None:
-        LOG.warning(f"{name}: {why}")
-    if recording.shear is not None and "simulation" not in recording.meta:
-        from edge.touch import shear  # few skins have three axes
-
-        still = shear.doubt(recording.shear)
-        if still is not None:
-            LOG.warning(f"{name}: {still}")
-    arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
-    arrays = {key: array for key, array in arrays.items() if array is not None}
-    save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)
-
-
-def save_arrays(
-    path: str | os.PathLike[str],
-    arrays: dict[str, NDArray[Any]],
-    meta: dict[str, Any],
-    *,
-    overwrite: bool = True,
-    lasting: bool = True,
-    compress: bool = False,
-) -> None:
-    """Write arrays and their JSON metadata as one `.npz`, whole or not at all."""
-    try:
-        text = json.dumps(meta, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(
-            f"{os.fspath(path)}: meta cannot be written as JSON: {error}"
-        ) from None
-    write = np.savez_compressed if compress else np.savez
-    with write_whole(path, overwrite=overwrite, lasting=lasting) as file:
-        write(file, meta=np.array(text), **arrays)  # type: ignore[arg-type]
-
-
-def find(paths: list[str]) -> list[Path]:
-    """The `.npz` files named, and those in the folders named (sorted, folders within
-    too).
-
-    Raises:
-        InputError: a path does not exist, or a folder holds no recording.
-    """
-    files: list[Path] = []
-    for path in map(Path, paths):
-        inside = [path]
-        if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-            inside = sorted(
-                p for p in path.rglob("*.npz") if not p.name.startswith(".")
-            )
-        if not inside:
-            raise InputError(f"{path}: no .npz recording in this folder")
-        files += inside
-    return files

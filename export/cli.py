@@ -14,7 +14,8 @@ from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
 from edge.files import check_writable
 from edge.model.model import Model
-from edge.recording import find, load
+from edge.recording import load
+from edge.saving import find
 from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.touch import measures

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from edge.model.model import Model
 from edge.model.verify import answers, first_series
-from edge.recording import Recording, save_arrays
+from edge.recording import Recording
+from edge.saving import save_arrays
 from train.dataset import DataSet
 
 TRIALS = 24

@@ -16,7 +16,8 @@ from hypothesis import settings
 
 import train
 from edge.cli import main as edge_classify
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from edge import demo
 from edge.model.model import Model
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 
 GOLDEN = Path(__file__).parent / "golden" / "demo.npz"
 

@@ -11,7 +11,8 @@ import pytest
 
 from edge import cli
 from edge.bus import protocol
-from edge.recording import Recording, load, save
+from edge.recording import Recording, load
+from edge.saving import save
 from edge.skin import file as skinfile
 from export.cli import parser as export_parser
 from tests.conftest import ROOT

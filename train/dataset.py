@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import read_bytes
-from edge.recording import LARGEST_BYTES, Recording, find, load
+from edge.recording import LARGEST_BYTES, Recording, load
+from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from edge.bus.protocol import Message, wire_bits
 from edge.chips import kinds
-from edge.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
-from edge.chips.three_axes import ZERO, ThreeAxisBlock
+from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
@@ -91,6 +90,8 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     noise = np.full(baseline.shape, noise_counts)
     calibration = TaxelCalibration(baseline, noise)
     if file.layout.axes:
+        from edge.chips.three_axes import ZERO  # few skins have three axes
+
         calibration = replace(
             calibration,
             shear_baseline=np.full((*baseline.shape, 2), ZERO, dtype=np.uint16),
@@ -143,7 +144,7 @@ def fake_buses(
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
             sense = _sense(chip, scene, calibration.baseline.ravel(), noise)
-            if chip.kind is ThreeAxisBlock:
+            if file.layout.axes:
                 sense = _three_axes(sense, chip, scene, calibration, noise)
             fake: type[FakeChip] = kinds.load(kinds.KINDS[chip.kind.name].model)
             model = fake.of(chip, sense, timed=timed, power_up=power_up)
@@ -192,6 +193,8 @@ def _three_axes(
     noise: NDArray[np.int64],
 ) -> Sense:
     """The function that gives a chip of three axes its raw values, taxel by taxel."""
+    from edge.chips.three_axes import ZERO  # few skins have three axes
+
     taxels = np.array(chip.taxels)
     rest = np.full((len(taxels), 2), ZERO, dtype=np.int64)
     if calibration.shear_baseline is not None:
@@ -294,7 +297,11 @@ def skin_file(layout: SkinLayout) -> SkinFile:
     cody = skinfile.load(skinfile.shipped("cody"))
     if layout.shape == cody.layout.shape and not layout.axes:
         return replace(cody, name="fake", layout=layout)
-    kind: type[Chip] = ThreeAxisBlock if layout.axes else kinds.driver("block")
+    kind = kinds.driver("block")
+    if layout.axes:
+        from edge.chips.three_axes import ThreeAxisBlock  # few skins have three axes
+
+        kind = ThreeAxisBlock
     most = MOST_TAXELS // (layout.axes or 1)
     taxels = range(layout.rows * layout.cols)
     shares = [taxels[first : first + most] for first in taxels[::most]]

@@ -34,7 +34,8 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.files import parsing
 from edge.model.model import Model
-from edge.recording import Recording, load_arrays, load_meta, save_arrays
+from edge.recording import Recording, load_arrays, load_meta
+from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
 from edge.touch.track import first_contact

@@ -14,7 +14,8 @@ from typing import Any
 from edge.commands.output import Output, counted, wrapped
 from edge.model.info import ModelInfo
 from edge.model.model import Model
-from edge.recording import Recording, find, load
+from edge.recording import Recording, load
+from edge.saving import find
 from edge.tools.explanation import Near, Space, explain
 from edge.tools.replay import contact_of
 

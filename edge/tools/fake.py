@@ -20,7 +20,7 @@ from edge.fake.player import fake_buses, playback
 from edge.fake.touches import still, touches
 from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.recording import load as load_recording
-from edge.recording import save
+from edge.saving import save
 from edge.skin.file import SkinFile, load
 from edge.skin.loop import stop_on
 

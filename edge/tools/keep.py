@@ -14,7 +14,7 @@ from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
 from edge.files import check_writable
 from edge.model.novelty import UNKNOWN
-from edge.recording import save
+from edge.saving import save
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.tools.record import Trials, recording

@@ -19,7 +19,8 @@ from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import read_text, write_whole
-from edge.recording import find, load, save
+from edge.recording import load
+from edge.saving import find, save
 from edge.tools.slips import counts_text, slips
 
 JOURNAL = ".edge-classify-labels.json"

@@ -10,7 +10,8 @@ from typing import Any
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
 from edge.files import read_bytes, refusing, write_whole
-from edge.recording import LARGEST_BYTES, Recording, load, save
+from edge.recording import LARGEST_BYTES, Recording, load
+from edge.saving import save
 from edge.skin.loop import Schedule
 from edge.tools.label import Change, changed
 from edge.touch.contact import Contact

@@ -28,7 +28,8 @@ from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable, refusing
 from edge.output.event_writer import Lines
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.skin.skin import Skin
 from edge.tools import terminal
 from edge.tools.page import Page

@@ -21,7 +21,8 @@ from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
 from edge.policy import AS_TRAINED
-from edge.recording import Recording, find, load
+from edge.recording import Recording, load
+from edge.saving import find
 from edge.statistics import wilson
 from edge.touch.contact import FeatureSeries
 

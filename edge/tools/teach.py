@@ -17,7 +17,8 @@ from edge.commands.output import LOG, Output, counted
 from edge.files import write_whole
 from edge.model.model import Model
 from edge.model.verify import renew
-from edge.recording import find, load
+from edge.recording import load
+from edge.saving import find
 from edge.tools.replay import contact_of
 from edge.tools.teaching import joined, spelled_like, taught, unknown_labels
 

@@ -17,6 +17,7 @@ COMMANDS = {
     "show": "train",
     "split": "train",
     "thresholds": "train",
+    "save": "train",
 }
 """The package of each command."""
 

@@ -32,6 +32,8 @@ SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the table of gains."""
 PICTURE = tables.ROOT / "docs" / "shear.png"
 PICTURED = "mobility"
+SIDES = {"without s": "plain", "with s": "sheared"}
+"""{column: the answers that it holds}."""
 Runs = Sequence[shear.Compared]
 
 
@@ -49,7 +51,7 @@ def compared(seed: int, folder: Path, jobs: int) -> shear.Compared:
 def mean_reached_s(runs: Runs, kind: str, task: str, level: float) -> dict[str, str]:
     """The first window from which on the mean accuracy of the seeds keeps a level."""
     cells = {}
-    for name, side in (("without s", "plain"), ("with s", "sheared")):
+    for name, side in SIDES.items():
         points = [getattr(pair, side).points for pair in runs]
         first = None
         for window in WINDOWS_S:
@@ -67,7 +69,7 @@ def mean_early_s(runs: Runs, task: str, level: float) -> dict[str, str]:
     """The mean over the seeds of the time of early decisions; a dash where a seed never
     reaches the level."""
     cells = {}
-    for name, side in (("without s", "plain"), ("with s", "sheared")):
+    for name, side in SIDES.items():
         times = [shear.early_s(getattr(pair, side), task, level) for pair in runs]
         reached = [time for time in times if time is not None]
         complete = len(reached) == len(times)
@@ -156,7 +158,8 @@ def measure(arguments: argparse.Namespace) -> int:
     for seed in range(first, first + arguments.seeds):
         print(f"seed {seed}", flush=True)
         runs.append(compared(seed, arguments.out, arguments.jobs))
-    tables.write("shear", [times(runs), gains(runs)], "make shear")
+    reached = [row for row in times(runs) if {"-"} != {row[key] for key in SIDES}]
+    tables.write("shear", [reached, gains(runs)], "make shear")
     PICTURE.write_bytes(draw(runs))
     return 0
 

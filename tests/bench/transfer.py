@@ -25,7 +25,8 @@ from joblib import Parallel, cpu_count, delayed
 from edge.cli import dispatch
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.tools.replay import Summary, decide
 from tests.bench import tables
 from tests.bench.mujoco_touch import (

@@ -17,7 +17,8 @@ import numpy as np
 
 from edge.model.model import Model
 from edge.model.verify import first_series
-from edge.recording import load, save_arrays
+from edge.recording import load
+from edge.saving import save_arrays
 from export import golden
 from train.dataset import load_trials
 

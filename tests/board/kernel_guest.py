@@ -28,7 +28,8 @@ from edge.cli import main
 from edge.fake.clock import VirtualClock
 from edge.fake.player import Playback, calibrated
 from edge.fake.usb_adapter import UsbAdapter, plugged
-from edge.recording import Recording, load, save
+from edge.recording import Recording, load
+from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
 from edge.skin.loop import Loop

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from edge import recording
+from edge import recording, saving
 from edge.model.model import Model
 from edge.skin import file as skinfile
 from tests.conftest import in_a_row
@@ -45,7 +45,7 @@ def skin(tmp_path):
 def quiet(tmp_path, make_touch):
     """A recording in which nothing touches."""
     path = tmp_path / "quiet.npz"
-    recording.save(path, make_touch(lead_s=1.8, seconds=0.0))
+    saving.save(path, make_touch(lead_s=1.8, seconds=0.0))
     return path
 
 
@@ -53,5 +53,5 @@ def quiet(tmp_path, make_touch):
 def parted(recordings, tmp_path):
     """A touch and half a second without one, so that a loop of it is many contacts."""
     path = tmp_path / "parted.npz"
-    recording.save(path, in_a_row(recording.load(recordings / "hard_1.npz")))
+    saving.save(path, in_a_row(recording.load(recordings / "hard_1.npz")))
     return path

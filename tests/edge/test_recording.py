@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.recording import LARGEST_BYTES, Recording, find, load, save
+from edge.recording import LARGEST_BYTES, Recording, load
+from edge.saving import find, save
 
 
 def arrays_of(recording: Recording) -> dict[str, np.ndarray]:

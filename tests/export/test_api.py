@@ -8,7 +8,8 @@ import train
 from edge.classifier import Classifier
 from edge.model.model import Model
 from edge.model.verify import verify
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from export.api import measure
 from train.report.summary import names, warnings
 

@@ -16,7 +16,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
 from edge.model.verify import first_series, renew, verify
-from edge.recording import save
+from edge.saving import save
 from edge.tools.teaching import taught
 from edge.touch.features import FEATURES
 from export.api import save as save_model

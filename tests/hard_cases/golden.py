@@ -18,7 +18,8 @@ import numpy as np
 
 from edge.files import write_whole
 from edge.model.model import Model
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from export import golden
 from export.__main__ import main as export
 from export.api import describe

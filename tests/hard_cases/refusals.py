@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.touch.arm import Chain, Joint
 from edge.touch.frame import Frame
 from edge.touch.joint_stream import Joints

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import train
-from edge.recording import save
+from edge.saving import save
 from edge.statistics import wilson
 from train.choose import (
     Chosen,

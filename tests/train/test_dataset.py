@@ -10,7 +10,8 @@ from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.verify import verify
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from edge.touch.arm import Chain, Joint
 from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
 from train.fitting import FitOptions, _decision_points, _leaks, _windows

@@ -3,7 +3,7 @@
 import pytest
 
 from edge.errors import InputError
-from edge.recording import save
+from edge.saving import save
 from train.dataset import load_trials
 from train.labels import completed, shared_tasks
 

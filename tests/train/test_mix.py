@@ -7,7 +7,7 @@ import pytest
 
 import train
 from edge.errors import InputError
-from edge.recording import save
+from edge.saving import save
 from edge.statistics import wilson
 from train.pipeline import Choice, ContactClassifier
 from train.projection import Projection

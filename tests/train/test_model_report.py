@@ -8,7 +8,8 @@ import pytest
 import export
 import train
 from edge.model.model import Model
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from export.api import measure
 from tests.conftest import rows_of
 from train import model_report as report

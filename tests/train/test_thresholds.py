@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import train
-from edge.recording import save
+from edge.saving import save
 from train.thresholds import count_contacts, proposed
 
 GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from edge.files import parsing
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 from train.dataset import read

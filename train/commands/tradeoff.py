@@ -12,7 +12,7 @@ from pathlib import Path
 
 from edge.errors import InputError
 from edge.files import check_writable
-from edge.recording import find
+from edge.saving import find
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ user names, for formats with joint angles. A format with options of its own also
 
 import pkgutil
 
-SHARED = {"arrays", "columns", "reading", "topics"}
+SHARED = {"arrays", "axes", "clock", "columns", "counts", "reading", "topics"}
 """Modules that the formats share."""
 
 

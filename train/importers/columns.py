@@ -301,11 +301,7 @@ def _unit(table: Table, time: str, unit: str | None) -> tuple[str, str]:
 
 
 def times_of(table: Table, taken: Meaning) -> NDArray[np.float64]:
-    """(n,) seconds from the first row.
-
-    Raises:
-        InputError: a time is missing, goes back or stands still.
-    """
+    """(n,) seconds from the first row; NaN where a time is missing."""
     assert taken.time is not None
     if taken.unit == "iso":
         dates = pd.to_datetime(
@@ -315,15 +311,4 @@ def times_of(table: Table, taken: Meaning) -> NDArray[np.float64]:
     else:
         values = numbers_of(table, taken.time).to_numpy()
         values = (values - values[0]) * UNITS_S[taken.unit]
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise InputError(f"{table.path}: row {bad[0] + 1} has no time")
-    late = np.flatnonzero(np.diff(values) <= 0.0)
-    if len(late):
-        step = values[late[0] + 1] - values[late[0]]
-        fault = "stands still" if step == 0.0 else f"goes back by {-step:g} s"
-        raise InputError(
-            f"{table.path}: its time {fault} at row {late[0] + 2} of the values; split "
-            "the file there, or mend the times"
-        )
     return np.asarray(values)

@@ -32,16 +32,8 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers import arrays
-from train.importers.axes import (
-    Axes,
-    Parted,
-    axis_letters,
-    counts_of,
-    flipped_letters,
-    parted,
-    shear_of,
-)
+from train.importers import arrays, clock, counts
+from train.importers.axes import Axes, Parted, parted, shear_of
 from train.importers.columns import (
     UNITS,
     Meaning,
@@ -49,6 +41,7 @@ from train.importers.columns import (
     meaning,
     times_of,
 )
+from train.importers.counts import Rest, Values, asked_shape, rest_of
 from train.importers.reading import (
     PACKED,
     TEXTS,
@@ -66,14 +59,6 @@ LABELS = "labels.csv"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 FASTEST_HZ = 1e6
 """A higher frame rate must be a mistake."""
-START = 3
-"""Frames at the start of a trial, whose median may be the rest value."""
-MOST_COUNTS = 65535
-PART = 1 << 16
-"""Frames that are converted at a time."""
-DECIMALS = 6
-"""Most decimals that signed values keep."""
-LARGEST_SHAPE = 4096
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
 SPARSEST = 64
@@ -83,7 +68,6 @@ SPARSEST = 64
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the facts that a table lacks."""
     rate = within(float, 1e-3, FASTEST_HZ)
-    scale = within(float, 1e-12, 1e12)
     add = parser.add_argument
     add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
     add(
@@ -108,46 +92,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--degrees", action="store_true", help="joint angles are in degrees")
     add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
     add(
-        "--shape",
-        metavar="ROWSxCOLS",
-        help="of the skin (default: skin.json's, the columns' numbers, or one row)",
-    )
-    add(
-        "--falls",
-        action="store_true",
-        help="values fall under pressure: subtract them from those at rest, which are "
-        "those of the trial with the quietest start",
-    )
-    add(
-        "--signed",
-        action="store_true",
-        help="values rise and fall: count how far they are from those at rest",
-    )
-    add(
-        "--scale",
-        type=scale,
-        default=1.0,
-        help="counts in a unit of values with fractions",
-    )
-    add(
         "--task",
         default="object",
         help="the task of these labels (default: %(default)s)",
     )
-    add(
-        "--axes",
-        type=axis_letters,
-        metavar="XYZ",
-        help="columns such as s1_x, s1_y, s1_z: the letters of the axes along the rows, "
-        "around the columns, and of the normal force",
-    )
-    add(
-        "--flip",
-        type=flipped_letters,
-        metavar="XYZ",
-        help="letters of the axes whose sign is turned round",
-    )
     add("--strict", action="store_true", help="stop at the first file that is unusable")
+    counts.add_options(parser)
 
 
 @dataclass(frozen=True)
@@ -176,18 +126,16 @@ class Measured:
     Attributes:
         source: where they come from.
         t: (n,) seconds.
-        values: (n, taxels); NaN where one is missing.
+        values: of the taxels.
         joints: (n, dof) radians, or None.
         meaning: of the columns.
-        shear: (n, taxels, 2) values of the other two axes, or None.
     """
 
     source: Source
     t: NDArray[np.float64]
-    values: NDArray[np.float64]
+    values: Values
     joints: NDArray[np.float64] | None
     meaning: Meaning
-    shear: NDArray[np.float64] | None = None
 
 
 def trials(
@@ -217,17 +165,17 @@ def trials(
     _announce(first, shape, beside is not None)
     if axes is not None:
         say(axes.text)
-    rest = _rest(measured, options)
+    rest = rest_of([trial.values for trial in measured], options)
     missing = 0
     imported = 0
     for trial in measured:
         try:
-            recording = _recording(trial, rest, shape, skin, options)
+            recording = _recording(trial, rest, shape, skin)
         except InputError as error:
             _skip(options, error)
             continue
         imported += 1
-        missing += int(np.isnan(trial.values).sum())
+        missing += int(np.isnan(trial.values.normal).sum())
         labels = trial.source.labels
         if beside is not None:
             labels = {
@@ -553,17 +501,26 @@ def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Me
     values[~np.isfinite(values)] = np.nan
     if np.isnan(values).all():
         raise InputError(f"{table.path}: none of its values is a finite number")
+    joints = None
+    if taken.joints:
+        angles = [numbers_of(table, name) for name in taken.joints]
+        joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
     if taken.time is None:
         assert options.rate is not None
         t = np.arange(len(values)) / options.rate
     else:
         t = times_of(table, taken)
-    joints = None
-    if taken.joints:
-        angles = [numbers_of(table, name) for name in taken.joints]
-        joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
+        order = clock.order(t, table.path, "row")
+        if order.text:
+            say(f"{table.path}: {order.text}")
+        kept = order.kept
+        t = t[kept]
+        values = values[kept]
+        shear = None if shear is None else shear[kept]
+        joints = None if joints is None else joints[kept]
     head = replace(table, data=table.data.iloc[:0])
-    return Measured(replace(source, table=head), t, values, joints, taken, shear)
+    source = replace(source, table=head)
+    return Measured(source, t, Values(values, shear), joints, taken)
 
 
 def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
@@ -579,123 +536,28 @@ def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
     return Wishes(wishes.time, taxels, wishes.joints, wishes.unit, wishes.rate)
 
 
-@dataclass(frozen=True)
-class Rest:
-    """How values become counts.
-
-    Attributes:
-        values: (taxels,) at rest; None where they are counts as they stand.
-        sign: of the pressure; 0 where both directions count.
-        scale: counts a unit of value.
-        shear: (taxels, 2) shear at rest, or None.
-    """
-
-    values: NDArray[np.float64] | None
-    sign: int
-    scale: float
-    shear: NDArray[np.float64] | None = None
-
-    def counts(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values as counts, not rounded."""
-        if self.values is None:
-            return values * self.scale
-        deviations = values - self.values
-        if self.sign:
-            deviations = np.maximum(self.sign * deviations, 0.0)
-        return np.abs(deviations) * self.scale
-
-
-def _rest(measured: Sequence[Measured], options: argparse.Namespace) -> Rest:
-    """The values at rest, and the scale that keeps all digits of signed ones."""
-    if options.falls and options.signed:
-        raise InputError("--falls and --signed exclude each other; give one")
-    if not (options.falls or options.signed):
-        return Rest(None, 1, options.scale)
-    starts = np.array([np.median(trial.values[:START], axis=0) for trial in measured])
-    if options.falls:
-        quietest = int(np.nansum(starts, axis=1).argmax())
-        shear = _shear_at_rest(measured[quietest])
-        return Rest(starts[quietest], -1, options.scale, shear)
-    middle = np.nanmedian(starts, axis=0)
-    unrest = np.nansum(np.abs(starts - middle), axis=1)
-    quietest = int(unrest.argmin())
-    values = starts[quietest]
-    largest = max(float(np.nanmax(np.abs(m.values - values))) for m in measured)
-    scale = options.scale
-    if scale == 1.0 and largest > 0.0:
-        scale = _finest([m.values - values for m in measured], largest)
-    return Rest(values, 0, scale, _shear_at_rest(measured[quietest]))
-
-
-def _shear_at_rest(trial: Measured) -> NDArray[np.float64] | None:
-    """(taxels, 2) shear at the start of a trial."""
-    if trial.shear is None:
-        return None
-    return np.asarray(np.median(trial.shear[:START], axis=0))
-
-
-def _finest(deviations: Sequence[NDArray[np.float64]], largest: float) -> float:
-    """The counts a unit that make all deviations whole, or else use all counts."""
-    for decimals in range(DECIMALS + 1):
-        scale = 10.0**decimals
-        if scale * largest > MOST_COUNTS:
-            break
-        wholes = [np.abs(d * scale - np.rint(d * scale)) for d in deviations]
-        if all(float(np.nanmax(whole)) < 1e-6 * max(scale, 1.0) for whole in wholes):
-            return scale
-    return MOST_COUNTS / largest
-
-
 def _recording(
     trial: Measured,
     rest: Rest,
     shape: tuple[int, ...],
     skin: ConfigTable,
-    options: argparse.Namespace,
 ) -> Recording:
     """The recording of a trial, without labels."""
-    path = trial.source.table.path
-    meta: dict[str, Any] = {
-        "skin": {**skin.raw, "rows": shape[0], "cols": shape[1]},
-        "trial": trial.source.name,
-    }
-    if rest.values is not None:
-        at_rest = [None if np.isnan(v) else float(v) for v in rest.values]
-        meta["values"] = {"counts_per_unit": rest.scale, "rest": at_rest}
-    exact = rest.scale == 1.0 and rest.values is None
-    frames = np.empty(trial.values.shape, dtype=np.uint16)
-    valid = np.empty(trial.values.shape, dtype=np.bool_)
-    # A part at a time, as a long recording would else fill the memory several times.
-    for begin in range(0, len(frames), PART):
-        rows = slice(begin, begin + PART)
-        counts = rest.counts(trial.values[rows])
-        valid[rows] = np.isfinite(counts)
-        counts = np.where(valid[rows], counts, 0.0)
-        _check_counts(path, counts, exact)
-        frames[rows] = np.rint(counts)
-    seen = None if valid.all() else valid.reshape(-1, *shape)
-    t = trial.t - trial.t[0]
+    counted = rest.counted(trial.source.table.path, trial.values)
+    skin_meta = {**skin.raw, "rows": shape[0], "cols": shape[1]}
     shear = None
-    if trial.shear is not None:
-        unloaded = np.float64(0.0) if rest.shear is None else rest.shear
-        tangential = counts_of(path, trial.shear - unloaded, rest.scale)
-        shear = tangential.reshape(-1, *shape, 2)
-        meta["skin"]["axes"] = 3
-    return Recording(t, frames.reshape(-1, *shape), trial.joints, seen, meta, shear)
-
-
-def _check_counts(path: Path, counts: NDArray[np.float64], exact: bool) -> None:
-    """Refuse what are no counts."""
-    low = float(counts.min(initial=0.0))
-    high = float(counts.max(initial=0.0))
-    whole = not exact or bool((counts == np.rint(counts)).all())
-    if low < 0.0 or high > MOST_COUNTS + 0.5 or not whole:
-        hint = "--signed, " if low < 0.0 else ""
-        lowest = float(counts.min())
-        raise InputError(
-            f"{path}: {lowest:g} to {high:g} are no counts (whole numbers from 0 to "
-            f"65535); see {hint}--falls, --scale and --taxels"
-        )
+    if counted.shear is not None:
+        shear = counted.shear.reshape(-1, *shape, 2)
+        skin_meta["axes"] = 3
+    valid = counted.valid
+    return Recording(
+        t=trial.t - trial.t[0],
+        frames=counted.frames.reshape(-1, *shape),
+        joints=trial.joints,
+        valid=None if valid is None else valid.reshape(-1, *shape),
+        meta={"skin": skin_meta, "trial": trial.source.name, **rest.meta},
+        shear=shear,
+    )
 
 
 def _shape(text: str | None, first: Measured, skin: ConfigTable) -> tuple[int, ...]:
@@ -704,13 +566,7 @@ def _shape(text: str | None, first: Measured, skin: ConfigTable) -> tuple[int, .
     table = first.source.table
     told = table.shape or first.meaning.shape
     shape = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    if text is not None:
-        sizes = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
-        if sizes is None:
-            raise InputError(
-                f"--shape must be ROWSxCOLS, such as 16x24, not {text[:40]}"
-            )
-        shape = int(sizes[1]), int(sizes[2])
+    shape = asked_shape(text) or shape
     if len(shape) != 2 or shape[0] * shape[1] != taxels:
         size = " x ".join(map(str, shape))
         raise InputError(

@@ -1,25 +1,31 @@
-"""MCAP files of ROS 2 or JSON messages: one recording each; see
+"""MCAP files of ROS or JSON messages: one recording each; see
 train/importers/topics.py.
 
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
 
+import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers.topics import FRAMES, JOINTS, Log, needs
+from train.importers.topics import Log, add_options, needs
+
+__all__ = ["add_options", "trials"]
 
 
-def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
+def trials(
+    path: Path, arm: Chain | None, options: argparse.Namespace
+) -> Iterator[tuple[str, Recording]]:
     """The one trial of the file."""
     with needs("mcap"):
         from mcap.reader import make_reader
     with needs("rosbags"):
         from rosbags.typesys import Stores, get_typestore
-    log = Log.of(path, arm)
+    log = Log.of(path, arm, options)
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (
         parsing(str(path), "a complete MCAP file", "; copy it again"),
@@ -32,7 +38,19 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
             kind = "" if schema is None else schema.name
             if channel.message_encoding == "json":
                 log.json(channel.topic, message.data, logged_s)
-            elif channel.message_encoding == "cdr" and kind in (*FRAMES, *JOINTS):
+            elif channel.message_encoding == "cdr" and log.takes(channel.topic, kind):
+                define(types, schema)
                 data = types.deserialize_cdr(message.data, kind)
                 log.ros(channel.topic, kind, data, logged_s)
     yield path.stem, log.recording()
+
+
+def define(types: Any, schema: Any) -> None:
+    """Add the types that a schema defines, unless they are known."""
+    from rosbags.typesys import get_types_from_msg
+
+    if schema.name not in types.types:
+        text = schema.data.decode()
+        defined = get_types_from_msg(text, schema.name)
+        new = {name: kind for name, kind in defined.items() if name not in types.types}
+        types.register(new)

@@ -4,28 +4,33 @@ train/importers/topics.py.
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
 """
 
+import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers.topics import FRAMES, JOINTS, Log, needs
+from train.importers.topics import Log, add_options, needs
+
+__all__ = ["add_options", "trials"]
 
 
-def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
+def trials(
+    path: Path, arm: Chain | None, options: argparse.Namespace
+) -> Iterator[tuple[str, Recording]]:
     """The one trial of the bag."""
     with needs("rosbags"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    log = Log.of(path, arm)
+    log = Log.of(path, arm, options)
     # ROS 2 bags from before 2024 do not contain the definitions of their types.
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (
         parsing(str(path), "a readable bag", "; copy it again"),
         AnyReader([path], default_typestore=types) as reader,
     ):
-        wanted = [c for c in reader.connections if c.msgtype in (*FRAMES, *JOINTS)]
+        wanted = [c for c in reader.connections if log.takes(c.topic, c.msgtype)]
         # With an empty list, AnyReader would give every message of the bag.
         for connection, logged_ns, raw in reader.messages(wanted) if wanted else ():
             message = reader.deserialize(raw, connection.msgtype)

@@ -22,7 +22,8 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.layout import SkinLayout
+from edge.touch.layout import RELEASE_S, SkinLayout
+from train.importers import clock
 
 PADS = (1, 5)
 """The matrices that touch: the distal pads of the two fingers that close. In 3 of 856
@@ -35,9 +36,6 @@ ONSET_COUNTS = 60
 contact."""
 LARGEST_BYTES = 1 << 26
 """Largest size of an unpacked file; the longest published grasp takes 1 MB."""
-STALE_S = 0.1
-"""Joint angles count as unknown so long before the first message or after the last: ten
-periods."""
 
 
 def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
@@ -96,8 +94,9 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
     left, right = (np.array(frames)[:, place] for place in places)
     side_by_side = np.concatenate([left, 0 * left[:, :, :1], right], axis=2)
     t = (np.array(stamps) - stamps[0]) / 1000.0
-    if (np.diff(t) <= 0.0).any():
-        raise ValueError("the times of its frames do not increase")
+    kept = clock.order(t, file).kept
+    t = t[kept]
+    side_by_side = side_by_side[kept]
     layout = SkinLayout(
         rows=alive.shape[0],
         cols=alive.shape[1],
@@ -113,7 +112,7 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
         "source": f"SDH-2 grasp {file.name}",
         "trial": file.stem,
     }
-    return Recording(t, side_by_side, _joints(root, t, stamps[0]), alive, meta)
+    return Recording(t, side_by_side, _joints(root, t, stamps[0], file), alive, meta)
 
 
 def _pads(
@@ -181,10 +180,10 @@ def _unpacked(text: str, cells: int) -> NDArray[np.uint16]:
 
 
 def _joints(
-    root: ElementTree.Element, t: NDArray[np.float64], start_ms: float
+    root: ElementTree.Element, t: NDArray[np.float64], start_ms: float, file: Path
 ) -> NDArray[np.float64] | None:
-    """(n, 7) radians at the frames' times, NaN far from known ones; None if the file
-    has none."""
+    """(n, 7) radians at the frames' times, NaN where they are not known; None if the
+    file has none."""
     stamps, angles = [], []
     for angle in root.iterfind("./joint_angles/angle"):
         stamps.append(_number(angle, "time_stamp"))
@@ -198,12 +197,9 @@ def _joints(
     if not angles:
         return None
     joints_t = (np.array(stamps) - start_ms) / 1000.0
-    if (np.diff(joints_t) < 0.0).any():
-        raise ValueError("the times of its joint angles go back")
+    kept = clock.order(joints_t, f"{file}: its joint angles", "angle").kept
     radians = np.radians(np.array(angles))
-    joints = np.stack([np.interp(t, joints_t, column) for column in radians.T], axis=1)
-    joints[(t < joints_t[0] - STALE_S) | (t > joints_t[-1] + STALE_S)] = np.nan
-    return joints
+    return clock.angles_at(t, joints_t[kept], radians[kept], RELEASE_S)
 
 
 def _number(

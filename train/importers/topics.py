@@ -1,28 +1,30 @@
 """Topics of frames and joint angles in a robot's log, turned into one recording.
 
-Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`),
-`std_msgs/UInt16MultiArray` (with two dimensions in its layout, or with the skin's rows
-and columns in the JSON file), or JSON `{"counts": [[...], ...]}`. Joint angles are
-`sensor_msgs/JointState`, or JSON `{"q": [...]}`, optionally with `"names": [...]`. A
-message may carry its own time (`header.stamp`, `"t"`); otherwise the time at which it
-was logged is used.
+Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), an array of
+`std_msgs` (`UInt16MultiArray`, `Int16MultiArray`, `Float32MultiArray` and so on), or
+JSON `{"counts": [[...], ...]}`. A sensor's own message is read by the definition that
+the log carries: `--field forces.z` names the values in it, and with `--axes` the field
+whose parts are x, y and z. Joint angles are `sensor_msgs/JointState`, or JSON `{"q":
+[...]}`, optionally with `"names": [...]`. A message may carry its own time
+(`header.stamp`, `"t"`); otherwise the time at which it was logged is used. Where the
+clocks of frames and angles never meet, both are taken by the time of logging.
 
 Joints are identified by name, in any order, and several messages may share them. With
 an arm, its joints are selected in the arm's order, and a warning names the others.
-Without an arm, all joints are kept.
+Without an arm, all joints with angles are kept. Angles are not known across a gap.
 
 A JSON file beside the log, `NAME.json`, may complete it: `labels` {task: label}, `skin`
 (see `edge.touch.layout.SkinLayout`), `arm`, and, if there are several topics of a kind,
-the ones to use: `frames_topic` and `joints_topic`.
+the ones to use: `frames_topic` and `joints_topic`. Other topics are not read.
 """
 
 from __future__ import annotations
 
+import argparse
 import logging
-import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -35,12 +37,23 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain, joint_columns
-from edge.touch.joint_stream import OLDEST_S
+from edge.touch.layout import RELEASE_S
+from train.importers import clock, counts
+from train.importers.axes import Axes
+from train.importers.counts import Values, asked_shape, rest_of
+from train.progress import say
 
 LOG = logging.getLogger(__name__)
 
-FRAMES = ("sensor_msgs/msg/Image", "std_msgs/msg/UInt16MultiArray")
-JOINTS = ("sensor_msgs/msg/JointState",)
+IMAGE = "sensor_msgs/msg/Image"
+ARRAYS = tuple(
+    f"std_msgs/msg/{name}MultiArray"
+    for name in "UInt8 Int8 UInt16 Int16 UInt32 Int32 Float32 Float64".split()
+)
+JOINTS = "sensor_msgs/msg/JointState"
+FRAMES = (IMAGE, *ARRAYS)
+ENCODINGS = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
+"""Bytes of a pixel."""
 
 
 @contextmanager
@@ -54,6 +67,41 @@ def needs(package: str) -> Iterator[None]:
         ) from None
 
 
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add options for the values in a log."""
+    parser.add_argument(
+        "--field",
+        metavar="NAME",
+        help="the values in a sensor's own message, such as data or taxels.force",
+    )
+    counts.add_options(parser)
+
+
+class Unusable(ValueError):
+    """A message from which no frame can be read."""
+
+
+@dataclass
+class Stream:
+    """The messages of one topic, or of one joint.
+
+    Attributes:
+        stamps: seconds of their own clock, or of logging where they have none.
+        logged: seconds at which they were logged.
+        values: one a message.
+    """
+
+    stamps: list[float] = field(default_factory=list)
+    logged: list[float] = field(default_factory=list)
+    values: list[Any] = field(default_factory=list)
+
+    def add(self, stamp: float, logged: float, value: Any) -> None:
+        """Append a message."""
+        self.stamps.append(stamp)
+        self.logged.append(logged)
+        self.values.append(value)
+
+
 @dataclass
 class Log:
     """The messages of one log, collected by topic.
@@ -62,21 +110,27 @@ class Log:
         path: of the log.
         beside: the JSON file beside it.
         arm: whose joint angles are wanted, or None for all.
+        options: of the command.
+        axes: of the taxels; None for one.
     """
 
     path: Path
     beside: ConfigTable
-    arm: Chain | None = None
-    _frames: dict[str, list[tuple[float, NDArray[np.uint16]]]] = field(
-        default_factory=lambda: defaultdict(list)
+    arm: Chain | None
+    options: argparse.Namespace
+    axes: Axes | None
+    _frames: dict[str, Stream] = field(default_factory=lambda: defaultdict(Stream))
+    _joints: dict[str, dict[str, Stream]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(Stream))
     )
-    _joints: dict[str, dict[str, list[tuple[float, float]]]] = field(
-        default_factory=lambda: defaultdict(lambda: defaultdict(list))
-    )
-    """{topic: {joint: [(time, angle)]}}"""
+    """{topic: {joint: its angles}}"""
+    _left_out: dict[str, str] = field(default_factory=dict)
+    """{topic: why no frame can be read from it}."""
+    _seen: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    """{`frames` or `joints`: all topics of such a kind}."""
 
     @classmethod
-    def of(cls, path: Path, arm: Chain | None = None) -> Log:
+    def of(cls, path: Path, arm: Chain | None, options: argparse.Namespace) -> Log:
         """A log with its JSON file; `arm` has precedence over the file's.
 
         Raises:
@@ -86,19 +140,35 @@ class Log:
         beside = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
         if arm is None and beside.has("arm"):
             arm = Chain.from_dict(beside.get("arm"), where=f"{file}: arm")
-        return cls(path, beside, arm)
+        return cls(path, beside, arm, options, Axes.of(options))
+
+    def takes(self, topic: str, kind: str) -> bool:
+        """Whether messages of a kind on a topic are wanted; others are never read."""
+        if kind == JOINTS:
+            self._seen["joints"].add(topic)
+            return bool(self.beside.get("joints_topic", topic) == topic)
+        if kind in FRAMES:
+            self._seen["frames"].add(topic)
+        if self.beside.has("frames_topic"):
+            return bool(self.beside.get("frames_topic") == topic)
+        return kind in FRAMES or self.options.field is not None
 
     def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
-        """Take in a ROS message; kinds other than frames and joint angles are
-        ignored."""
+        """Take in a ROS message that is wanted."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         # Some drivers leave the stamp empty, which is the time 0.
         t = (0.0 if stamp is None else stamp.sec + stamp.nanosec * 1e-9) or logged_s
-        if kind in JOINTS:
-            self._pose(topic, t, list(message.name), np.asarray(message.position))
-        elif kind in FRAMES:
-            read = self._image if kind == FRAMES[0] else self._array
-            self._frames[topic].append((t, read(topic, message)))
+        if kind == JOINTS:
+            names = list(message.name)
+            angles = np.asarray(message.position, dtype=np.float64)
+            self._pose(topic, (t, logged_s), names, angles)
+            return
+        try:
+            values = self._values(kind, message)
+        except Unusable as reason:
+            self._left_out.setdefault(topic, str(reason))
+            return
+        self._frames[topic].add(t, logged_s, values)
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
@@ -106,184 +176,332 @@ class Log:
         with parsing(where, "usable"):
             message = ConfigTable(parse_json(data, where), where)
             t = message.number("t", logged_s)
-            if message.has("q"):
-                q = np.asarray(message.get("q"), dtype=np.float64)
-                self._pose(topic, t, list(map(str, message.get("names", ()))), q)
-            elif message.has("counts"):
-                counts = self._counts(topic, np.asarray(message.get("counts")))
-                self._frames[topic].append((t, counts))
+            if message.has("q") and self.takes(topic, JOINTS):
+                angles = np.asarray(message.get("q"), dtype=np.float64)
+                names = list(map(str, message.get("names", ())))
+                self._pose(topic, (t, logged_s), names, angles)
+            elif message.has("counts") and self.takes(topic, IMAGE):
+                values = np.asarray(message.get("counts"))
+                if values.ndim != 2 or values.dtype.kind not in "iuf":
+                    raise InputError(
+                        f"{where}: counts must be numbers in rows and columns, not "
+                        f"{values.dtype} {values.shape}"
+                    )
+                self._frames[topic].add(t, logged_s, values.astype(np.float64))
 
     def _pose(
-        self, topic: str, t: float, names: list[str], q: NDArray[np.float64]
+        self,
+        topic: str,
+        times: tuple[float, float],
+        names: list[str],
+        angles: NDArray[np.float64],
     ) -> None:
         """Take in a message's angles; joints without names get their positions as
-        names."""
+        names.
+
+        A message without positions, and an angle that is not finite, tell nothing.
+        """
+        if not angles.size:
+            return
         where = f"{self.path}: a message of {topic}"
-        if q.ndim != 1 or (names and len(names) != len(q)):
-            raise InputError(f"{where}: its names are {len(names)} and angles {q.size}")
+        if angles.ndim != 1 or (names and len(names) != len(angles)):
+            raise InputError(
+                f"{where}: its names are {len(names)} and angles {angles.size}"
+            )
         if len(set(names)) < len(names):
             raise InputError(f"{where} names a joint twice")
-        if not np.isfinite(q).all():
-            raise InputError(f"{where} has an angle that is not finite")
-        for name, angle in zip(
-            names or map(str, range(len(q))), q.tolist(), strict=True
-        ):
-            self._joints[topic][name].append((t, angle))
+        called = names or [str(place) for place in range(len(angles))]
+        for name, angle in zip(called, angles.tolist(), strict=True):
+            if np.isfinite(angle):
+                self._joints[topic][name].add(*times, angle)
 
-    def _image(self, topic: str, message: Any) -> NDArray[np.uint16]:
-        kinds = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
-        size = kinds.get(message.encoding)
-        if size is None:
-            known = ", ".join(kinds)
-            raise InputError(
-                f"{self.path}: the images of {topic} are {message.encoding}; they must "
-                f"be {known}"
-            )
-        raw = np.asarray(message.data, dtype=np.uint8)
-        if (
-            raw.size != message.height * message.step
-            or message.step < message.width * size
-        ):
-            raise InputError(
-                f"{self.path}: an image of {topic} does not have its stated size"
-            )
-        lines = raw.reshape(message.height, message.step)[:, : message.width * size]
-        order = ">" if message.is_bigendian else "<"
-        return np.ascontiguousarray(lines).view(f"{order}u{size}").astype(np.uint16)
+    def _values(self, kind: str, message: Any) -> NDArray[np.float64]:
+        """The values of a message, in the shape that it tells.
 
-    def _array(self, topic: str, message: Any) -> NDArray[np.uint16]:
-        shape = [int(dimension.size) for dimension in message.layout.dim]
-        values = np.asarray(message.data)[message.layout.data_offset :]
-        if len(shape) != 2:
-            skin = self.beside.table("skin", {})
-            if not (skin.has("rows") and skin.has("cols")):
-                raise InputError(
-                    f"{self.path}: {topic} does not state its rows and columns; put "
-                    "them as "
-                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into '
-                    f"{self.path.stem}.json beside it"
-                )
-            shape = [skin.whole("rows"), skin.whole("cols")]
-        if values.size != math.prod(shape):
-            raise InputError(
-                f"{self.path}: a message of {topic} has {values.size} values, not "
-                f"{shape}"
-            )
-        return self._counts(topic, values.reshape(shape))
-
-    def _counts(self, topic: str, counts: NDArray[Any]) -> NDArray[np.uint16]:
-        if counts.ndim != 2 or counts.dtype.kind not in "iu":
-            raise InputError(
-                f"{self.path}: {topic} must hold whole numbers in rows and columns, "
-                f"not {counts.dtype} {counts.shape}"
-            )
-        if counts.size and not 0 <= counts.min() <= counts.max() <= 65535:
-            raise InputError(f"{self.path}: {topic} has counts outside 0 to 65535")
-        return counts.astype(np.uint16)
+        Raises:
+            Unusable: it has none.
+        """
+        if kind == IMAGE:
+            return image_values(message)
+        if kind in ARRAYS:
+            return array_values(message)
+        name = self.options.field
+        if name is None:
+            raise Unusable(f"is {kind}; give --field, the name of the values in it")
+        if self.axes is None:
+            return field_values(message, name)
+        with suppress(Unusable):
+            three = [field_values(message, f"{name}.{letter}") for letter in "xyz"]
+            return np.stack(three, axis=-1)
+        return field_values(message, name)
 
     def recording(self) -> Recording:
-        """The frames in the order of time, from 0, with joint angles at the frames'
+        """The frames in the order of the log, from 0, with joint angles at the frames'
         times.
 
         Raises:
             InputError: the log has no topic of frames or several, or the frames' shapes
-                differ.
+                or times cannot be used.
         """
         name, frames = self._topic("frames", self._frames)
-        if not frames:
-            raise InputError(
-                f"{self.path}: holds no frames; they must be {' or '.join(FRAMES)}, or "
-                "JSON "
-                '{"counts": [[...]]}'
-            )
-        frames = sorted(frames, key=lambda entry: entry[0])
-        shapes = {picture.shape for _, picture in frames}
+        if frames is None:
+            raise InputError(f"{self.path}: {self._why_empty()}")
+        for topic, reason in self._left_out.items():
+            say(f"{self.path}: left out {topic}, which {reason}")
+        shapes = {np.shape(values) for values in frames.values}
         if len(shapes) > 1:
             raise InputError(
                 f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
             )
-        t = np.array([at for at, _ in frames])
-        joints, names = self._angles(t)
-        rows, cols = shapes.pop()
+        values = np.stack(frames.values)
+        topic, joints = self._topic("joints", self._joints)
+        t = np.array(frames.stamps)
+        by_logging = joints is not None and self._never_meet(frames, joints)
+        if by_logging:
+            t = np.array(frames.logged)
+        order = clock.order(t, f"{self.path}: {name}", "message")
+        if order.text:
+            say(f"{self.path}: {name}: {order.text}")
+        t = t[order.kept]
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
-            "skin": {"rows": rows, "cols": cols, **self.beside.table("skin", {}).raw},
-            **({} if names is None else {"joint_names": list(names)}),
-            **({} if self.arm is None else {"arm": self.arm.to_dict()}),
             "source": f"{self.path.name} {name}",
         }
-        pictures = np.stack([picture for _, picture in frames])
-        return Recording(t=t - t[0], frames=pictures, joints=joints, meta=meta)
+        angles = None
+        if joints is not None:
+            angles, names = self._angles(topic, t, joints, by_logging=by_logging)
+            if names is not None:
+                meta["joint_names"] = list(names)
+        if self.arm is not None:
+            meta["arm"] = self.arm.to_dict()
+        return self._counted(t, values[order.kept], angles, meta)
+
+    def _why_empty(self) -> str:
+        """The sentence for a log without frames."""
+        for topic, reason in self._left_out.items():
+            return f"holds no frames: {topic} {reason}"
+        kinds = f"{IMAGE}, {ARRAYS[2]} or another array"
+        return (
+            f'holds no frames; they must be {kinds}, JSON {{"counts": [[...]]}}, or a '
+            "message of a sensor's own with --field"
+        )
+
+    def _counted(
+        self,
+        t: NDArray[np.float64],
+        values: NDArray[np.float64],
+        angles: NDArray[np.float64] | None,
+        meta: dict[str, Any],
+    ) -> Recording:
+        """The recording of values (n, ...) as counts."""
+        shear = None
+        if self.axes is not None:
+            if values.shape[-1] != 3:
+                raise InputError(
+                    f"{self.path}: --axes needs values of x, y and z, not {values.shape[1:]}"
+                )
+            letters = (self.axes.along, self.axes.around)
+            parts = [self.axes.sign(a) * values[..., "xyz".index(a)] for a in letters]
+            shear = np.stack(parts, axis=-1).reshape(len(t), -1, 2)
+            normal = self.axes.normal
+            values = self.axes.sign(normal) * values[..., "xyz".index(normal)]
+            say(self.axes.text)
+        shape = self._shape(values.shape[1:])
+        flat = Values(values.reshape(len(t), -1), shear)
+        rest = rest_of([flat], self.options)
+        counted = rest.counted(self.path, flat)
+        skin = {**self.beside.table("skin", {}).raw, "rows": shape[0], "cols": shape[1]}
+        if shear is not None:
+            skin["axes"] = 3
+        valid = counted.valid
+        tangential = counted.shear
+        return Recording(
+            t=t - t[0],
+            frames=counted.frames.reshape(-1, *shape),
+            joints=angles,
+            valid=None if valid is None else valid.reshape(-1, *shape),
+            meta={**meta, "skin": skin, **rest.meta},
+            shear=None if tangential is None else tangential.reshape(-1, *shape, 2),
+        )
+
+    def _shape(self, told: tuple[int, ...]) -> tuple[int, int]:
+        """The rows and columns of frames whose messages tell a shape.
+
+        Raises:
+            InputError: nothing tells it, or it is another number of taxels.
+        """
+        asked = asked_shape(self.options.shape)
+        if asked is None and len(told) != 2:
+            skin = self.beside.table("skin", {})
+            if not (skin.has("rows") and skin.has("cols")):
+                raise InputError(
+                    f"{self.path}: its frames do not state their rows and columns; give "
+                    "--shape ROWSxCOLS, or put them as "
+                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into '
+                    f"{self.path.stem}.json beside it"
+                )
+            asked = skin.whole("rows"), skin.whole("cols")
+        rows, cols = asked or (told[0], told[1])
+        taxels = int(np.prod(told))
+        if rows * cols != taxels:
+            raise InputError(
+                f"{self.path}: its frames have {taxels} values, not {rows} x {cols}"
+            )
+        return rows, cols
+
+    def _never_meet(self, frames: Stream, joints: Mapping[str, Stream]) -> bool:
+        """Whether the stamps of frames and angles are of clocks that never meet; it is
+        said."""
+        of_joints = [t for stream in joints.values() for t in stream.stamps]
+        meet = min(of_joints) <= max(frames.stamps) and min(frames.stamps) <= max(
+            of_joints
+        )
+        if meet:
+            return False
+        say(
+            f"{self.path}: the clocks of frames (from {frames.stamps[0]:.3f} s) and joint "
+            f"angles (from {of_joints[0]:.3f} s) never meet; both are taken by the time "
+            "at which they were logged"
+        )
+        return True
 
     def _angles(
-        self, t: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64] | None, tuple[str, ...] | None]:
+        self,
+        topic: str,
+        t: NDArray[np.float64],
+        joints: Mapping[str, Stream],
+        *,
+        by_logging: bool,
+    ) -> tuple[NDArray[np.float64], tuple[str, ...] | None]:
         """Angles (n, dof) at the frames' times, and the joints' names if the log has
         them."""
-        topic, series = self._topic("joints", self._joints)
-        if not series:
-            return None, None
-        logged = tuple(series)
-        named = logged != tuple(map(str, range(len(logged))))
-        wanted = logged
-        if self.arm is not None and named:
-            wanted = self.arm.names
-            try:
-                joint_columns(logged, wanted)
-            except InputError as error:
-                raise InputError(f"{self.path}: {topic} has {error}") from None
-            others = [name for name in logged if name not in wanted]
-            if others:
-                LOG.warning(
-                    f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
-                )
-        elif self.arm is not None and len(logged) != self.arm.dof:
+        logged = tuple(joints)
+        wanted = self._wanted(topic, logged)
+        release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
+        columns = []
+        for name in wanted:
+            stream = joints[name]
+            at = np.array(stream.logged if by_logging else stream.stamps)
+            order = clock.order(at, f"{self.path}: {topic}", "message")
+            angles = np.array(stream.values)[order.kept, None]
+            columns.append(clock.angles_at(t, at[order.kept], angles, release_s)[:, 0])
+        found = np.stack(columns, axis=1)
+        unknown = ~np.isfinite(found).all(axis=1)
+        found[unknown] = np.nan
+        if unknown.all():
             raise InputError(
-                f"{self.path}: {topic} has {len(logged)} angles without names, but the "
-                "arm has "
-                f"{self.arm.dof} joints"
+                f"{self.path}: {topic} has no joint angle at the time of any frame; "
+                "record both with one clock"
             )
-        first = max(min(series[name])[0] for name in wanted)
-        last = min(max(series[name])[0] for name in wanted)
-        gap_s = max(first - t[0], t[-1] - last)
-        if gap_s > OLDEST_S:
+        if unknown.any():
+            say(
+                f"{self.path}: {topic} lacks joint angles for {int(unknown.sum())} of "
+                f"{len(t)} frames, where they are unknown"
+            )
+        named = logged != tuple(map(str, range(len(logged))))
+        return found, wanted if named else None
+
+    def _wanted(self, topic: str, logged: Sequence[str]) -> tuple[str, ...]:
+        """The joints whose angles are taken, in their order."""
+        named = tuple(logged) != tuple(map(str, range(len(logged))))
+        if self.arm is None:
+            return tuple(logged)
+        if not named:
+            if len(logged) != self.arm.dof:
+                raise InputError(
+                    f"{self.path}: {topic} has {len(logged)} angles without names, but "
+                    f"the arm has {self.arm.dof} joints"
+                )
+            return tuple(logged)
+        try:
+            joint_columns(logged, self.arm.names)
+        except InputError as error:
+            raise InputError(f"{self.path}: {topic} has {error}") from None
+        others = [name for name in logged if name not in self.arm.names]
+        if others:
             LOG.warning(
-                f"{self.path}: {topic} lacks joint angles for up to {gap_s:.2f} s of "
-                "the frames; "
-                "the nearest ones are used"
+                f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
             )
-        angles = np.stack([_at(t, series[name]) for name in wanted], axis=1)
-        return angles, wanted if named else None
+        return self.arm.names
 
     def _topic(self, kind: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
         """The topic of a kind that the JSON file names, or else the only one, with its
-        messages."""
+        messages; None where there is none."""
         name = self.beside.get(f"{kind}_topic", None)
+        if name is not None and not (isinstance(name, str) and name in topics):
+            reason = self._left_out.get(str(name))
+            why = f"; it {reason}" if reason else ""
+            raise InputError(
+                f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
+                f"{sorted(self._seen[kind])}, not {shown(name)}{why}"
+            )
         if name is None and len(topics) > 1:
             raise InputError(
                 f"{self.path}: {kind} are on {', '.join(sorted(topics))}; name one of "
-                "them as "
-                f'"{kind}_topic" in {self.path.stem}.json beside it'
+                f'them as "{kind}_topic" in {self.path.stem}.json beside it'
             )
         if name is None:
-            return next(iter(topics.items()), ("", ()))
-        if not isinstance(name, str) or name not in topics:
-            raise InputError(
-                f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
-                f"{sorted(topics)}, not {shown(name)}"
-            )
+            return next(iter(topics.items()), ("", None))
         return name, topics[name]
 
 
-def _at(
-    t: NDArray[np.float64], series: list[tuple[float, float]]
-) -> NDArray[np.float64]:
-    """A joint's angles at times `t`: linear between messages, constant before and after
-    them.
+def image_values(message: Any) -> NDArray[np.float64]:
+    """(rows, columns) values of an image.
 
-    An angle that wraps at +-pi between two messages is taken to have gone the shorter
-    way.
+    Raises:
+        Unusable: it is of another encoding, or damaged.
     """
-    at, angle = np.array(sorted(series)).T
-    angles: NDArray[np.float64] = np.interp(t, at, np.unwrap(angle))
-    return angles
+    size = ENCODINGS.get(message.encoding)
+    if size is None:
+        raise Unusable(f"is {message.encoding}; frames are {', '.join(ENCODINGS)}")
+    raw = np.asarray(message.data, dtype=np.uint8)
+    wide = message.width * size
+    if raw.size != message.height * message.step or message.step < wide:
+        raise Unusable("has an image that does not have its stated size")
+    lines = raw.reshape(message.height, message.step)[:, :wide]
+    kind = f"{'>' if message.is_bigendian else '<'}u{size}"
+    return np.ascontiguousarray(lines).view(kind).astype(np.float64)
+
+
+def array_values(message: Any) -> NDArray[np.float64]:
+    """Values of an array, in the shape of its layout where it has one.
+
+    Raises:
+        Unusable: its layout is not that of its data.
+    """
+    shape = [int(dimension.size) for dimension in message.layout.dim]
+    values = np.asarray(message.data, dtype=np.float64)[message.layout.data_offset :]
+    if len(shape) < 2:
+        return values
+    if values.size != np.prod(shape):
+        raise Unusable(f"has a message of {values.size} values, not {shape}")
+    return values.reshape(shape)
+
+
+def field_values(message: Any, name: str) -> NDArray[np.float64]:
+    """The numbers of a field of a message, such as `forces.z` of each of its forces.
+
+    Raises:
+        Unusable: the message has no such field, or no numbers in it.
+    """
+    found: Any = message
+    for part in name.split("."):
+        found = _part(found, part)
+    try:
+        values = np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise Unusable(f"has no numbers in {name}") from None
+    return values if values.ndim else values[None]
+
+
+def _part(value: Any, name: str) -> Any:
+    """A field of a message, or of each message of a list."""
+    if isinstance(value, list | tuple):
+        return [_part(entry, name) for entry in value]
+    try:
+        return getattr(value, name)
+    except AttributeError:
+        fields = [key for key in vars(value) if not key.startswith("_")]
+        raise Unusable(
+            f"has no field {name}; it has {', '.join(fields) or 'none'}"
+        ) from None

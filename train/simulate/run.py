@@ -8,7 +8,7 @@ from os import cpu_count
 from pathlib import Path
 from typing import Any
 
-from edge import recording
+from edge import saving
 from edge.files import check_writable
 from edge.recording import Recording
 from train.cluster import on_cluster
@@ -163,7 +163,7 @@ def write(
     )
     paths, redrawn, unfelt = [], 0, 0
     for name, trial in _simulated(scene, work, jobs, address):
-        recording.save(target / name, trial, lasting=False)
+        saving.save(target / name, trial, lasting=False)
         paths.append(target / name)
         redrawn += trial.meta["simulation"]["redrawn"] > 0
         unfelt += trial.frames.max(initial=0) <= scene.skin.onset

@@ -14,7 +14,8 @@ from edge.chips.kinds import KINDS, Kind
 from edge.errors import InputError
 from edge.fake.chip import FakeChip
 from edge.fake.player import fake_skin
-from edge.recording import Recording, save
+from edge.recording import Recording
+from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.file import Signal, parse
 from tests.edge.skin.small import mpr121

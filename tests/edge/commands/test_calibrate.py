@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from edge import recording
+from edge import recording, saving
 from edge.commands import calibrate
 from edge.commands.calibrate import (
     NOISY,
@@ -69,7 +69,7 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
 
 def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
     touched = tmp_path / "touched.npz"
-    recording.save(touched, make_touch(arm=False))
+    saving.save(touched, make_touch(arm=False))
     before = skin.read_text()
     status, _, err = edge(
         "calibrate", "--skin", skin, "--fake", touched, "--frames", 100
@@ -155,14 +155,14 @@ def shifted(skin, tmp_path, counts, taxels):
     for row, col in taxels:
         frames[:, row, col] = counts
     path = tmp_path / "leant.npz"
-    recording.save(path, replace(still, frames=frames))
+    saving.save(path, replace(still, frames=frames))
     return path
 
 
 @pytest.fixture
 def calibrated(edge, skin, quiet, tmp_path):
     """A skin file that was calibrated at rest."""
-    recording.save(tmp_path / "rest.npz", recording.load(quiet))
+    saving.save(tmp_path / "rest.npz", recording.load(quiet))
     assert edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)[0] == 0
     return skin
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from edge import recording
+from edge import recording, saving
 from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
@@ -27,7 +27,7 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     """Its sequence number stands still."""
     monkeypatch.setattr("edge.fake.block.RATE_HZ", 0.0)
     skin, rest = skinfile.shipped("matrix"), tmp_path / "rest.npz"
-    recording.save(rest, still(skinfile.load(skin), 2.0))
+    saving.save(rest, still(skinfile.load(skin), 2.0))
     fake = ("--skin", skin, "--fake", rest, "--noise", 0)
     status, (chip,), err = edge("scan", *fake)
     assert (status, chip["state"], chip["invalid"]) == (1, "running", 100)
@@ -83,7 +83,7 @@ def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted)
 @pytest.fixture
 def bare(make_touch, tmp_path):
     """A touch without joint angles, which the model needs."""
-    recording.save(tmp_path / "bare.npz", make_touch(arm=False))
+    saving.save(tmp_path / "bare.npz", make_touch(arm=False))
     return tmp_path / "bare.npz"
 
 

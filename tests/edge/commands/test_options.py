@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge import recording
+from edge import recording, saving
 from edge.cli import main
 from edge.touch.arm import Chain
 
@@ -46,7 +46,7 @@ def files(tmp_path, make_touch, urdf):
     trial = make_touch()
     swing = np.linspace(0.0, 0.2, len(trial.t))
     trial = replace(trial, joints=np.column_stack([swing, 0.5 + swing]))
-    recording.save(tmp_path / "two.npz", trial)
+    saving.save(tmp_path / "two.npz", trial)
     return tmp_path
 
 

@@ -14,7 +14,8 @@ from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.output import touch_map as touchmap
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from edge.tools import label
 
 

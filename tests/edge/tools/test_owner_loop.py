@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from edge import recording
+from edge import recording, saving
 from edge.recording import load
 from edge.skin import file as skinfile
 from tests.conftest import PAPER, export
@@ -27,7 +27,7 @@ def skin(tmp_path, forearm):
 def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     first = load(recordings / "hard_0.npz")
     rest = recording.Recording(first.t[:20], first.frames[:20], meta={})
-    recording.save(tmp_path / "rest.npz", rest)
+    saving.save(tmp_path / "rest.npz", rest)
     assert edge("check", skin)[0] == 0
     assert edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
     assert (

@@ -19,7 +19,8 @@ import pytest
 from edge.commands.source import ending_signals
 from edge.fake.clock import VirtualClock
 from edge.output.event_writer import Lines
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from edge.tools import terminal
 from edge.tools.record import Recorder, Trials, trial_path
 from edge.touch.frame import Frame

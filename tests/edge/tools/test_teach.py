@@ -7,7 +7,8 @@ import pytest
 
 from edge.model.model import Model
 from edge.model.verify import first_series
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 
 ALL_TAXELS = np.full((1, 16, 24), 8, np.uint16)
 

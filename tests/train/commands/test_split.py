@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from edge.touch.track import ContactTracker
 from tests.conftest import in_a_row
 from train.__main__ import main

@@ -1,6 +1,6 @@
 """The command that proposes thresholds."""
 
-from edge.recording import save
+from edge.saving import save
 from tests.train.test_thresholds import noisy, weaker
 from train.__main__ import main
 

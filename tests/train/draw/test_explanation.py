@@ -3,7 +3,7 @@ trials."""
 
 import numpy as np
 
-from edge.recording import save
+from edge.saving import save
 from train.__main__ import main
 
 

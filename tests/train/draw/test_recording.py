@@ -8,7 +8,8 @@ from matplotlib.image import imread
 
 from edge import demo
 from edge.errors import InputError
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from train.__main__ import main
 from train.draw.recording import draw
 

@@ -135,20 +135,6 @@ def test_steps_that_may_be_seconds_or_milliseconds_are_asked_for():
     assert taken(table("t", "s1"), unit="ms").unit == "ms"
 
 
-@pytest.mark.parametrize(
-    ("times", "sentence"),
-    [
-        ([0.0, 0.1, 0.1, 0.2, 0.3], "stands still at row 3"),
-        ([0.0, 0.1, 0.05, 0.2, 0.3], "goes back by 0.05 s at row 3"),
-        ([0.0, 0.1, np.nan, 0.2, 0.3], "row 3 has no time"),
-    ],
-)
-def test_times_must_rise(times, sentence):
-    given = table("s1", t=times)
-    with pytest.raises(InputError, match=sentence):
-        times_of(given, taken(given))
-
-
 def test_a_line_says_what_was_taken():
     given = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
     found = meaning(given, given.names, Wishes(unit="ms"))

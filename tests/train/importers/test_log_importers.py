@@ -1,5 +1,6 @@
 """CSV frames, bags and MCAP files, made here and imported through the command."""
 
+import argparse
 import json
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Bag1
 from rosbags.rosbag2 import Writer as Bag2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from edge.errors import InputError
 from edge.recording import load
@@ -22,6 +23,7 @@ JOINT_T = 99.99 + np.arange(8) / 50
 JOINTS = RNG.uniform(-1, 1, (8, DOF))
 BESIDE = {"labels": {"object": "cup"}, "skin": {"threshold_counts": 50, "wraps": True}}
 NAMES = tuple(f"j{i}" for i in range(DOF))
+OPTIONS = argparse.Namespace(axes=None, flip=None, field=None, shape=None)
 STORES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
 
 
@@ -296,7 +298,235 @@ def test_a_json_message_that_is_no_table_is_named_with_its_topic(tmp_path):
     with pytest.raises(
         InputError, match=r"grasp: a message of /skin must be a table, not \[\]"
     ):
-        Log.of(tmp_path / "grasp").json("/skin", b"[]", 0.0)
+        Log.of(tmp_path / "grasp", None, OPTIONS).json("/skin", b"[]", 0.0)
+
+
+def add_topic(bag, types, topic, kind, messages):
+    """Write messages, (t, message), on a further topic of an open bag."""
+    connection = bag.add_connection(topic, kind, typestore=types)
+    for t, message in messages:
+        data = types.serialize_cdr(message, kind)
+        bag.write(connection, nanoseconds(t + 0.007), data)
+
+
+def skin_and(path, *others, frames=None, joints=True):
+    """A bag of the skin, its arm's joints, and further (topic, kind, messages)."""
+    types = STORES[2]
+    with Bag2(path, version=9) as bag:
+        skin = frames or list(zip(T, images(), strict=True))
+        add_topic(bag, types, "/skin", skin[0][1].__msgtype__, skin)
+        if joints:
+            states = [
+                (t, joint_state(types, t, q))
+                for t, q in zip(JOINT_T, JOINTS, strict=True)
+            ]
+            add_topic(bag, types, "/joints", "sensor_msgs/msg/JointState", states)
+        for topic, kind, messages in others:
+            add_topic(bag, types, topic, kind, messages)
+    return path
+
+
+def camera():
+    """Colour images, which are no frames."""
+    types = STORES[2]
+    picture = types.types["sensor_msgs/msg/Image"](
+        header=header(types, T[0]),
+        height=2,
+        width=2,
+        encoding="rgb8",
+        is_bigendian=0,
+        step=6,
+        data=np.zeros(12, np.uint8),
+    )
+    return "/camera", "sensor_msgs/msg/Image", [(T[0], picture)]
+
+
+def test_a_colour_camera_beside_the_skin_is_left_out_and_said(tmp_path, capsys):
+    path = skin_and(tmp_path / "grasp", camera())
+    assert differences(imported(tmp_path, "rosbag", path)) == []
+    assert (
+        "left out /camera, which is rgb8; frames are mono16" in capsys.readouterr().out
+    )
+
+
+def test_a_topic_that_is_not_named_is_never_read(tmp_path, capsys):
+    broken = image(STORES[2], T[0], FRAMES[0])
+    broken.step = 1
+    other = ("/other", "sensor_msgs/msg/Image", [(T[0], broken)])
+    path = skin_and(tmp_path / "grasp", camera(), other)
+    (tmp_path / "grasp.json").write_text('{"frames_topic": "/skin"}')
+    assert differences(imported(tmp_path, "rosbag", path)) == []
+    assert "left out" not in capsys.readouterr().out
+
+
+def test_a_camera_alone_is_no_skin(tmp_path, refusal):
+    types = STORES[2]
+    with Bag2(tmp_path / "grasp", version=9) as bag:
+        add_topic(bag, types, *camera())
+    said = refusal("import", "rosbag", tmp_path / "grasp", "--out", tmp_path / "out")
+    assert "holds no frames: /camera is rgb8; frames are mono16" in said
+
+
+def test_joints_outside_the_arm_may_have_no_angles(tmp_path, arm):
+    states = []
+    for t, q in zip(JOINT_T, JOINTS, strict=True):
+        states.append((t, (*NAMES, "wheel"), [*q, np.nan]))
+        states.append((t + 0.001, ("base_x", "base_y"), []))
+    path = write_bag(tmp_path / "grasp", 2, images(), states=states)
+    assert differences(imported(tmp_path, "rosbag", path, *arm)) == []
+
+
+def test_frames_whose_time_goes_back_are_refused_and_never_sorted_in(tmp_path, refusal):
+    stamps = [*T[:6], *(T[:6] + 0.005)]
+    frames = [
+        (t, image(STORES[2], stamp, frame))
+        for t, stamp, frame in zip(T, stamps, FRAMES, strict=True)
+    ]
+    path = skin_and(tmp_path / "grasp", frames=frames, joints=False)
+    said = refusal("import", "rosbag", path, "--out", tmp_path / "out")
+    assert "/skin: its time goes back by 0.045 s at message 7; split it there" in said
+
+
+def test_angles_across_a_gap_are_unknown(tmp_path, capsys):
+    t = np.concatenate([T[:6], T[6:] + 1.0])
+    frames = [
+        (at, image(STORES[2], at, frame)) for at, frame in zip(t, FRAMES, strict=True)
+    ]
+    path = skin_and(tmp_path / "grasp", frames=frames)
+    recording = imported(tmp_path, "rosbag", path)
+    assert np.isfinite(recording.joints[:6]).all()
+    assert np.isnan(recording.joints[6:]).all()
+    assert "lacks joint angles for 6 of 12 frames" in capsys.readouterr().out
+
+
+def test_clocks_that_never_meet_are_joined_by_the_time_of_logging(tmp_path, capsys):
+    types = STORES[2]
+    states = [
+        (t, joint_state(types, t - 90.0, q))
+        for t, q in zip(JOINT_T, JOINTS, strict=True)
+    ]
+    with Bag2(tmp_path / "grasp", version=9) as bag:
+        skin = list(zip(T, images(), strict=True))
+        add_topic(bag, types, "/skin", "sensor_msgs/msg/Image", skin)
+        add_topic(bag, types, "/joints", "sensor_msgs/msg/JointState", states)
+    assert differences(imported(tmp_path, "rosbag", tmp_path / "grasp")) == []
+    assert "never meet; both are taken by the time" in capsys.readouterr().out
+
+
+def multi_array(name, values):
+    """A MultiArray message without a layout."""
+    types = STORES[2]
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    return types.types[f"std_msgs/msg/{name}"](layout=layout, data=values)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "scale", "options"),
+    [
+        ("Float32MultiArray", np.float32, 0.25, ("--scale", 4)),
+        ("Int16MultiArray", np.int16, 1, ()),
+        ("UInt8MultiArray", np.uint8, 1, ()),
+        ("Float64MultiArray", np.float64, 0.5, ("--scale", 2)),
+    ],
+)
+def test_arrays_of_every_kind_are_frames(tmp_path, name, kind, scale, options):
+    counts = FRAMES % 200
+    frames = [
+        (t, multi_array(name, (frame.reshape(-1) * scale).astype(kind)))
+        for t, frame in zip(T, counts, strict=True)
+    ]
+    path = skin_and(tmp_path / "grasp", frames=frames, joints=False)
+    shape = ("--shape", f"{ROWS}x{COLS}")
+    recording = imported(tmp_path, "rosbag", path, *shape, *options)
+    assert np.array_equal(recording.frames, counts)
+
+
+SENSOR = """std_msgs/Header header
+xela/Taxel[] taxels
+================================================================================
+MSG: xela/Taxel
+int16 x
+int16 y
+int16 z
+"""
+SENSOR_KIND = "xela/msg/Stream"
+
+
+def sensor_types():
+    """A sensor's own messages, as its maker defines them."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    text = SENSOR.replace("xela/Taxel", "xela/msg/Taxel")
+    text = text.replace("std_msgs/Header", "std_msgs/msg/Header")
+    types.register(get_types_from_msg(text, SENSOR_KIND))
+    return types
+
+
+def sensor_messages(types):
+    """Messages whose taxels have x and y beside the counts of `FRAMES`, cut to 15
+    bits."""
+    taxel, stream = types.types["xela/msg/Taxel"], types.types[SENSOR_KIND]
+    for t, frame in zip(T, FRAMES >> 1, strict=True):
+        taxels = [taxel(x=z // 4, y=-(z // 8), z=z) for z in frame.reshape(-1).tolist()]
+        yield t, stream(header=header(types, t), taxels=taxels)
+
+
+def sensor_bag(tmp_path):
+    types = sensor_types()
+    with Bag2(tmp_path / "grasp", version=9) as bag:
+        add_topic(bag, types, "/xela", SENSOR_KIND, sensor_messages(types))
+    return "rosbag", tmp_path / "grasp"
+
+
+def sensor_mcap(tmp_path):
+    types = sensor_types()
+    path = tmp_path / "grasp.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start()
+        schema = writer.register_schema(SENSOR_KIND, "ros2msg", SENSOR.encode())
+        channel = writer.register_channel("/xela", "cdr", schema)
+        for t, message in sensor_messages(types):
+            data = bytes(types.serialize_cdr(message, SENSOR_KIND))
+            writer.add_message(channel, nanoseconds(t), data, nanoseconds(t))
+        writer.finish()
+    return "mcap", path
+
+
+@pytest.mark.parametrize("make", [sensor_bag, sensor_mcap])
+def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(tmp_path, make):
+    kind, path = make(tmp_path)
+    shape = ("--shape", f"{ROWS}x{COLS}")
+    recording = imported(tmp_path, kind, path, "--field", "taxels.z", *shape)
+    assert np.array_equal(recording.frames, FRAMES >> 1)
+    assert recording.shear is None
+
+
+@pytest.mark.parametrize("make", [sensor_bag, sensor_mcap])
+def test_its_three_axes_are_shear(tmp_path, make):
+    kind, path = make(tmp_path)
+    options = ("--field", "taxels", "--axes", "xyz", "--flip", "y")
+    shape = ("--shape", f"{ROWS}x{COLS}")
+    recording = imported(tmp_path, kind, path, *options, *shape)
+    counts = (FRAMES >> 1).astype(np.int16)
+    assert np.array_equal(recording.frames, counts)
+    assert np.array_equal(recording.shear[..., 0], counts // 4)
+    assert np.array_equal(recording.shear[..., 1], counts // 8)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ((), "holds no frames"),
+        (("--field", "forces"), "/xela has no field forces; it has header, taxels"),
+        (("--field", "taxels.w"), "/xela has no field w; it has x, y, z"),
+        (("--field", "taxels.z"), "do not state their rows and columns; give --shape"),
+        (("--field", "taxels.z", "--shape", "5x5"), "24 values, not 5 x 5"),
+    ],
+)
+def test_a_field_that_is_not_there_is_named(tmp_path, refusal, options, sentence):
+    kind, path = sensor_bag(tmp_path)
+    said = refusal("import", kind, path, "--out", tmp_path / "out", *options)
+    assert sentence in said
 
 
 def cut_mcap(tmp_path):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import train
-from edge.recording import load, save
+from edge.recording import load
+from edge.saving import save
 from train.pipeline import ContactClassifier
 from train.report.summary import (
     LEAK,

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from edge.recording import save
+from edge.saving import save
 from tests import browser
 from tests.conftest import rows_of, save_touches
 from train.__main__ import main

@@ -1,0 +1,103 @@
+"""Recordings as one long table, and back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import edge
+from train.__main__ import main
+
+pytest.importorskip("pyarrow", reason="needs pyarrow")
+
+
+@pytest.fixture
+def folder(make_touch, tmp_path):
+    """Two recordings with labels, joints, and a taxel that could not be read."""
+    for number in range(2):
+        touch = make_touch()
+        valid = np.ones(touch.frames.shape, dtype=bool)
+        valid[3, 4, 5] = number == 0
+        labels = {"object": f"thing {number}", "softness": "soft"}
+        meta = {**touch.meta, "labels": labels}
+        edge.save(
+            tmp_path / "in" / f"touch_{number}.npz",
+            replace(touch, valid=valid, meta=meta),
+        )
+    return tmp_path / "in"
+
+
+def saved(folder, form, *options):
+    out = folder.parent / f"all.{form}"
+    words = ["save", str(folder), "--as", form, "--out", str(out), *options]
+    assert main(words) == 0
+    return out
+
+
+def test_a_table_has_a_row_for_each_frame(folder, capsys):
+    table = pd.read_parquet(saved(folder, "parquet"))
+    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    assert len(table) == sum(len(r.t) for r in recordings)
+    second = table[table["trial"] == "touch_1"]
+    assert set(second["object"]) == {"thing 1"}
+    assert second["t_s"].tolist() == recordings[1].t.tolist()
+    counts = second["taxel_4_6"].to_numpy(dtype=int)
+    assert counts.tolist() == recordings[1].frames[:, 4, 6].tolist()
+    assert second["taxel_4_5"].isna().tolist() == [i == 3 for i in range(len(second))]
+    assert "frames of 2 recordings" in capsys.readouterr().out
+
+
+def test_import_reads_the_table_back(folder, tmp_path):
+    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    names = [f"joint_{name}" for name in recordings[0].joint_names or range(1, 6)]
+    out = str(tmp_path / "back")
+    table = str(saved(folder, "parquet"))
+    joints = ("--joints", ",".join(names))
+    assert main(["import", "csv", table, "--out", out, *joints]) == 0
+    for recording, path in zip(
+        recordings, sorted((tmp_path / "back").glob("*.npz")), strict=True
+    ):
+        back = edge.load(path)
+        valid = recording.valid
+        assert (back.frames * valid == recording.frames * valid).all()
+        assert back.t == pytest.approx(recording.t - recording.t[0])
+        assert back.joints == pytest.approx(recording.joints)
+        assert back.labels == recording.labels
+
+
+def test_hdf5_holds_an_array_for_each_quantity(folder):
+    h5py = pytest.importorskip("h5py")
+    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    with h5py.File(saved(folder, "hdf5")) as file:
+        frames = np.concatenate([r.frames for r in recordings])
+        assert file["frames"][()].tobytes() == frames.tobytes()
+        assert file["joints"].shape == (len(frames), 5)
+        assert not file["valid"][len(recordings[0].t) + 3, 4, 5]
+        objects = file["labels/object"].asstr()[()]
+        assert sorted(set(objects)) == ["thing 0", "thing 1"]
+        assert file["trial"].asstr()[0] == "touch_0"
+
+
+def test_shear_has_columns_of_its_own(folder):
+    for path in folder.glob("*.npz"):
+        touch = edge.load(path)
+        quarter = (touch.frames // 4).astype(np.int16)
+        shear = np.stack([quarter, -quarter], axis=3)
+        edge.save(path, replace(touch, shear=shear))
+    table = pd.read_parquet(saved(folder, "parquet"))
+    names = [name for name in table.columns if name.endswith("_along")]
+    along = table[names].to_numpy()
+    around = table[[name.replace("along", "around") for name in names]].to_numpy()
+    assert along.max() > 0
+    assert (around == -along).all()
+
+
+def test_recordings_that_do_not_fit_together_are_named(folder, make_touch, capsys):
+    touch = make_touch(arm=False)
+    edge.save(folder / "z.npz", replace(touch, joints=None))
+    out = folder.parent / "all.parquet"
+    words = ["save", str(folder), "--as", "parquet", "--out", str(out)]
+    assert main(words) == 2
+    assert "z.npz: its skin or joints are not those of" in capsys.readouterr().err
+    assert not out.exists()

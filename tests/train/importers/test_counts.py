@@ -1,0 +1,81 @@
+"""Values as counts: their rest, their scale, and what is no count."""
+
+import argparse
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from train.importers.counts import Rest, Values, asked_shape, rest_of
+
+
+def options(**given):
+    usual = {"falls": False, "signed": False, "scale": 1.0}
+    return argparse.Namespace(**{**usual, **given})
+
+
+def trial(*rows, shear=None) -> Values:
+    return Values(np.array(rows, dtype=float), shear)
+
+
+def test_counts_stay_as_they_are():
+    counted = rest_of([trial([0, 5], [7, 9])], options()).counted("a", trial([0, 5]))
+    assert counted.frames.tolist() == [[0, 5]]
+    assert counted.valid is None
+    assert counted.shear is None
+
+
+def test_values_that_fall_are_subtracted_from_the_quietest_start():
+    first = trial([100, 90], [100, 90], [100, 90], [60, 90])
+    touched = trial([50, 90], [50, 90], [50, 90], [40, 90])
+    rest = rest_of([touched, first], options(falls=True))
+    assert rest.values.tolist() == [100, 90]
+    assert rest.counted("a", first).frames[3].tolist() == [40, 0]
+
+
+def test_signed_values_count_their_distance_with_all_their_digits():
+    values = trial([0.5, -1.0], [0.5, -1.0], [0.5, -1.0], [0.25, -1.5])
+    rest = rest_of([values], options(signed=True))
+    assert rest.scale == 100.0
+    assert rest.counted("a", values).frames[3].tolist() == [25, 50]
+    assert rest.meta == {"values": {"counts_per_unit": 100.0, "rest": [0.5, -1.0]}}
+
+
+def test_shear_loses_its_rest_where_the_normal_does():
+    shear = np.array([[[3.0, -4.0]]] * 3 + [[[5.0, -10.0]]])
+    values = trial([1], [1], [1], [2], shear=shear)
+    signed = rest_of([values], options(signed=True)).counted("a", values)
+    assert signed.shear[3].tolist() == [[2, -6]]
+    plain = rest_of([values], options()).counted("a", values)
+    assert plain.shear[3].tolist() == [[5, -10]]
+
+
+def test_a_missing_value_is_not_valid():
+    counted = Rest(None, 1, 1.0).counted("a", trial([1, np.nan]))
+    assert counted.valid.tolist() == [[True, False]]
+    assert counted.frames.tolist() == [[1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("values", "hint"),
+    [([-1.0], "see --signed, --falls"), ([0.5], "see --falls"), ([7e4], "see --falls")],
+)
+def test_what_is_no_count_is_refused(values, hint):
+    with pytest.raises(InputError, match=rf"a.csv: .* are no counts .*; {hint}"):
+        Rest(None, 1, 1.0).counted("a.csv", trial(values))
+
+
+def test_values_cannot_fall_and_be_signed():
+    with pytest.raises(InputError, match="exclude each other"):
+        rest_of([trial([1])], options(falls=True, signed=True))
+
+
+def test_a_shape_is_rows_and_columns():
+    assert asked_shape("16x24") == (16, 24)
+    assert asked_shape(None) is None
+
+
+@pytest.mark.parametrize("text", ["16", "x", "axb", "16x", f"{'1' * 5000}x2", "²x2"])
+def test_another_text_is_no_shape(text):
+    with pytest.raises(InputError, match="--shape must be ROWSxCOLS"):
+        asked_shape(text)

@@ -1,0 +1,133 @@
+"""LeRobot data sets of both layouts, made here and imported through the command."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import edge
+from train.__main__ import main
+
+pytest.importorskip("pyarrow", reason="needs pyarrow")
+
+N, TAXELS = 30, 6
+TASKS = ("grasp the cup", "grasp the box")
+
+
+def episode(number, *, axes=1):
+    """The columns of an episode; counts tell their episode, frame and taxel."""
+    counts = 100 * number + np.arange(N)[:, None] + 10 * np.arange(TAXELS)
+    values = counts.astype(float)
+    if axes == 3:
+        values = np.stack([counts // 2, -(counts // 4), counts], axis=2)
+    return pd.DataFrame(
+        {
+            "observation.tactile": list(values.tolist()),
+            "observation.state": [[0.1 * i, -0.2 * i] for i in range(N)],
+            "observation.temperature": np.full(N, 22.0),
+            "timestamp": 0.02 * np.arange(N),
+            "frame_index": np.arange(N),
+            "episode_index": number,
+            "task_index": number % 2,
+        }
+    )
+
+
+def data_set(folder, version, **options):
+    """A data set of four episodes."""
+    meta = folder / "meta"
+    meta.mkdir(parents=True)
+    names = {"motors": ["shoulder", "elbow"]}
+    features = {"observation.state": {"dtype": "float32", "names": names}}
+    info = {"codebase_version": version, "features": features}
+    (meta / "info.json").write_text(json.dumps(info))
+    chunk = folder / "data" / "chunk-000"
+    chunk.mkdir(parents=True)
+    episodes = [episode(number, **options) for number in range(4)]
+    if version == "v2.1":
+        lines = [
+            json.dumps({"task_index": i, "task": task}) for i, task in enumerate(TASKS)
+        ]
+        (meta / "tasks.jsonl").write_text("\n".join(lines))
+        for number, data in enumerate(episodes):
+            data.to_parquet(chunk / f"episode_{number:06}.parquet")
+    else:
+        tasks = pd.DataFrame({"task_index": [0, 1]}, index=list(TASKS))
+        tasks.to_parquet(meta / "tasks.parquet")
+        pd.concat(episodes).to_parquet(chunk / "file-000.parquet")
+    return folder
+
+
+def imported(folder, out, *options):
+    words = ["--taxels", "observation.tactile", "--out", str(out)]
+    assert main(["import", "lerobot", str(folder), *words, *options]) == 0
+    return [edge.load(path) for path in sorted(out.glob("*.npz"))]
+
+
+@pytest.mark.parametrize("version", ["v2.1", "v3.0"])
+def test_an_episode_is_a_trial_and_its_task_the_label(tmp_path, version, capsys):
+    folder = data_set(tmp_path / "set", version)
+    recordings = imported(folder, tmp_path / "out", "--shape", "2x3")
+    assert [r.labels["object"] for r in recordings] == [*TASKS, *TASKS]
+    for number, recording in enumerate(recordings):
+        expected = np.stack(episode(number)["observation.tactile"]).reshape(N, 2, 3)
+        assert recording.frames.tolist() == expected.tolist()
+        assert recording.t == pytest.approx(0.02 * np.arange(N))
+        assert recording.joints is None
+    said = capsys.readouterr().out
+    assert 'taxels: "observation.tactile" (6, as 2 x 3), label: the episode' in said
+
+
+def test_joints_come_with_their_names(tmp_path):
+    folder = data_set(tmp_path / "set", "v2.1")
+    joints = ("--joints", "observation.state")
+    first = imported(folder, tmp_path / "out", *joints)[0]
+    assert first.joint_names == ("shoulder", "elbow")
+    assert first.joints[3] == pytest.approx([0.3, -0.6])
+    assert first.frames.shape[1:] == (1, TAXELS)
+
+
+def test_three_axes_are_shear(tmp_path):
+    folder = data_set(tmp_path / "set", "v3.0", axes=3)
+    options = ("--axes", "xyz", "--flip", "y", "--shape", "2x3")
+    second = imported(folder, tmp_path / "out", *options)[1]
+    counts = second.frames.astype(int)
+    assert counts[0].ravel().tolist() == [100, 110, 120, 130, 140, 150]
+    assert (second.shear[..., 0] == counts // 2).all()
+    assert (second.shear[..., 1] == counts // 4).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--taxels", "observation.skin"), "has no column observation.skin; it has"),
+        (("--taxels", "observation.tactile", "--shape", "5x5"), "has 6 values, not 5"),
+        (("--taxels", "observation.tactile", "--joints", "q"), "has no column q"),
+        (("--taxels", "observation.tactile", "--axes", "xyz"), "needs values of x, y"),
+        (("--taxels", "observation.state"), "are no counts"),
+    ],
+)
+def test_what_does_not_suit_is_one_sentence(tmp_path, options, sentence, capsys):
+    folder = data_set(tmp_path / "set", "v2.1")
+    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
+    assert main([*words, *options]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_folder_that_is_no_data_set_is_refused(tmp_path, capsys):
+    words = ["import", "lerobot", str(tmp_path), "--out", str(tmp_path / "out")]
+    assert main([*words, "--taxels", "x"]) == 2
+    assert "holds no meta/info.json" in capsys.readouterr().err
+
+
+def test_frames_of_several_lengths_are_named_with_their_episode(tmp_path, capsys):
+    folder = data_set(tmp_path / "set", "v2.1")
+    file = folder / "data" / "chunk-000" / "episode_000002.parquet"
+    data = episode(2)
+    data.at[5, "observation.tactile"] = [1.0, 2.0]
+    data.to_parquet(file)
+    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
+    assert main([*words, "--taxels", "observation.tactile"]) == 2
+    said = capsys.readouterr().err
+    assert "episode 2: observation.tactile does not hold numbers of one shape" in said

@@ -1,0 +1,122 @@
+"""One rule of time for tables, hands and logs, which is the board's own.
+
+Frames come in the order of their file. A time that goes back a little, within the
+jitter of a clock, puts its frame in its place; one that goes back further is refused,
+since two touches would be mixed. Of two frames at one time the later counts. Joint
+angles are interpolated, but not across a gap.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.errors import InputError
+
+JITTER_STEPS = 0.5
+"""A time may go back by so many of the usual steps."""
+MOST_REPEATED = 0.01
+"""Share of the frames that may have the time of the frame before."""
+GAP_STEPS = 5.0
+"""A gap of more than so many of the joints' usual steps, and of more than the skin's
+`release_s`, is not interpolated."""
+HOLD_S = 0.1
+"""How long angles hold before the first message and after the last."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """The frames that count, in the order of time.
+
+    Attributes:
+        kept: (m,) indices of the frames.
+        swapped: number of frames whose time went back within the jitter.
+        repeated: number of frames left out, as a later one has the same time.
+    """
+
+    kept: NDArray[np.intp]
+    swapped: int
+    repeated: int
+
+    @property
+    def text(self) -> str:
+        """What was done, in words; empty for times that increase."""
+        parts = []
+        if self.swapped:
+            parts.append(f"{self.swapped} times went back within the jitter")
+        if self.repeated:
+            parts.append(
+                f"{self.repeated} frames were left out, as later ones have their times"
+            )
+        return "; ".join(parts)
+
+
+def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
+    """Which of frames at some times count.
+
+    Args:
+        t: (n,) seconds.
+        where: names the file in errors.
+        frame: what a frame is called there, such as `row`.
+
+    Raises:
+        InputError: a time is not finite, goes back by more than the jitter, or stands
+            still.
+    """
+    bad = np.flatnonzero(~np.isfinite(t))
+    if len(bad):
+        raise InputError(f"{where}: {frame} {bad[0] + 1} has no time")
+    steps = np.diff(t)
+    forward = steps[steps > 0.0]
+    jitter_s = JITTER_STEPS * float(np.median(forward)) if len(forward) else 0.0
+    back = np.flatnonzero(steps < -jitter_s)
+    if len(back):
+        raise InputError(
+            f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
+            f"{back[0] + 2}; split it there, or mend the times"
+        )
+    kept = np.argsort(t, kind="stable")
+    last = np.append(np.diff(t[kept]) > 0.0, True)
+    repeated = int((~last).sum())
+    if repeated > MOST_REPEATED * len(t):
+        still = int(kept[np.flatnonzero(~last)[0] + 1])
+        raise InputError(
+            f"{where}: its time stands still at {frame} {still + 1}; name another time, "
+            "or mend the times"
+        )
+    return Order(kept[last], int((steps < 0.0).sum()), repeated)
+
+
+def angles_at(
+    t: NDArray[np.float64],
+    joints_t: NDArray[np.float64],
+    angles: NDArray[np.float64],
+    release_s: float,
+) -> NDArray[np.float64]:
+    """Joint angles (n, dof) at the frames' times.
+
+    They are linear between two messages that are no gap apart, hold for `HOLD_S` before
+    the first message and after the last, and are NaN elsewhere. An angle that wraps at
+    +-pi between two messages is taken to have gone the shorter way.
+
+    Args:
+        t: (n,) seconds.
+        joints_t: (m,) seconds of the messages, increasing.
+        angles: (m, dof) radians.
+        release_s: of the skin; a longer step is a gap, unless it is less than five
+            usual steps.
+    """
+    whole = np.unwrap(angles, axis=0)
+    columns = [np.interp(t, joints_t, column) for column in whole.T]
+    found = np.stack(columns, axis=1)
+    gap_s = release_s
+    if len(joints_t) > 1:
+        gap_s = max(release_s, GAP_STEPS * float(np.median(np.diff(joints_t))))
+    after = np.searchsorted(joints_t, t, side="left").clip(0, len(joints_t) - 1)
+    before = (np.searchsorted(joints_t, t, side="right") - 1).clip(0)
+    across_s = joints_t[after] - joints_t[before]
+    outside_s = np.maximum(joints_t[0] - t, t - joints_t[-1])
+    # A clock counts in steps of its own; a gap is longer by more than rounding.
+    unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
+    found[unknown] = np.nan
+    return np.asarray(found)

@@ -1,0 +1,251 @@
+"""LeRobot data sets (v2.1 and v3): Parquet files with `observation.*` columns.
+
+FOLDER is a data set with `meta/info.json` and `data/`. A trial is an episode; its label
+is the episode's task. --taxels names the column of the skin, such as
+observation.tactile, whose values are a list a frame; --joints that of the joint angles
+in radians.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from edge.config import ConfigTable, read_json, shown
+from edge.errors import InputError
+from edge.files import parsing, read_text
+from edge.recording import Recording
+from edge.touch.arm import Chain
+from train.importers import clock, counts
+from train.importers.axes import Axes
+from train.importers.counts import Rest, Values, asked_shape, rest_of
+from train.importers.reading import read_parquet
+from train.progress import say
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add options for the columns."""
+    add = parser.add_argument
+    add("--taxels", required=True, metavar="COL", help="the column of the taxels")
+    add("--joints", metavar="COL", help="the column of the joint angles in radians")
+    add(
+        "--task",
+        default="object",
+        help="the task whose labels are the episodes' tasks (default: %(default)s)",
+    )
+    counts.add_options(parser)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A trial before its values are counted.
+
+    Attributes:
+        number: of the episode.
+        label: its task; empty without one.
+        t: (n,) seconds.
+        values: of its taxels, (n, taxels).
+        shape: that the values of a frame have.
+        joints: (n, dof) radians, or None.
+    """
+
+    number: int
+    label: str
+    t: NDArray[np.float64]
+    values: Values
+    shape: tuple[int, ...]
+    joints: NDArray[np.float64] | None
+
+
+def trials(
+    path: Path, arm: Chain | None, options: argparse.Namespace
+) -> Iterator[tuple[str, Recording]]:
+    """One recording for each episode.
+
+    Raises:
+        InputError: the folder is no such data set, or lacks a column.
+    """
+    info = path / "meta" / "info.json"
+    if not info.is_file():
+        raise InputError(
+            f"{path}: holds no meta/info.json; give the folder of a LeRobot data set"
+        )
+    table = ConfigTable(read_json(info), str(info))
+    names = joint_names(table, options.joints)
+    episodes = list(_episodes(path, options))
+    rest = rest_of([episode.values for episode in episodes], options)
+    shape = _shape(path, episodes[0], options)
+    first = episodes[0].values.normal.shape[1]
+    say(
+        f'time: "timestamp" in s, taxels: "{options.taxels}" ({first}, as '
+        f"{shape[0]} x {shape[1]}), label: the episode's task"
+    )
+    for episode in episodes:
+        meta: dict[str, Any] = {"source": path.name}
+        if episode.label:
+            meta["labels"] = {options.task: episode.label}
+        if episode.joints is not None:
+            meta["arm"] = None if arm is None else arm.to_dict()
+            if names is not None:
+                meta["joint_names"] = names
+        yield (
+            f"episode_{episode.number:06}",
+            _recording(path, episode, rest, shape, meta),
+        )
+
+
+def joint_names(info: ConfigTable, column: str | None) -> list[str] | None:
+    """The names of the joints in a column, where the data set tells them."""
+    if column is None:
+        return None
+    feature = info.table("features", {}).raw.get(column, {})
+    names = feature.get("names") if isinstance(feature, Mapping) else None
+    if isinstance(names, Mapping):  # such as {"motors": [...]}
+        names = next(iter(names.values()), None)
+    texts = isinstance(names, list) and all(isinstance(n, str) for n in names)
+    return list(names) if texts else None  # type: ignore[arg-type] # checked above
+
+
+def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
+    """The episodes of all files, in the order of their numbers."""
+    files = sorted((path / "data").rglob("*.parquet"))
+    if not files:
+        raise InputError(f"{path}: holds no data/**/*.parquet; fetch it again")
+    tasks = task_names(path)
+    axes = Axes.of(options)
+    for file in files:
+        data = read_parquet(file).data
+        for column in ("episode_index", "timestamp", options.taxels, options.joints):
+            if column is not None and column not in data.columns:
+                raise InputError(
+                    f"{file}: has no column {column}; it has {shown(list(data.columns))}"
+                )
+        for number, rows in data.groupby("episode_index", sort=True):
+            yield _episode(file, int(number), rows, tasks, options, axes)
+
+
+def _episode(
+    file: Path,
+    number: int,
+    rows: pd.DataFrame,
+    tasks: Mapping[int, str],
+    options: argparse.Namespace,
+    axes: Axes | None,
+) -> Episode:
+    """One episode of a file."""
+    where = f"{file}: episode {number}"
+    t = rows["timestamp"].to_numpy(np.float64)
+    order = clock.order(t, where)
+    if order.text:
+        say(f"{where}: {order.text}")
+    kept = order.kept
+    frames = stacked(where, rows[options.taxels])[kept]
+    joints = None
+    if options.joints is not None:
+        joints = stacked(where, rows[options.joints])[kept].reshape(len(kept), -1)
+    shear = None
+    if axes is not None:
+        if frames.shape[-1] != 3:
+            raise InputError(f"{where}: --axes needs values of x, y and z a taxel")
+        parts = [
+            axes.sign(letter) * frames[..., "xyz".index(letter)]
+            for letter in (axes.along, axes.around)
+        ]
+        shear = np.stack(parts, axis=-1).reshape(len(kept), -1, 2)
+        frames = axes.sign(axes.normal) * frames[..., "xyz".index(axes.normal)]
+    label = ""
+    if "task_index" in rows.columns:
+        label = tasks.get(int(rows["task_index"].iloc[0]), "")
+    values = Values(frames.reshape(len(kept), -1), shear)
+    return Episode(number, label, t[kept], values, frames.shape[1:], joints)
+
+
+def stacked(where: str, column: pd.Series) -> NDArray[np.float64]:
+    """(n, ...) numbers of a column of numbers, lists or lists of lists.
+
+    Raises:
+        InputError: its lists are of several lengths, or hold no numbers.
+    """
+    try:
+        nested = [np.array(_plain(value), dtype=np.float64) for value in column]
+        return np.stack(nested).reshape(len(column), *(nested[0].shape or (1,)))
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{where}: {column.name} does not hold numbers of one shape in each frame"
+        ) from None
+
+
+def _plain(value: Any) -> Any:
+    """A cell as nested lists; Parquet's are arrays of arrays."""
+    if isinstance(value, np.ndarray):
+        return [_plain(entry) for entry in value]
+    return value
+
+
+def task_names(path: Path) -> dict[int, str]:
+    """{index: text} of the tasks of a data set; empty where it tells none.
+
+    Raises:
+        InputError: their file is damaged.
+    """
+    lines = path / "meta" / "tasks.jsonl"
+    table = path / "meta" / "tasks.parquet"
+    tasks: dict[int, str] = {}
+    if lines.is_file():
+        with parsing(str(lines), "a list of tasks", "; fetch it again"):
+            for line in read_text(lines).splitlines():
+                entry = json.loads(line)
+                tasks[int(entry["task_index"])] = str(entry["task"])
+    elif table.is_file():
+        data = read_parquet(table).data
+        with parsing(str(table), "a table of tasks", "; fetch it again"):
+            texts = data["task"] if "task" in data.columns else data.index
+            for index, text in zip(data["task_index"], texts, strict=True):
+                tasks[int(index)] = str(text)
+    return tasks
+
+
+def _shape(
+    path: Path, episode: Episode, options: argparse.Namespace
+) -> tuple[int, int]:
+    """The rows and columns of the skin."""
+    taxels = episode.values.normal.shape[1]
+    told = episode.shape if len(episode.shape) == 2 else (1, taxels)
+    rows, cols = asked_shape(options.shape) or (told[0], told[1])
+    if rows * cols != taxels:
+        raise InputError(
+            f"{path}: {options.taxels} has {taxels} values, not {rows} x {cols}; give "
+            "--shape"
+        )
+    return rows, cols
+
+
+def _recording(
+    path: Path,
+    episode: Episode,
+    rest: Rest,
+    shape: tuple[int, int],
+    meta: dict[str, Any],
+) -> Recording:
+    """The recording of an episode."""
+    counted = rest.counted(f"{path}: episode {episode.number}", episode.values)
+    skin: dict[str, Any] = {"rows": shape[0], "cols": shape[1]}
+    shear = counted.shear
+    if shear is not None:
+        skin["axes"] = 3
+        shear = shear.reshape(-1, *shape, 2)
+    valid = counted.valid
+    return Recording(
+        t=episode.t - episode.t[0],
+        frames=counted.frames.reshape(-1, *shape),
+        joints=episode.joints,
+        valid=None if valid is None else valid.reshape(-1, *shape),
+        meta={**meta, "skin": skin, "trial": episode.number, **rest.meta},
+        shear=shear,
+    )
