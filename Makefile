@@ -117,7 +117,11 @@ endif
 
 # FRONT=fast, balanced, accurate, milliseconds or an accuracy: a point that `make tradeoff` found.
 ifdef FRONT
-FRONTED := --front $(FRONT) --fronts $(OUT)/tradeoff/front.json
+FRONTS := $(firstword $(wildcard $(OUT)/tradeoff/front.json build/tradeoff/front.json))
+ifeq ($(FRONTS)$(findstring n,$(firstword -$(MAKEFLAGS))),)
+$(error FRONT needs the points of `make tradeoff`; run make tradeoff with the same DATA and OUT first)
+endif
+FRONTED := --front $(FRONT) --fronts $(or $(FRONTS),$(OUT)/tradeoff/front.json)
 endif
 
 export: $(READY)
@@ -204,7 +208,8 @@ BOARD := $(OUT)/tradeoff/board.json
 FORMATS := $(OUT)/tradeoff/formats.json
 tradeoff: $(READY)
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --out $(OUT)/tradeoff --check
-	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff --quick
+	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff \
+	  $(filter --quick,$(TRADEOFF))
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
 	$(BIN)/python -m export.arithmetic --model $(OUT)/tradeoff/model.onnx \
 	  --golden $(OUT)/tradeoff/golden.npz --out $(FORMATS)

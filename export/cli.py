@@ -118,7 +118,7 @@ def parser() -> argparse.ArgumentParser:
     option(
         "--front",
         metavar="WHAT",
-        help="the quick choice at the window of a point of `make tradeoff`: fast, balanced, "
+        help="the choice at the window of a point of `make tradeoff`: fast, balanced, "
         "accurate, milliseconds to decide within, or an accuracy (0 to 1) to reach",
     )
     option(
@@ -152,7 +152,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_writable(arguments.out)  # before the work, which may take an hour
     window_s, quick = arguments.window, arguments.quick
     if arguments.front is not None:
-        window_s, quick = _of_front(arguments).window_s, True
+        front, point = _of_front(arguments)
+        window_s = point.window_s
+        quick = front.quick
     points = arguments.decision_points
     if window_s is None and points not in (None, "none"):
         window_s = WINDOW_S
@@ -203,8 +205,10 @@ def tested(path: Path, former: str | None, recordings: Sequence[str]) -> str:
     return "\n\n".join(lines)
 
 
-def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
-    """The operating point that was asked for."""
+def _of_front(
+    arguments: argparse.Namespace,
+) -> tuple[fronts.ParetoFront, fronts.OperatingPoint]:
+    """The front of `make tradeoff`, and the operating point that was asked for."""
     given = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
     if given:
         raise InputError(
@@ -219,7 +223,7 @@ def _of_front(arguments: argparse.Namespace) -> fronts.OperatingPoint:
         f"{point.milliseconds:.0f} ms",
         file=sys.stderr,
     )
-    return point
+    return front, point
 
 
 def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:

@@ -281,7 +281,14 @@ def load(
     recordings = read(paths, progress=options.progress)
     if options.fixed_window_s is None and not (options.quick or recordings.mixed):
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
-        windows = _windows(seconds)
+        windows = windows_of(seconds)
+    return trials_of(recordings, windows, options)
+
+
+def trials_of(
+    recordings: Recordings, windows: tuple[float, ...], options: FitOptions
+) -> Loaded:
+    """The trials of recordings, up to the last of some windows."""
     notes: list[str] = []
     dataset = _with_thresholds(recordings, windows, options, notes)
     return Loaded(dataset, windows, notes)
@@ -377,7 +384,7 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     choosing = options.choosing(dataset, y, drawn=_are_drawn(dataset))
     windows = loaded.windows
     if len(windows) > 1:
-        windows = _windows(
+        windows = windows_of(
             [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
         )
     window_s, notes = choosing.window(windows)
@@ -478,7 +485,7 @@ def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(wanted)
 
 
-def _windows(seconds: Sequence[float]) -> tuple[float, ...]:
+def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
     """The windows to try for touches that last so many seconds each.
 
     They reach the time that a tenth of the touches last; of shorter ones the last

@@ -30,6 +30,7 @@ from edge.files import NameTaken, check_writable, refusing
 from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import save
+from edge.skin.file import SkinFile, frame_rate
 from edge.skin.skin import Skin
 from edge.tools import terminal
 from edge.tools.page import Page
@@ -48,6 +49,9 @@ LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
 KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
 DIGITS = "123456789"
+
+WIRE_FRAMES = 20
+"""Frames whose bits are counted together, as some transactions are rare."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -284,8 +288,18 @@ def _metadata(opened: Opened, arm: Chain | None) -> dict[str, Any]:
         "skin_name": file.name,
         "source": opened.source,
         "rate_hz": file.reading.rate_hz,
+        "wire_s": wire_s(file),
     }
     return meta if arm is None else {**meta, "arm": arm.to_dict()}
+
+
+def wire_s(file: SkinFile) -> float:
+    """Seconds that a frame takes on the skin's wires, from the drivers' own
+    transactions."""
+    from edge.fake.player import frame_bits  # counts the bits on a fake bus
+
+    bits = [total / WIRE_FRAMES for total in frame_bits(file, WIRE_FRAMES)]
+    return round(1.0 / frame_rate(bits, [bus.clock_hz for bus in file.buses]), 6)
 
 
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:

@@ -10,7 +10,7 @@ from edge.recording import Recording
 from edge.saving import save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
-from train.fitting import FitOptions, _decision_points, _leaks, _windows
+from train.fitting import FitOptions, _decision_points, _leaks, windows_of
 from train.pipeline import Choice
 
 
@@ -163,4 +163,4 @@ def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are
     ],
 )
 def test_windows_reach_as_far_as_a_tenth_of_the_touches(seconds, windows):
-    assert _windows(seconds) == pytest.approx(windows)
+    assert windows_of(seconds) == pytest.approx(windows)

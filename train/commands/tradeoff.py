@@ -43,6 +43,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--scene",
         help="the scene that they were simulated from: adds the physical limit",
     )
+    text = "try few candidates at each window, and say by how much that differs"
+    option("--quick", action="store_true", help=text)
     option("--task", help="task of front.json (default: category, or else the first)")
     option(
         "--out",
@@ -93,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         wrong=arguments.cost[0],
         second=arguments.cost[1],
         formats_path=arguments.formats,
+        quick=arguments.quick,
     )
     print(report)
     return 0

@@ -6,10 +6,11 @@ from train.evaluate import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.choices import WINDOWS_S, unseen
-from train.tradeoff.early import FOLDS, Certified, StoppingComparison
+from train.tradeoff.choices import unseen
+from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
+from train.tradeoff.uses import EARLY, cheapest, distinct
 
 TABLE_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows in the tables."""
@@ -17,18 +18,15 @@ TITLE_S = (0.4, 1.2)
 """Windows with their accuracy in a panel's title."""
 ACROSS = 3
 """At most so many panels stand side by side."""
-EARLY = (
-    f"make export EXPORT='--quick --decision-points {WINDOWS_S[0]}:{WINDOWS_S[-1]}:0.1'"
-)
-"""The command that exports a model for early decisions."""
 
 
 def answers(measured: Measured, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
     after_s = measured.after_s
+    export = measured.commands.export(*EARLY)
     rows: list[Row] = []
     for window, tasks in measured.points.items():
-        if window in TABLE_S:
+        if window in TABLE_S or window > TABLE_S[-1]:
             unmet = unseen(tasks[task])
             rows.append(
                 {
@@ -41,7 +39,7 @@ def answers(measured: Measured, task: str) -> list[Row]:
                     if unmet is None
                     else percent(unmet.accuracy)
                 }
-                | {"command": f"`make export EXPORT='--quick --window {window:g}'`"}
+                | {"command": f"`{measured.commands.export(f'--window {window:g}')}`"}
             )
     for rule in distinct(measured.comparisons[task]):
         rows.append(
@@ -50,21 +48,12 @@ def answers(measured: Measured, task: str) -> list[Row]:
                 "time s": round(rule.mean_s + after_s, 3),
             }
             | shares(rule.result)
-            | {"command": f"`{EARLY}`, then `edge-classify run --error {rule.asked:g}`"}
+            | {
+                "command": f"`{export}`, then `edge-classify run --error {rule.asked:g}`"
+            }
         )
     guess = {"decision": "always the most frequent label", "time s": 0.0}
     return [*rows, guess | shares(majority(measured.y[task]))]
-
-
-def distinct(compared: StoppingComparison) -> list[Certified]:
-    """The rules that most folds certify; one that serves two error rates stands at the
-    smaller."""
-    able = [
-        certified for certified in compared.certified if certified.folds > FOLDS // 2
-    ]
-    return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[
-        ::-1
-    ]
 
 
 def section(measured: Measured) -> Section:
@@ -75,7 +64,7 @@ def section(measured: Measured) -> Section:
             Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y
         ],
         figures=[drawn(measured)],
-        widget=slider(measured.points),
+        widget=slider(measured),
     )
 
 
@@ -130,43 +119,42 @@ def early(measured: Measured) -> Section:
 
 
 def prices(measured: Measured) -> Section:
-    """The cheapest window, by the price of a wrong decision and of waiting for a
+    """The cheapest use, by the price of a wrong decision and of waiting for a
     second."""
     rows: list[Row] = []
     for task in measured.y:
-        paid = {
-            window: measured.wrong * (1.0 - result.accuracy)
-            + measured.second * (window + measured.after_s)
-            for window, result in measured.results(task).items()
-        }
-        best = min(paid, key=paid.__getitem__)
-        rows.append(
-            {"task": task, "best window s": best, "mean price": round(paid[best], 2)}
-            | {"command": f"`make export EXPORT='--quick --window {best:g}'`"}
+        best = cheapest(measured, task)
+        low, high = best.result.interval
+        least, mean, most = (
+            round(best.price(accuracy, measured), 2)
+            for accuracy in (high, best.result.accuracy, low)
         )
+        row: Row = {"task": task, "best use": best.name, "mean price": mean}
+        row["95 % interval"] = f"{least:g} to {most:g}"
+        row["command"] = f"`{best.command}`"
+        rows.append(row)
+    command = measured.commands.tradeoff("--cost wrong=10,second=1")
     return Section(
         "The price of a wrong decision",
         [
             "Waiting makes errors rarer, and costs time. In this table a wrong "
-            "decision costs "
-            f"{measured.wrong:g}, and waiting for a second costs {measured.second:g}. "
-            "Give your "
-            'own prices with `make tradeoff TRADEOFF="--cost wrong=10,second=1"`. The '
-            "best of "
-            "several windows looks a little better than it is, because chance helped "
-            "to choose it."
+            f"decision costs {measured.wrong:g}, and waiting for a second costs "
+            f"{measured.second:g}. Give your own prices with `{command}`. The best of "
+            "several uses looks a little better than it is, because chance helped to "
+            "choose it."
         ],
-        [Table("price", "The window with the lowest mean price of a decision", rows)],
+        [Table("price", "The use with the lowest mean price of a decision", rows)],
     )
 
 
 def reasons(measured: Measured) -> Section:
     """The physical reason for the time, and the commands that export the models."""
+    wire = "The recordings do not tell the skin's wires, whose time is left out. The"
+    if measured.wire_s is not None:
+        wire = f"The last frame takes {1e3 * measured.wire_s:.1f} ms over the wire. The"
     notes = [
-        "Nearly all of the time is spent waiting for the contact to unfold. The last "
-        "frame takes "
-        f"{1e3 * measured.wire_s:.1f} ms over the wire, and the arithmetic of a "
-        "decision takes "
+        "Nearly all of the time is spent waiting for the contact to unfold. "
+        f"{wire} arithmetic of a decision takes "
         f"{1e3 * measured.board.arithmetic_s:.2f} ms on {measured.board.name}."
     ]
     slow = sorted(measured.breakaways.items(), key=lambda item: -item[1])
@@ -179,23 +167,19 @@ def reasons(measured: Measured) -> Section:
             "this time, mu_s m g / (k v), for the middle of each object's friction and "
             "mass."
         )
+    commands = measured.commands
+    kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
-        "All accuracies belong to the quick choice, `make export EXPORT=--quick`, made "
-        "at each "
-        "window. To export one of the measured models, use `make export FRONT=fast`, "
-        "`FRONT=balanced` (a window of at most 0.9 s) or `FRONT=accurate`. `FRONT=500` "
-        "exports the "
-        "most accurate one within 500 ms, and `FRONT=0.8` the fastest one that reaches "
-        "80 %.",
-        f"For early decisions, export a model with `{EARLY}`. With this model, "
-        "`edge-classify run "
-        "--error 0.1` decides as soon as it may while at most one decision in ten is "
-        "wrong. It "
-        "refuses an error rate that the trials cannot certify, and names the smallest "
-        "rate that "
-        "they can. Leave a margin above that rate. Early decisions were not measured "
-        "on objects "
-        "never met.",
+        *measured.notes,
+        f"All accuracies belong to the {kind}, made at each window. To export one of "
+        f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
+        "of at most 0.9 s) or `accurate` in place of `fast`; `500` is the most accurate "
+        "one within 500 ms, and `0.8` the fastest one that reaches 80 %.",
+        f"For early decisions, export a model with `{commands.export(*EARLY)}`. With "
+        "this model, `edge-classify run --error 0.1` decides as soon as it may while at "
+        "most one decision in ten is wrong. It refuses an error rate that the trials "
+        "cannot certify, and names the smallest rate that they can. Leave a margin "
+        "above that rate. Early decisions were not measured on objects never met.",
     ]
     rows: list[Row] = [
         {"object": name, "time until it moves s": round(at, 2)} for name, at in slow
@@ -307,12 +291,12 @@ def _split(figure: Any, measured: Measured) -> None:
     """Draw the parts of the time until a decision after the full window, and the end
     magnified."""
     window, after_ms = max(measured.points), 1e3 * measured.after_s
-    wire_ms, arithmetic_ms = 1e3 * measured.wire_s, 1e3 * measured.board.arithmetic_s
-    stages = [
-        (f"wait {window:g} s", 1e3 * window),
-        (f"wire {wire_ms:.0f} ms", wire_ms),
-        (f"arithmetic {arithmetic_ms:.1f} ms", arithmetic_ms),
-    ]
+    arithmetic_ms = 1e3 * measured.board.arithmetic_s
+    stages = [(f"wait {window:g} s", 1e3 * window)]
+    if measured.wire_s is not None:
+        wire_ms = 1e3 * measured.wire_s
+        stages.append((f"wire {wire_ms:.0f} ms", wire_ms))
+    stages.append((f"arithmetic {arithmetic_ms:.1f} ms", arithmetic_ms))
     rows = figure.subplots(2, 1)
     start = 1e3 * window - 0.25 * after_ms
     ends = (0.0, 1e3 * window + after_ms), (start, 1e3 * window + 1.02 * after_ms)

@@ -8,11 +8,6 @@ from edge.errors import InputError
 from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")
-INSTRUCTIONS = {"a frame in contact": 219_768, "the frame that decides": 1_708_087}
-"""Instructions on aarch64 for the model of `edge-classify demo`, counted by `make
-board-test`."""
-ESTIMATED = {"Raspberry Pi Zero 2 W": 1.0, "Raspberry Pi 4": 1.5, "Raspberry Pi 5": 2.4}
-"""{board: clock of one core in GHz}."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +62,6 @@ def read(path: str | os.PathLike[str]) -> Board:
     return board
 
 
-def estimated_s(board: str, step: str = "the frame that decides") -> float:
-    """Estimated seconds of a step on a board of `ESTIMATED`, at one instruction a
-    cycle."""
-    return INSTRUCTIONS[step] / (1e9 * ESTIMATED[board])
-
-
 FORMAT = (
     "format",
     "decision us",
@@ -104,45 +93,26 @@ def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
 
 
 def section(board: Board) -> Section:
-    """The figures in the board file, and estimates for boards that were not
-    measured."""
+    """The figures in the board file."""
     rows = [
         {"stage": name, "median us": median, "99th percentile us": p99}
         for name, (median, p99) in board.stages_us.items()
     ]
-    estimates = [
-        {"step": step, "instructions": count}
-        | {f"{name} ms": round(1e3 * estimated_s(name, step), 2) for name in ESTIMATED}
-        for step, count in INSTRUCTIONS.items()
-    ]
-    clocks = ", ".join(f"{name} {clock:g} GHz" for name, clock in ESTIMATED.items())
     return Section(
         "The board",
         [
             "`edge-classify bench` measured these times with the model "
             f"{board.model[:12]} on {board.name}. The program takes "
-            f"{board.memory_mb:.0f} MB of "
-            f"memory, and the model is ready {board.cold_start_ms:.0f} ms after the "
-            "start of "
-            "Python. The stage `region` finds the contact in a frame; `track` does "
-            "this and "
-            "measures the contact; `answer` is features and decision; `frame` and "
-            "`last` are all "
-            "work for a frame in a contact, and for the frame that decides. The "
-            "arithmetic of a "
-            "decision is the sum of the medians of track, features and decision.",
-            "No Raspberry Pi was measured. The times for Raspberry Pis are estimates: "
-            "`make board-test` counts the aarch64 instructions under an emulator, for "
-            "the model of "
-            "`edge-classify demo` with three features, and the estimate assumes one "
-            "instruction a "
-            f"cycle ({clocks}). Run `edge-classify bench` on your board for its own "
-            "times.",
+            f"{board.memory_mb:.0f} MB of memory, and the model is ready "
+            f"{board.cold_start_ms:.0f} ms after the start of Python. The stage `region` "
+            "finds the contact in a frame; `track` does this and measures the contact; "
+            "`answer` is features and decision; `frame` and `last` are all work for a "
+            "frame in a contact, and for the frame that decides. The arithmetic of a "
+            "decision is the sum of the medians of track, features and decision. Another "
+            "board has other times: run `edge-classify bench` on it, and give the file "
+            "as `BOARD=board.json`.",
         ],
-        [
-            Table("board", "Stages", rows, timed=("median us", "99th percentile us")),
-            Table("boards", "Estimates for other boards", estimates, narrow=5),
-        ],
+        [Table("board", "Stages", rows, timed=("median us", "99th percentile us"))],
     )
 
 

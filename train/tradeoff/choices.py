@@ -1,20 +1,53 @@
-"""The quick choice of `make export`, made at each window and for changed recordings."""
+"""The choice of `make export`, made at each window and for changed recordings."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from edge.touch.features import WINDOW_S
+from edge.touch.layout import SkinLayout
 from train.candidates import candidates
 from train.choose import TRIAL, Chosen, kinds_of
 from train.dataset import DataSet, Recordings, load_trials
 from train.evaluate import Result
 from train.feature_sets import expand
-from train.fitting import fit
+from train.fitting import FitOptions, fit, trials_of, windows_of
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
-"""Windows of the report, which are also the decision points of its early decisions."""
+"""Decision points of the report's early decisions."""
+CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
+"""Windows of the report, closer where most things begin to move."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The trials that `make export` would fit.
+
+    Attributes:
+        dataset: with export's thresholds, and the features of all its candidates.
+        windows: of the report: `CHOSEN_S`, and the longer ones that export tries.
+        notes: sentences that a user should read.
+    """
+
+    dataset: DataSet
+    windows: tuple[float, ...]
+    notes: Sequence[str]
+
+
+def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Prepared:
+    """The trials of recordings as export takes them."""
+    options = FitOptions(quick=quick, jobs=jobs, progress=True)
+    if quick or raw.mixed:
+        loaded = trials_of(raw, CHOSEN_S, options)
+        return Prepared(loaded.dataset, CHOSEN_S, loaded.notes)
+    seconds = [float(r.t[-1] - r.t[0]) for r in raw.recordings]
+    loaded = trials_of(raw, (*CHOSEN_S, windows_of(seconds)[-1]), options)
+    trials = loaded.dataset.trials
+    tried = windows_of([float(t.recording.t[-1]) - t.onset_s for t in trials])
+    longer = tuple(window for window in tried if window > CHOSEN_S[-1])
+    return Prepared(loaded.dataset, (*CHOSEN_S, *longer), loaded.notes)
 
 
 def followed(
@@ -23,9 +56,18 @@ def followed(
     *,
     quick: bool = True,
     progress: bool = False,
+    like: SkinLayout | None = None,
 ) -> DataSet:
     """The trials of recordings, with the features of all candidates and further ones by
-    name."""
+    name.
+
+    Args:
+        raw: the recordings.
+        features: names of further ones.
+        quick: the candidates of a quick choice.
+        progress: show progress bars on stderr.
+        like: a skin whose thresholds are taken; those of the recordings where None.
+    """
     drawn = kinds_of(raw.recordings) is not None
     tried = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
     sets = [name for candidate in tried for name in candidate.sets]
@@ -34,14 +76,16 @@ def followed(
         horizon_s=WINDOWS_S[-1],
         features=expand([*sets, *features]),
         progress=progress,
+        threshold=None if like is None else like.threshold_counts,
+        onset=None if like is None else like.onset,
     )
 
 
 def chosen(
     dataset: DataSet, window_s: float = WINDOW_S, **given: Any
 ) -> dict[str, Chosen]:
-    """Each task's choice, as `python -m export --quick --window` makes it with options
-    `given`."""
+    """Each task's choice, as `python -m export --window` makes it with options
+    `given`; by default a quick one."""
     form = {
         "window_s": window_s,
         "quick": True,

@@ -11,6 +11,7 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.features import WINDOW_S
+from edge.touch.layout import SkinLayout
 from train.choose import Chosen
 from train.dataset import DataSet, Recordings
 from train.evaluate import finest, stratified_folds
@@ -19,7 +20,6 @@ from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
 from train.report.work import Workers
 from train.tradeoff import shear
-from train.tradeoff.board import ESTIMATED, estimated_s
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
 from train.tradeoff.wires import Wire, wires
@@ -32,6 +32,8 @@ PARTS = (2, 4)
 FEWEST = 20
 """Smallest number of trials for a choice."""
 TIME = "time on this machine"
+ALL = "all candidates"
+"""The change from a quick choice to that of `make export`."""
 Hits = Mapping[tuple[Path, int], bool]
 """{(recording, number of its contact): whether the answer is right}."""
 
@@ -81,7 +83,7 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     # The longest first: it runs beside the others.
     cases = [
         Change(
-            "all candidates (`make export`)",
+            ALL,
             "longer training",
             raw,
             given={"quick": False},
@@ -143,12 +145,19 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     }
 
 
-def answered(change: Change) -> tuple[dict[str, Hits], float]:
+def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
     """{task: hits of the choice made with a change}, and the seconds of one core that
-    it took."""
+    it took.
+
+    Args:
+        change: to measure.
+        like: the skin whose thresholds are taken.
+    """
     began = time.process_time()
     source, quick = change.source, change.given.get("quick", True)
-    dataset = source if isinstance(source, DataSet) else followed(source, quick=quick)
+    dataset = source
+    if not isinstance(dataset, DataSet):
+        dataset = followed(dataset, quick=quick, like=like)
     made = hits(dataset, chosen(dataset, **change.given))
     return made, time.process_time() - began
 
@@ -172,30 +181,41 @@ def measure(
     Args:
         raw: the recordings.
         dataset: their trials.
-        windows: the choices at each window.
+        windows: the choices at each window; waiting is compared with these, and every
+            other change with the quick choice.
         rate_hz: frames a second.
         workers: the processes.
     """
-    base = hits(dataset, windows[WINDOW_S])
     waits = [
         Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         for w in WAITS_S
     ]
-    cases = changes(raw, dataset, rate_hz)
-    afters = [(hits(dataset, windows[w]), 0.0) for w in WAITS_S]
-    afters += workers.map("costs", answered, [(case,) for case in cases])
-    return [
-        {"change": case.name, "saves or costs": case.price}
-        | {
-            f"{task}, points": points(
-                difference(base[task], after[task], fewer=case.fewer)
-            )
-            for task in base
-            if task in after
-        }
-        | {TIME: f"{seconds:.1f} s to train" if seconds else ""}
-        for case, (after, seconds) in zip([*waits, *cases], afters, strict=True)
+    at_windows = hits(dataset, windows[WINDOW_S])
+    rows = [
+        row_of(wait, at_windows, hits(dataset, windows[w]), 0.0)
+        for wait, w in zip(waits, WAITS_S, strict=True)
     ]
+    cases = changes(raw, dataset, rate_hz)
+    jobs = [(Change("the quick choice", "", dataset), dataset.layout)]
+    jobs += [(case, dataset.layout) for case in cases]
+    (base, _), *afters = workers.map("costs", answered, jobs)
+    for case, (after, seconds) in zip(cases, afters, strict=True):
+        rows.append(row_of(case, base, after, seconds))
+    return rows
+
+
+def row_of(
+    case: Change, base: Mapping[str, Hits], after: Mapping[str, Hits], seconds: float
+) -> Row:
+    """The row of a change: the points that it gains, and what it saves or costs."""
+    row: Row = {"change": case.name}
+    for task in base:
+        if task in after:
+            gain = difference(base[task], after[task], fewer=case.fewer)
+            row[f"{task}, points"] = points(gain)
+    row["saves or costs"] = case.price
+    row[TIME] = f"{seconds:.1f} s to train" if seconds else ""
+    return row
 
 
 def section(measured: Measured) -> Section:
@@ -213,21 +233,14 @@ def section(measured: Measured) -> Section:
             }
             for row in measured.formats
         ),
-        *(
-            {"change": f"deciding on a {board}"}
-            | {"saves or costs": f"about {1e3 * estimated_s(board):.1f} ms to decide"}
-            | dict.fromkeys((f"{task}, points" for task in measured.y), "the same bits")
-            for board in ESTIMATED
-        ),
     ]
     return Section(
         "Savings, and the accuracy that they cost",
         [
-            f"Each row changes one thing of the quick choice at {WINDOW_S:g} s, and "
-            "makes the "
-            "choice again with the features that suit the change. A larger taxel reads "
-            "the sum of "
-            "the forces on its area. The last section explains points and intervals.",
+            f"Each row changes one thing of the choice at {WINDOW_S:g} s: a shorter wait "
+            "of the choice above, everything else of the quick choice, which is made "
+            "again with the features that suit the change. A larger taxel reads the sum "
+            "of the forces on its area. The last section explains points and intervals.",
             "The rows of number formats are about the exported graph, measured with "
             "`python -m "
             "export.arithmetic` on this machine. Labels are compared on the model's "
@@ -235,9 +248,7 @@ def section(measured: Measured) -> Section:
             "vectors. A distance depends on the batch if it has other bits when its "
             "vector is "
             "decided alone. Only whole numbers give the same bits in any order of "
-            "summation, and "
-            "so on every machine. The boards' times are estimates; see the section on "
-            "the board.",
+            "summation, and so on every machine.",
         ],
         [
             Table(
@@ -245,7 +256,7 @@ def section(measured: Measured) -> Section:
                 "Accuracy gained or lost by each change",
                 rows,
                 timed=(TIME,),
-                narrow=3,
+                narrow=1 + len(measured.y),
             )
         ],
     )

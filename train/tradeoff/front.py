@@ -1,4 +1,4 @@
-"""The points of `make export FRONT=`: windows, with the accuracy of the quick choice at
+"""The points of `make export FRONT=`: windows, with the accuracy of the choice at
 each."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BALANCED_S = 0.9
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A window, and the accuracy of the quick choice at that window.
+    """A window, and the accuracy of the choice at that window.
 
     Attributes:
         window_s: seconds from onset that a decision waits for.
@@ -42,19 +42,24 @@ class ParetoFront:
     Attributes:
         task: the task whose accuracy the points have.
         points: the fastest first, each more accurate than those before it.
+        quick: whether the choices are quick ones.
     """
 
     task: str
     points: tuple[OperatingPoint, ...]
+    quick: bool = False
 
     @classmethod
-    def of(cls, points: Points, task: str, after_s: float = 0.0) -> ParetoFront:
+    def of(
+        cls, points: Points, task: str, after_s: float = 0.0, *, quick: bool = False
+    ) -> ParetoFront:
         """The windows that no other beats in both time and accuracy.
 
         Args:
             points: the choices at each window, the shortest first.
             task: the task whose accuracy counts.
             after_s: seconds from the end of a window to the decision.
+            quick: whether the choices are quick ones.
         """
         best: list[OperatingPoint] = []
         for window_s, tasks in points.items():
@@ -64,12 +69,18 @@ class ParetoFront:
                 best.append(
                     OperatingPoint(window_s, after, result.accuracy, *result.interval)
                 )
-        return cls(task, tuple(best))
+        return cls(task, tuple(best), quick)
 
     def to_dict(self, digest: str) -> dict[str, Any]:
         """The contents of front.json, for recordings with a digest."""
         points = [asdict(point) for point in self.points]
-        return {"format": 2, "task": self.task, "data_digest": digest, "points": points}
+        return {
+            "format": 3,
+            "task": self.task,
+            "data_digest": digest,
+            "quick": self.quick,
+            "points": points,
+        }
 
     @classmethod
     def read(cls, path: Path, digest: str) -> ParetoFront:
@@ -92,6 +103,7 @@ class ParetoFront:
                 for point in content["points"]
             ]
             task, measured = str(content["task"]), str(content["data_digest"])
+            quick = bool(content["quick"])
             if not points or not all(
                 0.0 < p.window_s <= 60.0 and p.milliseconds for p in points
             ):
@@ -102,7 +114,8 @@ class ParetoFront:
                 "these have "
                 f"{digest[:12]}); {mend} DATA=... of these"
             )
-        return cls(task, tuple(sorted(points, key=lambda point: point.milliseconds)))
+        fastest_first = sorted(points, key=lambda point: point.milliseconds)
+        return cls(task, tuple(fastest_first), quick)
 
     def pick(self, wanted: str) -> OperatingPoint:
         """The operating point that a user asks for.

@@ -7,6 +7,7 @@ from train.evaluate import Labels, Result
 from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
+from train.tradeoff.commands import Commands
 from train.tradeoff.early import StoppingComparison
 from train.tradeoff.shear import Compared
 
@@ -18,13 +19,16 @@ class Measured:
     Attributes:
         y: {task: (n,) labels}, the main task first.
         board: figures of the machine that decides.
-        wire_s: from the end of the window until its last frame is read.
+        wire_s: from the end of the window until its last frame is read; None where the
+            recordings do not tell the skin's wires.
         breakaways: {object: seconds} until static friction breaks; empty without a
             scene.
-        points: the quick choice at each window.
+        points: the choice at each window.
         comparisons: {task: early decisions compared with fixed windows}.
         costs: a row for each change of the choice at the usual window
             (`costs.measure`).
+        commands: that make these models.
+        notes: sentences of the choice.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
         formats: the number formats (`board.read_formats`); empty if unknown.
@@ -33,11 +37,13 @@ class Measured:
 
     y: Labels
     board: Board
-    wire_s: float
+    wire_s: float | None
     breakaways: Mapping[str, float]
     points: Points
     comparisons: Mapping[str, StoppingComparison]
     costs: Sequence[Row]
+    commands: Commands
+    notes: Sequence[str] = ()
     wrong: float = 10.0
     second: float = 1.0
     formats: Sequence[Mapping[str, str | float]] = ()
@@ -45,8 +51,9 @@ class Measured:
 
     @property
     def after_s(self) -> float:
-        """Seconds from the end of the window to the decision."""
-        return self.wire_s + self.board.arithmetic_s
+        """Seconds from the end of the window to the decision, as far as they are
+        known."""
+        return (self.wire_s or 0.0) + self.board.arithmetic_s
 
     def results(self, task: str) -> dict[float, Result]:
         """{window: accuracy of a task on left-out trials}."""

@@ -3,6 +3,7 @@ board."""
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +12,17 @@ from edge.errors import InputError
 from edge.files import write_whole
 from train.dataset import read
 from train.report.page import write
-from train.report.section import Section, counted
+from train.report.section import Row, Section, counted
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.tradeoff import answer, costs, early, shear
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, chosen, followed
+from train.tradeoff.choices import WINDOWS_S, chosen, prepared
+from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
-from train.tradeoff.wires import waited_s
+from train.tradeoff.wires import wire_time_s
 
 SECTIONS: tuple[Callable[[Measured], Section], ...] = (
     answer.section,
@@ -48,6 +50,11 @@ def require_enough(trials: int) -> None:
         )
 
 
+def rows_by_change(rows: Sequence[Row]) -> dict[str, Row]:
+    """{change: its row}."""
+    return {str(row["change"]): row for row in rows}
+
+
 def tradeoff(
     data: Sequence[str],
     out: Path,
@@ -59,9 +66,9 @@ def tradeoff(
     wrong: float = 10.0,
     second: float = 1.0,
     formats_path: str | None = None,
+    quick: bool = False,
 ) -> Path:
-    """Measure the quick choice at each window and with each change, and write the
-    report.
+    """Measure the choice at each window and with each change, and write the report.
 
     Args:
         data: recordings and folders of them.
@@ -75,6 +82,7 @@ def tradeoff(
             second.
         formats_path: the file that `python -m export.arithmetic` wrote about that
             model.
+        quick: make quick choices.
 
     Returns:
         The path of report.html.
@@ -88,7 +96,8 @@ def tradeoff(
     scene = None if scene_path is None else scenes.load(scene_path)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
-    dataset = followed(raw, progress=True)
+    ready = prepared(raw, quick=quick, jobs=jobs)
+    dataset = ready.dataset
     require_enough(len(dataset.trials))
     main = main or ("category" if "category" in dataset.tasks else dataset.tasks[0])
     if main not in dataset.tasks:
@@ -98,26 +107,37 @@ def tradeoff(
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     y = {task: dataset.labels(task) for task in order}
     workers = Workers(jobs)
-    made = workers.map("windows", chosen, [(dataset, window) for window in WINDOWS_S])
-    points = dict(zip(WINDOWS_S, made, strict=True))
+    choose = partial(chosen, quick=quick)
+    made = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
+    points = dict(zip(ready.windows, made, strict=True))
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
-    comparisons = early.compare_stopping(dataset, WINDOWS_S, jobs=jobs)
+    comparisons = early.compare_stopping(dataset, WINDOWS_S, quick=quick, jobs=jobs)
     sheared = None
     if dataset.layout.axes:
         measured_with = shear.Answers(points, comparisons)
-        sheared = shear.compared(dataset, measured_with, workers)
+        sheared = shear.compared(dataset, measured_with, workers, quick=quick)
+    rows = costs.measure(raw, dataset, points, rate, workers)
+    notes = list(ready.notes)
+    if quick:
+        gain = rows_by_change(rows)[costs.ALL].get(f"{main}, points", "")
+        notes.append(
+            "These are quick choices. A choice among all candidates gains "
+            f"{main} {gain} points."
+        )
     measured = Measured(
         y=y,
         board=board,
-        wire_s=waited_s(dataset.layout, rate),
+        wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
         breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=comparisons,
-        costs=costs.measure(raw, dataset, points, rate, workers),
+        costs=rows,
         wrong=wrong,
         second=second,
         formats=formats,
         shear=sheared,
+        commands=Commands(tuple(map(str, data)), out, scene_path, quick),
+        notes=notes,
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     lead = [
@@ -131,7 +151,7 @@ def tradeoff(
     if sheared is not None:
         sections.insert(1, shear.section(sheared))
     report = write(out, "Accuracy against time", lead, sections)
-    best = ParetoFront.of(points, main, measured.after_s).to_dict(dataset.digest)
+    best = ParetoFront.of(points, main, measured.after_s, quick=quick)
     with write_whole(out / "front.json") as file:
-        file.write(json.dumps(best, indent=1).encode() + b"\n")
+        file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
     return report

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from train.report.figures import PHONE, STROKES, legend, picture
 from train.report.score import paired, percent, points
 from train.report.section import Figure, Row, Section, Table
 from train.report.work import Workers
-from train.tradeoff.choices import Points, chosen, unseen
+from train.tradeoff.choices import WINDOWS_S, Points, chosen, unseen
 from train.tradeoff.early import StoppingComparison, compare_stopping
 from train.tradeoff.wires import microcontroller
 
@@ -59,19 +60,26 @@ def without(dataset: DataSet) -> DataSet:
     return dataset.of(names)
 
 
-def answers(dataset: DataSet, windows: Sequence[float], workers: Workers) -> Answers:
-    """The quick choice at each window, and early decisions."""
+def answers(
+    dataset: DataSet, windows: Sequence[float], workers: Workers, *, quick: bool = True
+) -> Answers:
+    """The choice at each window, and early decisions."""
     cases = [(dataset, window) for window in windows]
-    made = workers.map("windows", chosen, cases)
+    made = workers.map("windows", partial(chosen, quick=quick), cases)
+    points = [window for window in windows if window <= WINDOWS_S[-1]]
     return Answers(
         dict(zip(windows, made, strict=True)),
-        compare_stopping(dataset, windows, jobs=workers.jobs),
+        compare_stopping(dataset, points, quick=quick, jobs=workers.jobs),
     )
 
 
-def compared(dataset: DataSet, sheared: Answers, workers: Workers) -> Compared:
+def compared(
+    dataset: DataSet, sheared: Answers, workers: Workers, *, quick: bool = True
+) -> Compared:
     """The answers with shear beside those without."""
-    return Compared(sheared, answers(without(dataset), list(sheared.points), workers))
+    windows = list(sheared.points)
+    plain = answers(without(dataset), windows, workers, quick=quick)
+    return Compared(sheared, plain)
 
 
 def right(choice: Chosen, kind: str) -> NDArray[np.bool_] | None:

@@ -1,5 +1,5 @@
-"""The first screen: a line for each task, and a slider that sets the time of the
-decision."""
+"""The first screen: the time and the accuracy of each task, each by a slider of the
+other."""
 
 import html
 import json
@@ -10,10 +10,16 @@ from string import Template
 from train.choose import Chosen
 from train.evaluate import Result
 from train.report.score import interval
-from train.tradeoff.choices import Points, unseen
+from train.tradeoff.choices import unseen
+from train.tradeoff.front import NAMES, ParetoFront
+from train.tradeoff.measured import Measured
+from train.tradeoff.uses import cheapest
 
 FIRST_S = 1.0
 """The time shown at first; without a script, it stays."""
+LEVELS = (60, 70, 75, 80, 85, 90, 92, 95, 97, 99)
+"""Accuracies in percent of the second slider."""
+FIRST_LEVEL = 90
 PAGE = Template(Path(__file__).with_suffix(".html").read_text(encoding="utf-8"))
 LINE = Template(
     '<tr><td>$task</td><td class="share">$share</td><td class="interval">$interval</td>'
@@ -21,11 +27,13 @@ LINE = Template(
 )
 
 
-def slider(points: Points) -> str:
+def slider(measured: Measured) -> str:
     """The HTML of the first screen.
 
-    In a browser without scripts, it shows the accuracy after `FIRST_S`.
+    In a browser without scripts, it shows the accuracy after `FIRST_S` and the times of
+    `FIRST_LEVEL`.
     """
+    points = measured.points
     windows = list(points)
     first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
     shown = {
@@ -35,21 +43,101 @@ def slider(points: Points) -> str:
     lines = [
         LINE.substitute(
             task=html.escape(task),
-            curve=_curve(
-                {w: tasks[task].by_trial for w, tasks in points.items()}, first
-            ),
+            curve=_curve(measured.results(task), first),
             **texts[first],
         )
         for task, texts in shown.items()
     ]
-    data = json.dumps({"windows": windows, "tasks": list(shown.values())})
+    levels = [reached(measured, level / 100.0) for level in LEVELS]
+    commands = [measured.commands.export(f"--window {window:g}") for window in windows]
+    data = json.dumps(
+        {
+            "windows": windows,
+            "tasks": list(shown.values()),
+            "names": list(shown),
+            "commands": commands,
+            "levels": LEVELS,
+            "reached": levels,
+        }
+    )
+    at = LEVELS.index(FIRST_LEVEL)
     return PAGE.substitute(
         answers=html.escape(data),
         first=first,
         last=len(windows) - 1,
         lines="".join(lines),
         wait=f"{windows[first]:g}",
+        longest=f"{windows[-1]:g}",
+        command=html.escape(commands[first]),
+        first_level=at,
+        last_level=len(LEVELS) - 1,
+        level=FIRST_LEVEL,
+        reached=html.escape(levels[at]),
+        fronts=fronts(measured),
+        prices="".join(
+            f"<li>{html.escape(line)}</li>" for line in price_lines(measured)
+        ),
     )
+
+
+def reached(measured: Measured, level: float) -> str:
+    """The time after which each task reaches an accuracy, early and fixed."""
+    parts = []
+    for task in measured.y:
+        times = []
+        early = [
+            rule.mean_s
+            for rule in measured.comparisons[task].certified
+            if 1.0 - rule.wrong >= level
+        ]
+        if early:
+            times.append(f"{min(early):.2f} s on average (early)")
+        fixed = [
+            window
+            for window, result in measured.results(task).items()
+            if result.accuracy >= level
+        ]
+        if fixed:
+            times.append(f"{min(fixed):g} s (fixed)")
+        parts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")
+    return "; ".join(parts)
+
+
+def fronts(measured: Measured) -> str:
+    """Rows of a table: what the names of `FRONT=` give."""
+    task = next(iter(measured.y))
+    front = ParetoFront.of(measured.points, task, measured.after_s)
+    rows = ""
+    for name in NAMES:
+        point = front.pick(name)
+        text = f"{100 * point.accuracy:.0f} % after {point.milliseconds / 1e3:.2f} s"
+        command = html.escape(measured.commands.front(name))
+        rows += (
+            f"<tr><td>{name}</td><td>{text}</td><td><code>{command}</code></td></tr>"
+        )
+    return rows
+
+
+def price_lines(measured: Measured) -> list[str]:
+    """A line for each further price: taxels, recordings, arithmetic, a wrong
+    decision."""
+    task = next(iter(measured.y))
+    lines = []
+    for end, words in ((" taxels", "Fewer taxels"), (" trials", "Fewer recordings")):
+        rows = [row for row in measured.costs if str(row["change"]).endswith(end)]
+        for row in rows[:1]:
+            gain = row.get(f"{task}, points", "")
+            lines.append(f"{words}: {row['change']} gain {task} {gain} points.")
+    arithmetic_ms = 1e3 * measured.board.arithmetic_s
+    lines.append(
+        f"Arithmetic: {arithmetic_ms:.1f} ms a decision on {measured.board.name}."
+    )
+    best = cheapest(measured, task)
+    lines.append(
+        f"A wrong decision: at {measured.wrong:g} each, and {measured.second:g} for a "
+        f"second of waiting, {task} is cheapest {best.name}."
+    )
+    return lines
 
 
 def _texts(choice: Chosen) -> dict[str, str]:
@@ -64,8 +152,8 @@ def _texts(choice: Chosen) -> dict[str, str]:
 
 
 def _curve(results: Mapping[float, Result], first: int) -> str:
-    """An SVG of a task's accuracy against time, with its interval and a line at the
-    time shown."""
+    """An SVG of a task's accuracy against time, with its interval, lines at every
+    quarter and one at the time shown."""
     x = [100 * window / max(results) for window in results]
 
     def points(heights: list[float], x: list[float] = x) -> str:
@@ -76,9 +164,13 @@ def _curve(results: Mapping[float, Result], first: int) -> str:
     low, high = (
         list(ends) for ends in zip(*(r.interval for r in results.values()), strict=True)
     )
+    scale = "".join(
+        f'<path class="scale" d="M0 {height}H100"/>' for height in (0, 25, 50, 75, 100)
+    )
     return (
         '<svg viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
         'aria-label="accuracy, 0 to 100 %, against time">'
+        f"{scale}"
         f'<polygon points="{points(low)} {points(high[::-1], x[::-1])}"/>'
         f'<polyline points="{points([r.accuracy for r in results.values()])}"/>'
         f'<line x1="{x[first]:.1f}" x2="{x[first]:.1f}" y1="0" y2="100"/></svg>'

@@ -2,6 +2,7 @@
 transactions."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from edge.chips.ad7147 import AD7147
@@ -9,6 +10,7 @@ from edge.chips.block import Block
 from edge.chips.chip import UNUSED, ChipSpec
 from edge.chips.three_axes import ThreeAxisBlock
 from edge.fake.player import frame_bits
+from edge.recording import Recording
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
 from edge.skin.wiring import BusSpec
@@ -105,6 +107,24 @@ def microcontroller(layout: SkinLayout) -> Wire:
     chip = ChipSpec(kind, 0x08, tuple(range(layout.rows * layout.cols)))
     served = SkinFile("block", layout, (BusSpec("fake", (chip,), clock_hz=1_000_000),))
     return wire("microcontroller", served)
+
+
+def wire_time_s(
+    recordings: Sequence[Recording], layout: SkinLayout, rate_hz: float
+) -> float | None:
+    """Seconds from the end of a window until its last frame is read, where the
+    recordings tell the skin's wires.
+
+    Recordings of `edge-classify record` hold the time of a frame on their skin's wires
+    (`meta.wire_s`). Simulated ones have the paper's skin. Others tell nothing.
+    """
+    told = [recording.meta.get("wire_s") for recording in recordings]
+    times = [float(wire_s) for wire_s in told if isinstance(wire_s, int | float)]
+    if times:
+        return 0.5 / rate_hz + max(times)
+    if all("simulation" in recording.meta for recording in recordings):
+        return waited_s(layout, rate_hz)
+    return None
 
 
 def waited_s(layout: SkinLayout, rate_hz: float) -> float:

@@ -16,6 +16,7 @@ def text(points=POINTS, **more):
         {
             "task": "object",
             "data_digest": DIGEST,
+            "quick": False,
             "points": [
                 {
                     "window_s": ms / 1000,

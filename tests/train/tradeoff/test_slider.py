@@ -1,5 +1,9 @@
 """The first screen: the accuracy after each time, without and with a script."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from tests.browser import chromium
@@ -8,8 +12,10 @@ from train.evaluate import Promise
 from train.pipeline import Choice
 from train.report.page import write
 from train.report.section import Section
+from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.slider import slider
+from train.tradeoff.measured import Measured
+from train.tradeoff.slider import reached, slider
 
 
 def chosen(right, left_out="trial"):
@@ -23,26 +29,76 @@ ANSWERS = {
 }
 
 
+def measured(**changes):
+    """Measurements of two tasks, whose early decisions about mobility take 0.5 s."""
+    rule = SimpleNamespace(
+        asked=0.1, folds=5, mean_s=0.5, wrong=0.05, result=Promise(95, 100)
+    )
+    early = {"mobility": [rule], "<b>": []}
+    facts = {
+        "y": dict.fromkeys(early, np.array(["a"])),
+        "points": ANSWERS,
+        "comparisons": {
+            task: SimpleNamespace(certified=rules) for task, rules in early.items()
+        },
+        "costs": [
+            {"change": "96 taxels", "mobility, points": "-3 (-6 to +1)"},
+            {"change": "70 of 140 trials", "mobility, points": "-9 (-15 to -3)"},
+        ],
+        "board": SimpleNamespace(arithmetic_s=0.002, name="a board"),
+        "commands": Commands(("mine",), Path("build/tradeoff")),
+        "wire_s": 0.0,
+    }
+    return Measured(**{**facts, "breakaways": {}, **changes})
+
+
+def shown() -> str:
+    return slider(measured())
+
+
 def test_the_interval_is_that_which_the_front_promises():
     point = ParetoFront.of(ANSWERS, "mobility").pick("1000")
-    assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in slider(ANSWERS)
+    assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in shown()
+
+
+def test_the_time_of_an_accuracy_is_told_early_and_fixed():
+    text = shown()
+    assert "mobility after 0.50 s on average (early), 1 s (fixed)" in text
+    assert "&lt;b&gt; after 1.2 s (fixed)" in text
+
+
+def test_a_task_that_never_is_so_right_is_told():
+    assert reached(measured(), 0.97).endswith("<b> never")
+
+
+def test_the_names_of_the_front_and_the_other_prices_have_a_line_each():
+    text = shown()
+    for name, share in (("fast", "60 %"), ("balanced", "60 %"), ("accurate", "99 %")):
+        assert f"<td>{name}</td><td>{share} after" in text
+        assert f"make export DATA=mine FRONT={name}" in text
+    assert (
+        "<li>Fewer taxels: 96 taxels gain mobility -3 (-6 to +1) points.</li>" in text
+    )
+    assert "<li>Fewer recordings: 70 of 140 trials gain mobility -9" in text
+    assert "<li>Arithmetic: 2.0 ms a decision on a board.</li>" in text
+    assert "mobility is cheapest early, at most 10% wrong.</li>" in text
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
-    text = slider(ANSWERS)
+    text = shown()
     assert '<td class="share">97 %</td><td class="interval">(86 to 99)</td>' in text
     assert text.count('<td class="unseen">73 %</td>') == 1
-    assert "make export EXPORT='--quick --window" in text
+    assert "make export DATA=mine EXPORT=&#x27;--window 1&#x27;" in text
     assert text.index("<label hidden>") < text.index("<script>")
     assert "<td>&lt;b&gt;</td>" in text
 
 
 @pytest.mark.parametrize("width", [1440, 390])
 def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
-    report = write(tmp_path, "Title", [], [Section("Answer", widget=slider(ANSWERS))])
+    report = write(tmp_path, "Title", [], [Section("Answer", widget=shown())])
     with chromium(width, report.resolve().as_uri()) as browser:
         browser.execute_script(
-            "const i = document.querySelector('input'); i.value = 0;"
+            "const i = document.querySelector('.waits'); i.value = 0;"
             "i.dispatchEvent(new Event('input'));"
         )
         text = browser.find_element("css selector", ".slider").text
@@ -51,4 +107,21 @@ def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
     assert "After waiting 0.4 s" in text
     assert "60 %" in text
     assert "--window 0.4" in text
-    assert copied == "make export EXPORT='--quick --window 0.4'"
+    assert copied == "make export DATA=mine EXPORT='--window 0.4'"
+
+
+def test_in_a_browser_the_other_slider_moves_the_accuracy(tmp_path):
+    report = write(tmp_path, "Title", [], [Section("Answer", widget=shown())])
+    with chromium(390, report.resolve().as_uri()) as browser:
+        browser.execute_script(
+            "const i = document.querySelector('.levels'); i.value = 0;"
+            "i.dispatchEvent(new Event('input'));"
+        )
+        text = browser.find_element("css selector", ".slider").text
+        spoken = browser.execute_script(
+            "return [...document.querySelectorAll('input')]"
+            ".map(input => input.getAttribute('aria-valuetext'))"
+        )
+    assert "60 % right: mobility after 0.50 s on average (early), 0.4 s" in text
+    assert spoken[0].startswith("60 % right: mobility after")
+    assert spoken[1] == "1 seconds: mobility 97 %, <b> 80 %"

@@ -25,13 +25,14 @@ from train.dataset import read
 from train.evaluate import Promise
 from train.pipeline import Choice
 from train.rules import Course
-from train.tradeoff import answer, board, costs, early
+from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, unseen
+from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import tradeoff
-from train.tradeoff.wires import spread, wire, wires
+from train.tradeoff.wires import spread, wire, wire_time_s, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
 
@@ -66,6 +67,14 @@ class TestWires:
         quarter = SkinLayout(rows=8, cols=12, wraps=True)
         assert "MPR121" in {choice.name.split(",")[0] for choice in wires(quarter)}
 
+    def test_the_wire_is_that_of_the_recordings_or_unknown(self, make_touch, forearm):
+        touch = make_touch()
+        assert wire_time_s([touch], forearm, 100.0) is None
+        told = replace(touch, meta={**touch.meta, "wire_s": 0.0182})
+        assert wire_time_s([told], forearm, 100.0) == pytest.approx(0.0232)
+        simulated = replace(touch, meta={**touch.meta, "simulation": {}})
+        assert 0.005 < wire_time_s([simulated], forearm, 100.0) < 0.02
+
 
 def chosen(hits, left_out="trial"):
     """A choice that answers these trials rightly, trials left out."""
@@ -98,7 +107,9 @@ def fronted(recordings, tmp_path_factory):
     dataset = followed(read([recordings]))
     points = {0.4: make_choice(dataset, 0.4)}
     path.write_text(
-        json.dumps(ParetoFront.of(points, "category", 0.01).to_dict(dataset.digest))
+        json.dumps(
+            ParetoFront.of(points, "category", 0.01, quick=True).to_dict(dataset.digest)
+        )
     )
     return path, points[0.4]["category"]
 
@@ -159,7 +170,7 @@ class TestCosts:
         raw = read([recordings])
         cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
         assert list(cases) == [
-            "all candidates (`make export`)",
+            "all candidates",
             "50 frames a second",
             "25 frames a second",
             "96 taxels",
@@ -190,14 +201,41 @@ def test_the_dearer_an_error_the_longer_it_pays_to_wait():
     """Errors fall by 40 of 100 for 0.4 s, then by 5 for 0.4 s more."""
     shares = {0.4: 50, 0.8: 90, 1.2: 95}
     points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
-    fixed = SimpleNamespace(y={"t": None}, after_s=0.0, points=points)
+    fixed = SimpleNamespace(
+        y={"t": None},
+        after_s=0.0,
+        comparisons={"t": SimpleNamespace(certified=[])},
+        commands=Commands(("mine",), Path("build/tradeoff")),
+    )
     fixed.results = lambda task: {
         w: tasks[task].by_trial for w, tasks in points.items()
     }
     best = []
     for fixed.wrong, fixed.second in ((0.5, 1.0), (2.0, 1.0), (10.0, 1.0)):
-        best.append(answer.prices(fixed).tables[0].rows[0]["best window s"])
-    assert best == [0.4, 0.8, 1.2]
+        best.append(answer.prices(fixed).tables[0].rows[0]["best use"])
+    assert best == ["after 0.4 s", "after 0.8 s", "after 1.2 s"]
+
+
+def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
+    points = {1.2: {"t": chosen(np.arange(100) < 95)}}
+    right = np.arange(100) < 94
+    rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
+    measured = SimpleNamespace(
+        y={"t": None},
+        after_s=0.0,
+        wrong=10.0,
+        second=1.0,
+        comparisons={"t": SimpleNamespace(certified=[rule])},
+        commands=Commands(("mine",), Path("build/tradeoff")),
+        results=lambda task: {w: tasks[task].by_trial for w, tasks in points.items()},
+    )
+    (row,) = answer.prices(measured).tables[0].rows
+    assert row["best use"] == "early, at most 10% wrong"
+    assert row["mean price"] == 1.2  # 10 times 6 %, and 0.6 s
+    low, high = rule.result.interval
+    ends = [round(10.0 * (1.0 - share) + 0.6, 2) for share in (high, low)]
+    assert row["95 % interval"] == f"{ends[0]:g} to {ends[1]:g}"
+    assert "edge-classify run --error 0.1" in row["command"]
 
 
 def comparison(right, seconds=(0.2, 0.6, 1.0)):
@@ -227,7 +265,7 @@ class TestEarly:
         rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
         bolder = replace(rule, asked=0.3, right=np.arange(100) < 70, mean_s=0.4)
         compared.certified.extend([rule, replace(rule, asked=0.2), bolder])
-        listed = [rule.asked for rule in answer.distinct(compared)]
+        listed = [rule.asked for rule in uses.distinct(compared)]
         assert listed == [0.1, 0.3]
 
     def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(
@@ -341,12 +379,13 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     monkeypatch.setattr(running, "FEWEST", 28)
     monkeypatch.setattr(costs, "PARTS", (1,))
     monkeypatch.setattr(running, "WINDOWS_S", (0.4, 1.2))
+    monkeypatch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
     monkeypatch.setattr(costs, "WAITS_S", (0.4,))
     monkeypatch.setattr(costs, "EVERY", (4,))
     digest = read([data]).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
-    report = tradeoff([data], out, str(path), scene_path=str(SCENE))
+    report = tradeoff([data], out, str(path), scene_path=str(SCENE), quick=True)
     text = report.read_text()
     assert "http" not in text
     assert (
@@ -360,4 +399,6 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     assert saved["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
     best = ParetoFront.read(out / "front.json", digest)
     assert best.task == "category"
+    assert best.quick
+    assert "A choice among all candidates gains category +0" in text
     assert best.points[-1].accuracy > 0.9

@@ -1,0 +1,72 @@
+"""Commands of the report: they name the data, the folder and the scene that make takes
+no default for."""
+
+from pathlib import Path
+
+import pytest
+
+from train.tradeoff.commands import Commands
+
+BUILD = Path("build/tradeoff")
+
+
+@pytest.mark.parametrize(
+    ("commands", "expected"),
+    [
+        (
+            Commands(("build/cody18",), BUILD, "train/scenes/cody18.toml"),
+            "make export EXPORT='--window 1'",
+        ),
+        (
+            Commands(("build/household",), BUILD, "train/scenes/household.toml"),
+            "make export SCENE=train/scenes/household.toml EXPORT='--window 1'",
+        ),
+        (
+            Commands(("mine",), BUILD),
+            "make export DATA=mine EXPORT='--window 1'",
+        ),
+        (
+            Commands(("mine", "kept"), Path("out/tradeoff")),
+            "make export DATA='mine kept' OUT=out EXPORT='--window 1'",
+        ),
+        (
+            Commands(("mine",), BUILD, quick=True),
+            "make export DATA=mine EXPORT='--quick --window 1'",
+        ),
+        (
+            Commands(("my touches",), BUILD),
+            "python -m export --data 'my touches' --out build --window 1",
+        ),
+        (
+            Commands(("mine",), Path("elsewhere")),
+            "python -m export --data mine --out elsewhere --window 1",
+        ),
+    ],
+)
+def test_a_model_of_a_window(commands, expected):
+    assert commands.export("--window 1") == expected
+
+
+def test_a_point_of_the_front():
+    assert (
+        Commands(("mine",), BUILD).front("fast") == "make export DATA=mine FRONT=fast"
+    )
+    assert Commands(("my touches",), Path("a b")).front("0.9") == (
+        "python -m export --data 'my touches' --out 'a b' --front 0.9 "
+        "--fronts 'a b/front.json'"
+    )
+
+
+def test_the_report_again():
+    options = "--cost wrong=10,second=1"
+    assert Commands(("mine",), BUILD, quick=True).tradeoff(options) == (
+        'make tradeoff DATA=mine TRADEOFF="--quick --cost wrong=10,second=1"'
+    )
+    assert Commands(("my touches",), BUILD).tradeoff(options) == (
+        "python -m train tradeoff --data 'my touches' --out build/tradeoff "
+        "--cost wrong=10,second=1"
+    )
+
+
+def test_a_model_without_options():
+    assert Commands(("mine",), BUILD).export() == "make export DATA=mine"
