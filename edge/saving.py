@@ -102,7 +102,9 @@ def find(paths: list[str]) -> list[Path]:
         inside = [path]
         if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
             inside = sorted(
-                p for p in path.rglob("*.npz") if not p.name.startswith(".")
+                p
+                for p in path.rglob("*.npz")
+                if not any(part[:1] == "." for part in p.relative_to(path).parts)
             )
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")

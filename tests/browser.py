@@ -68,6 +68,21 @@ def chromium(width: int, address: str) -> Iterator[Any]:
         browser.quit()
 
 
+def violations(browser: Any) -> list[str]:
+    """What axe-core finds against the rules for accessible pages, a line for each."""
+    package = pytest.importorskip("axe_core_python", reason="needs the group `browser`")
+    script = (Path(package.__file__).parent / "axe.min.js").read_text()
+    browser.execute_cdp_cmd("Runtime.evaluate", {"expression": script})
+    found = browser.execute_async_script(
+        "axe.run().then(arguments[arguments.length - 1])"
+    )
+    return [
+        f"{rule['id']}: {node['html'][:80]}"
+        for rule in found["violations"]
+        for node in rule["nodes"]
+    ]
+
+
 def faults(report: Path) -> list[str]:
     """A line for each fault of a report, at each of `WIDTHS`."""
     lines = []
@@ -77,6 +92,7 @@ def faults(report: Path) -> list[str]:
                 "document.querySelectorAll('details').forEach(section => section.open "
                 "= true)"
             )
+            lines += violations(browser)
             wide = browser.execute_script(WIDER_THAN_THE_PAGE)
             lines += [f"{width} px: wider than the page: {element}" for element in wide]
             lines += [

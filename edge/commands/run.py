@@ -157,6 +157,9 @@ def run(arguments: argparse.Namespace) -> int:
         model=model,
         needs_joints=not on_skin,
         decides=True,
+        folder=arguments.keep,
+        choices={name: task.labels for name, task in model.info.tasks.items()},
+        records=False,
         # Angles that another program writes go by the real clock.
         real_time=arguments.joints is not None,
     ) as live:

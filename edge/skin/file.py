@@ -1,7 +1,7 @@
 """`skin.toml`: the taxel of each chip stage, and the meaning of its counts."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
@@ -94,6 +94,8 @@ class SkinFile:
     reading: Reading = field(default_factory=Reading)
     calibration: TaxelCalibration | None = None
     path: str = "skin"
+    labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """{task: the labels that a person may choose from}."""
 
     @property
     def chips(self) -> list[ChipSpec]:
@@ -146,8 +148,10 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     calibration = None
     if top.has("calibration"):
         calibration = _calibration(top.table("calibration"), layout, chips)
+    named = top.table("labels", {})
+    labels = {str(task): named.texts(str(task)) for task in named.raw}
     top.done()
-    return SkinFile(name, layout, buses, signal, reading, calibration, where)
+    return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
 
 
 def _defaults(chips: Sequence[ChipSpec]) -> Defaults:

@@ -18,12 +18,11 @@ from edge.saving import save
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.tools.record import Trials, recording
+from edge.tools.review import UNSURE
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 
 REASONS = ("unsure", "unknown", "all")
-UNSURE = 0.8
-"""Confidence below which a decision is unsure."""
 LONGEST_S = 10.0
 """Seconds from onset that are kept of a touch."""
 WAITING = 4

@@ -1,13 +1,15 @@
 """List the labels of recordings, or change them.
 
-Without --set, --unset and --rename, prints each recording's labels, how many recordings
-have each, and which are probably slips. With them, shows what would change, and with
---yes writes the changed recordings anew, each whole or not at all, if all of them can
-be read. The next `make export` trains on the new labels.
+Without --set, --unset, --rename, --accept and --delete, prints each recording's course
+of force, labels and decisions, how many recordings have each label, and which are
+probably slips. With them, shows what would change, and with --yes writes the changed
+recordings anew, each whole or not at all, if all of them can be read. --undo takes the
+last change back. The next `make export` trains on the new labels.
 """
 
 import argparse
 import json
+import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,13 +20,20 @@ from edge.commands.options import task_label
 from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
-from edge.files import read_text, write_whole
-from edge.recording import load
+from edge.files import read_text, refusing, write_whole
+from edge.recording import Recording, load
 from edge.saving import find, save
+from edge.tools import review
 from edge.tools.slips import counts_text, slips
 
 JOURNAL = ".edge-classify-labels.json"
 """Beside recordings whose labels are being changed."""
+UNDO = ".edge-classify-undo.json"
+"""Beside the first of the recordings that were changed last: their former labels."""
+LINE = 16
+"""Characters of a recording's course."""
+DELETED = ".edge-classify-deleted"
+"""The folder of recordings that were deleted last."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -60,6 +69,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="take this task's label away; repeat it for more",
     )
     parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        type=review.kind_or_task,
+        metavar="WHICH",
+        help="only recordings that are unsure, wrong or unlabelled, or that have a task; "
+        "repeat it for recordings that are all of these",
+    )
+    parser.add_argument(
+        "--accept",
+        action="store_true",
+        help="label kept touches as they were decided",
+    )
+    parser.add_argument("--delete", action="store_true", help="delete the recordings")
+    parser.add_argument(
+        "--undo", action="store_true", help="take the last change in a folder back"
+    )
+    parser.add_argument(
         "--yes", action="store_true", help="change the recordings without a question"
     )
 
@@ -67,17 +94,32 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the labels, or change those that are to be changed."""
     output = Output.of(arguments)
+    if arguments.undo:
+        return undo(arguments.data, output)
     change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
-    paths = find(arguments.data)
-    for folder in sorted({path.parent for path in paths}):
+    every = find(arguments.data)
+    for folder in sorted({path.parent for path in every}):
         finish_interrupted(folder)
-    former = [load(path).meta for path in paths]
-    metas = [
-        changed(str(path), meta, change)
-        for path, meta in zip(paths, former, strict=True)
+    loaded = [(path, load(path)) for path in every]
+    chosen = [
+        (path, recording)
+        for path, recording in loaded
+        if review.selected(recording.meta, arguments.only)
     ]
-    if not (arguments.rename or arguments.set or arguments.unset):
-        _print(output, paths, metas)
+    if not chosen:
+        output.text(f"none of {counted(len(every), 'recording')} is of this kind")
+        return 1
+    paths = [path for path, _ in chosen]
+    former = [recording.meta for _, recording in chosen]
+    if arguments.delete:
+        return _delete(output, paths, agreed=arguments.yes)
+    metas = []
+    for path, meta in zip(paths, former, strict=True):
+        labels = review.accepted(meta) if arguments.accept else {}
+        wanted = replace(change, labels={**labels, **change.labels})
+        metas.append(changed(str(path), meta, wanted))
+    if not (arguments.accept or arguments.rename or arguments.set or arguments.unset):
+        _print(output, chosen)
         return 0
     differing = []
     for path, before, after in zip(paths, former, metas, strict=True):
@@ -92,7 +134,59 @@ def run(arguments: argparse.Namespace) -> int:
         output.text("nothing is changed")
         return 1
     change_all(differing)
-    _print(output, paths, metas)
+    _print(output, [(path, load(path)) for path in paths])
+    return 0
+
+
+def _delete(output: Output, paths: Sequence[Path], *, agreed: bool) -> int:
+    """Delete recordings, so that they can be brought back."""
+    for path in paths:
+        output.text(f"{path}: is deleted")
+    if not (agreed or _agreed(output, len(paths))):
+        output.text("nothing is changed")
+        return 1
+    for folder in sorted({path.parent for path in paths}):
+        bin_ = folder / DELETED
+        with refusing(f"{folder}: its recordings cannot be deleted"):
+            shutil.rmtree(bin_, ignore_errors=True)
+            bin_.mkdir()
+            for path in paths:
+                if path.parent == folder:
+                    path.rename(bin_ / path.name)
+        (folder / UNDO).unlink(missing_ok=True)
+    output.text(f"{counted(len(paths), 'recording')} deleted; --undo brings them back")
+    return 0
+
+
+def undo(data: Sequence[str], output: Output) -> int:
+    """Take the last change of labels, or the last deletion, in some folders back.
+
+    Raises:
+        InputError: there is nothing to take back.
+    """
+    folders = sorted(
+        {path if path.is_dir() else path.parent for path in map(Path, data)}
+    )
+    brought = []
+    for folder in folders:
+        for path in sorted((folder / DELETED).glob("*.npz")):
+            path.rename(folder / path.name)
+            brought.append(folder / path.name)
+        file = folder / UNDO
+        entries = parse_json(read_text(file), str(file)) if file.is_file() else []
+        for name, labels in entries if isinstance(entries, list) else []:
+            path = Path(name)
+            if path.is_file():
+                recording = load(path)
+                meta = {**recording.meta, "labels": labels}
+                save(path, replace(recording, meta=meta))
+                brought.append(path)
+        file.unlink(missing_ok=True)
+    if not brought:
+        where = ", ".join(map(str, folders))
+        raise InputError(f"{where}: there is no change to take back")
+    for path in brought:
+        output.text(f"{path}: is as it was before")
     return 0
 
 
@@ -105,8 +199,12 @@ def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
     entries = [[str(path.absolute()), meta["labels"]] for path, meta in metas]
     with write_whole(journal) as file:
         file.write(json.dumps(entries).encode())
+    former = [[str(path.absolute()), load(path).labels] for path, _ in metas]
     for path, meta in metas:
         save(path, replace(load(path), meta=dict(meta)))
+    with write_whole(journal.with_name(UNDO)) as file:
+        file.write(json.dumps(former).encode())
+    shutil.rmtree(journal.with_name(DELETED), ignore_errors=True)
     journal.unlink()
 
 
@@ -150,7 +248,7 @@ def _text(labels: Mapping[str, str]) -> str:
     return " ".join(parts) or "no label"
 
 
-def _decided_text(decided: Mapping[str, Any]) -> str:
+def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
     """The decisions of a kept touch, with their confidence and flags."""
     parts = []
     for task, answer in decided.items():
@@ -161,25 +259,27 @@ def _decided_text(decided: Mapping[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def _print(
-    output: Output, paths: Sequence[Path], metas: Sequence[Mapping[str, Any]]
-) -> None:
-    """Print each recording's labels, how many have each, and probable slips."""
-    width = max(len(str(path)) for path in paths)
-    labels = [meta.get("labels", {}) for meta in metas]
-    for path, current, meta in zip(paths, labels, metas, strict=True):
+def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None:
+    """Print each recording's course and labels, how many have each label, and probable
+    slips."""
+    width = max(len(str(path)) for path, _ in recordings)
+    labels = [recording.labels for _, recording in recordings]
+    for path, recording in recordings:
+        decided = review.decisions(recording.meta)
         event: dict[str, Any] = {
             "event": "labels",
             "file": str(path),
-            "labels": current,
+            "labels": recording.labels,
+            "kinds": review.kinds(recording.meta),
         }
-        text = f"{path!s:<{width}}  {_text(current)}"
-        if "decided" in meta:
-            event["decided"] = meta["decided"]
-            text += f" (decided: {_decided_text(meta['decided'])})"
+        line = review.sparkline(review.curve(recording, LINE))
+        text = f"{path!s:<{width}}  {line}  {_text(recording.labels)}"
+        if decided:
+            event["decided"] = decided
+            text += f" (decided: {_decided_text(decided)})"
         output.event(event, text)
-    for line in counts_text(labels):
-        output.text(line)
+    for sentence in counts_text(labels):
+        output.text(sentence)
     for sentence in slips(labels):
         output.text(f"probably a slip: {sentence}")
 

@@ -2,7 +2,7 @@
 there."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from edge.files import read_bytes, refusing, write_whole
 from edge.recording import LARGEST_BYTES, Recording, load
 from edge.saving import save
 from edge.skin.loop import Schedule
+from edge.tools import review
 from edge.tools.label import Change, changed
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
@@ -44,6 +45,8 @@ class Page:
         title: str,
         folder: Path | None = None,
         labels: dict[str, str] | None = None,
+        choices: Mapping[str, Sequence[str]] | None = None,
+        records: bool = True,
         decides: bool = False,
     ) -> None:
         """Serve a page.
@@ -52,9 +55,12 @@ class Page:
             address: HOST:PORT, as `WebServer` takes it.
             layout: the skin, with its thresholds.
             title: names the skin.
-            folder: of the trials that are recorded; None if none are.
+            folder: of the trials that are recorded or kept; None if none are.
             labels: of the first trials; without any, recording waits for a person to
                 give some.
+            choices: {task: the labels that it can have}, which the page offers as
+                buttons.
+            records: whether touches can be recorded there.
             decides: a model decides on the contacts.
 
         Raises:
@@ -70,6 +76,8 @@ class Page:
         self.recording = bool(self.labels)
         self._trials: dict[str, dict[str, Any]] = {}
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
+        self._version = 0
+        """Number of changes of the list of trials."""
         self._undo: tuple[str, bytes] | None = None
         """The file that the last action changed or deleted, as it was before."""
         if folder is not None:
@@ -87,6 +95,8 @@ class Page:
             "scale": self._scale,
             "units": {"force": layout.force_unit, "motion": layout.length_unit},
             "folder": None if folder is None else str(folder),
+            "choices": {task: list(names) for task, names in (choices or {}).items()},
+            "records": records,
             "decides": decides,
         }
         self.server = WebServer(address, self._act)
@@ -123,9 +133,7 @@ class Page:
             "decisions": list(self._decisions.values()),
             "labels": dict(self.labels),
             "recording": self.recording,
-            "trials": [
-                {"file": name, **trial} for name, trial in list(self._trials.items())
-            ],
+            "trials": self._version,
             "notices": list(self._notices),
             "undo": None if self._undo is None else self._undo[0],
         }
@@ -142,8 +150,15 @@ class Page:
 
     def saved(self, path: Path, trial: Recording) -> None:
         """Add a trial that has been recorded."""
-        seconds = round(float(trial.t[-1] - trial.t[0]), 2)
-        self._trials[path.name] = {"labels": trial.labels, "seconds": seconds}
+        decided = review.decisions(trial.meta)
+        self._trials[path.name] = {
+            "labels": trial.labels,
+            "seconds": round(float(trial.t[-1] - trial.t[0]), 2),
+            "curve": review.curve(trial),
+            "decided": decided,
+            "kinds": review.kinds(trial.meta),
+        }
+        self._version += 1
 
     def _show_trial(self, path: Path) -> None:
         """Add a trial of the folder; a damaged one is named and left out."""
@@ -171,8 +186,22 @@ class Page:
             ],
         }
 
-    def _act(self, action: dict[str, Any]) -> None:
-        """Carry out an action of the page.
+    def look(self) -> None:
+        """Add the touches that have come into the folder, and leave out those that have
+        gone."""
+        if self._folder is None:
+            return
+        paths = sorted(self._folder.glob("*.npz"))[-LAST_TRIALS:]
+        present = {path.name for path in paths}
+        for name in set(self._trials) - present:
+            del self._trials[name]
+            self._version += 1
+        for path in paths:
+            if path.name not in self._trials:
+                self._show_trial(path)
+
+    def _act(self, action: dict[str, Any]) -> list[dict[str, Any]] | None:
+        """Carry out an action of the page; the list of trials where it asks for it.
 
         Raises:
             InputError: it is none, it is not possible here, or a trial cannot be read.
@@ -180,6 +209,11 @@ class Page:
         kind = action.get("do")
         if self._folder is None:
             raise InputError("this page records nothing; start it with `record --web`")
+        if kind == "trials":
+            if not self._fixed["records"]:
+                self.look()
+            trials = list(self._trials.items())
+            return [{"file": name, **trial} for name, trial in trials]
         if kind == "labels":
             self.labels = _labels(action)
         elif kind == "record":
@@ -190,7 +224,7 @@ class Page:
             self.recording = bool(action.get("on"))
         elif kind == "undo":
             self._take_back(self._folder)
-        elif kind not in ("relabel", "delete"):
+        elif kind not in ("relabel", "accept", "delete"):
             raise InputError(f"{kind!r} is no action")
         elif (name := action.get("file")) not in list(self._trials):
             raise InputError(f"{name!r} is none of the trials that this page shows")
@@ -201,9 +235,24 @@ class Page:
                 with refusing(f"{path}: cannot be deleted"):
                     path.unlink(missing_ok=True)
                 del self._trials[path.name]
+                self._version += 1
+            elif kind == "accept":
+                self._relabel(path, self._accepted(path))
             else:
                 self._relabel(path, _labels(action))
             self._undo = path.name, before
+        return None
+
+    def _accepted(self, path: Path) -> dict[str, str]:
+        """The labels that accept a kept touch's decisions.
+
+        Raises:
+            InputError: it has none.
+        """
+        labels = review.accepted(load(path).meta)
+        if not labels:
+            raise InputError(f"{path.name}: no decision names a label to accept")
+        return labels
 
     def _relabel(self, path: Path, labels: dict[str, str]) -> None:
         """Give a trial labels beside those that it has for other tasks."""

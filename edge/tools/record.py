@@ -30,6 +30,7 @@ from edge.files import NameTaken, check_writable, refusing
 from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import save
+from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
 from edge.skin.skin import Skin
 from edge.tools import terminal
@@ -209,6 +210,7 @@ def run(arguments: argparse.Namespace) -> int:
             real_time=arguments.joints is not None,
             folder=folder,
             labels=labels,
+            choices=_choices(arguments),
         ) as live,
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
@@ -253,11 +255,26 @@ def _labels(
         raise InputError(
             "give --label TASK=LABEL; a trial without a label teaches nothing"
         )
-    if len(labels) < len(arguments.label) and not by_key:
+    if len(labels) < len(arguments.label) and not by_key and arguments.web is None:
         raise InputError(
-            "--label names a task twice; only in a terminal do keys choose the label"
+            "--label names a task twice; only in a terminal or on the page does a person "
+            "choose the label"
         )
     return labels
+
+
+def _choices(arguments: argparse.Namespace) -> dict[str, list[str]]:
+    """{task: the labels that a person may choose from}: those of the skin file, and
+    those of --label where a task has several."""
+    choices: dict[str, list[str]] = {}
+    if arguments.skin is not None:
+        for task, names in skinfile.load(arguments.skin).labels.items():
+            choices[task] = list(names)
+    for task, label in arguments.label:
+        names = choices.setdefault(task, [])
+        if label not in names:
+            names.append(label)
+    return {task: names for task, names in choices.items() if len(names) > 1}
 
 
 def _joint_names(

@@ -96,13 +96,13 @@ class WebServer:
         link: the address to open in a browser, with the token.
     """
 
-    def __init__(self, address: str, act: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, address: str, act: Callable[[dict[str, Any]], Any]) -> None:
         """Listen at an address.
 
         Args:
             address: HOST:PORT; port 0 takes a free one.
-            act: carries out an action of the page, one at a time; its `EdgeError` is
-                shown there.
+            act: carries out an action of the page, one at a time, and gives its answer
+                or None; its `EdgeError` is shown there.
 
         Raises:
             InputError: the address is not of that form, or cannot be listened at.
@@ -303,11 +303,15 @@ class WebServer:
         if len(body) < int(length):
             return
         try:
-            self._act(dict(json.loads(body[: int(length)])))
+            answer = self._act(dict(json.loads(body[: int(length)])))
         except (TypeError, ValueError, RecursionError, EdgeError) as error:
             self._answer(browser, HTTPStatus.BAD_REQUEST, str(error).encode())
-        else:
+            return
+        if answer is None:
             self._answer(browser, HTTPStatus.NO_CONTENT)
+        else:
+            contents = json.dumps(answer, allow_nan=False).encode()
+            self._answer(browser, HTTPStatus.OK, contents, "application/json")
 
     def _answer(
         self,

@@ -75,7 +75,8 @@ def _table(table: Table) -> str:
     )
     files = ", ".join(f'<a href="{name}">{name}</a>' for name in table_csv(table))
     body = f"<table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
-    body = f'<div class="table">{body}</div>'
+    name = html.escape(table.title)
+    body = f'<div class="table" tabindex="0" role="region" aria-label="{name}">{body}</div>'
     if len(table.rows) > LONGEST:
         body = f"<details><summary>{len(table.rows)} rows</summary>\n{body}</details>"
     return f"<h3>{_text(table.title)}</h3>\n{body}<p><small>{files}</small></p>"
@@ -116,11 +117,12 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
             "<!doctype html>",
             '<html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
+            f"<title>{html.escape(title)}</title><style>{STYLE}</style></head>"
+            "<body><main>",
             f"<h1>{_text(title)}</h1>",
             *(f"<p>{_text(text)}</p>" for text in lead),
             *(_section(section, i > 0) for i, section in enumerate(sections)),
-            "</body></html>\n",
+            "</main></body></html>\n",
         ]
     )
 

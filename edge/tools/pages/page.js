@@ -6,7 +6,10 @@
 const $ = (id) => document.getElementById(id);
 const query = location.search;
 let latest = null;
-let shownTrials = "";
+let trials = [];
+let version = null;
+let askedAt = 0;
+let drawnTrials = "";
 
 function element(tag, text, className) {
   const node = document.createElement(tag);
@@ -189,12 +192,16 @@ function drawDecisions(picture) {
   }));
 }
 
-async function act(action) {
-  const answer = await fetch("action" + query, {
+function post(action) {
+  return fetch("action" + query, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(action),
   }).catch(() => null);
+}
+
+async function act(action) {
+  const answer = await post(action);
   const failed = !answer || !answer.ok;
   $("error").hidden = !failed;
   if (failed) $("error").textContent = (answer && await answer.text()) || "The program did not answer.";
@@ -228,39 +235,148 @@ function formLabels() {
   return labels;
 }
 
+// The labels that stand in the form: of buttons, and of the rows of free text.
+function chosenLabels() {
+  const fixed = Object.keys(latest.choices).filter((task) => task in latest.labels);
+  return { ...Object.fromEntries(fixed.map((task) => [task, latest.labels[task]])), ...formLabels() };
+}
+
 function labelText(labels) {
   return Object.entries(labels).map(([task, label]) => `${task}=${label}`).join(", ");
+}
+
+// Buttons for the labels of each task that has a fixed choice; a number presses one.
+function drawChoices(picture) {
+  const box = $("choices");
+  const shape = JSON.stringify(picture.choices);
+  if (box.dataset.shape !== shape) {
+    box.dataset.shape = shape;
+    let digit = 0;
+    box.replaceChildren(...Object.entries(picture.choices).map(([task, names]) => {
+      const group = element("fieldset");
+      group.append(element("legend", task));
+      for (const name of names) {
+        digit += 1;
+        const button = element("button", digit < 10 ? `${digit} ${name}` : name);
+        button.type = "button";
+        button.dataset.task = task;
+        button.dataset.label = name;
+        if (digit < 10) button.dataset.key = digit;
+        button.onclick = () => act({ do: "labels", labels: { ...latest.labels, [task]: name } });
+        group.append(button);
+      }
+      return group;
+    }));
+  }
+  for (const button of box.querySelectorAll("button")) {
+    button.setAttribute("aria-pressed", picture.labels[button.dataset.task] === button.dataset.label);
+  }
 }
 
 function drawRecord(picture) {
   $("record-part").hidden = picture.folder === null;
   if (picture.folder === null) return;
-  if (!$("label-rows").children.length) {
+  $("record").hidden = !picture.records;
+  drawChoices(picture);
+  if (!$("label-rows").children.length && !Object.keys(picture.choices).length) {
     const labels = Object.entries(picture.labels);
     for (const [task, label] of labels.length ? labels : [["object", ""]]) labelRow(task, label);
   }
   $("record").setAttribute("aria-pressed", picture.recording);
   $("record").textContent = picture.recording ? "Stop recording" : "Record";
   const what = labelText(picture.labels) || "no labels yet";
-  const count = picture.trials.length;
-  $("recording").textContent = (picture.recording ? `Each contact is saved with ${what}`
-    : `Contacts are not saved (${what})`) + `; ${count} ${count === 1 ? "trial" : "trials"} in ${picture.folder}.`;
-  const text = JSON.stringify(picture.trials);
-  if (text === shownTrials) return;
-  shownTrials = text;
-  $("trials").replaceChildren(...picture.trials.slice().reverse().map((trial) => {
-    const row = element("tr");
-    const buttons = element("td");
-    const relabel = element("button", "Relabel");
-    relabel.title = "Give this trial the labels of the form above; its other tasks keep theirs";
-    relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: formLabels() });
-    const remove = element("button", "Delete");
-    remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
-    buttons.append(relabel, " ", remove);
-    row.append(element("td", trial.file), element("td", labelText(trial.labels)),
-      element("td", trial.seconds.toFixed(2)), buttons);
-    return row;
-  }));
+  const count = trials.length;
+  const number = `${count} ${count === 1 ? "touch" : "touches"} in ${picture.folder}.`;
+  const saved = picture.recording ? `Each contact is saved with ${what}; ` : `Contacts are not saved (${what}); `;
+  $("recording").textContent = picture.records ? saved + number : number;
+  const late = !picture.records && performance.now() - askedAt > 2000;
+  if (picture.trials !== version || late) fetchTrials(picture.trials);
+}
+
+// The list comes when it has changed; a folder that another thread fills is looked at again.
+async function fetchTrials(number) {
+  version = number;
+  askedAt = performance.now();
+  const answer = await post({ do: "trials" });
+  if (!answer || !answer.ok) return;
+  trials = await answer.json();
+  drawTrials();
+}
+
+function shownTrials() {
+  const kind = $("filter").value;
+  const known = (trial) => [...trial.kinds, ...Object.keys(trial.labels), ...Object.keys(trial.decided)];
+  return trials.filter((trial) => kind === "" || known(trial).includes(kind));
+}
+
+function drawFilter() {
+  const tasks = trials.flatMap((trial) => [...Object.keys(trial.labels), ...Object.keys(trial.decided)]);
+  const names = ["unsure", "wrong", "unlabelled", ...new Set(tasks)];
+  const text = JSON.stringify(names);
+  if ($("filter").dataset.names === text) return;
+  const chosen = $("filter").value;
+  $("filter").dataset.names = text;
+  const options = ["", ...names].map((name) => {
+    const option = element("option", name || "all touches");
+    option.value = name;
+    return option;
+  });
+  $("filter").replaceChildren(...options);
+  $("filter").value = ["", ...names].includes(chosen) ? chosen : "";
+}
+
+function decisionText([task, { label, confidence, flags }]) {
+  const sure = confidence === null ? [] : [`${Math.round(100 * confidence)} %`];
+  const notes = [...sure, ...flags].join(", ");
+  return `${task}: ${label === null ? "out of range" : label}` + (notes ? ` (${notes})` : "");
+}
+
+function smallCurve(percent) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 100 100");
+  svg.setAttribute("preserveAspectRatio", "none");
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", "largest force over time");
+  const line = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
+  const last = Math.max(percent.length - 1, 1);
+  line.setAttribute("points", percent.map((value, i) => `${(100 * i) / last},${100 - value}`).join(" "));
+  svg.append(line);
+  return svg;
+}
+
+function drawTrials() {
+  drawFilter();
+  const text = JSON.stringify(trials) + $("filter").value;
+  if (text === drawnTrials) return;
+  drawnTrials = text;
+  $("trials").replaceChildren(...shownTrials().reverse().map(trialRow));
+}
+
+function trialRow(trial) {
+  const row = element("tr");
+  const buttons = element("td");
+  const decided = Object.entries(trial.decided);
+  if (decided.length) {
+    const accept = element("button", "Accept");
+    accept.title = "Label this touch as it was decided";
+    accept.onclick = () => act({ do: "accept", file: trial.file });
+    buttons.append(accept, " ");
+  }
+  const relabel = element("button", decided.length ? "Correct" : "Relabel");
+  relabel.title = "Give this touch the labels chosen above; its other tasks keep theirs";
+  relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: chosenLabels() });
+  const remove = element("button", "Delete");
+  remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
+  buttons.append(relabel, " ", remove);
+  const name = element("td", trial.file);
+  name.append(element("div", `${trial.seconds.toFixed(2)} s`, "near"));
+  const picture = element("td", undefined, "small");
+  picture.append(smallCurve(trial.curve));
+  const what = element("td", labelText(trial.labels) || "no label");
+  for (const decision of decided) what.append(element("div", decisionText(decision), "near"));
+  for (const kind of trial.kinds) what.append(element("span", kind, "flag"));
+  row.append(picture, name, what, buttons);
+  return row;
 }
 
 function drawUndo(picture) {
@@ -286,10 +402,16 @@ function draw(picture) {
 
 $("undo").onclick = () => act({ do: "undo" });
 $("more").onclick = () => labelRow("", "");
-$("labels").onsubmit = (event) => { event.preventDefault(); act({ do: "labels", labels: formLabels() }); };
+$("labels").onsubmit = (event) => { event.preventDefault(); act({ do: "labels", labels: chosenLabels() }); };
+$("filter").onchange = drawTrials;
+addEventListener("keydown", (event) => {
+  if (["INPUT", "SELECT", "TEXTAREA"].includes(event.target.tagName) || event.ctrlKey || event.metaKey) return;
+  const button = document.querySelector(`#choices button[data-key="${event.key}"]`);
+  if (button) button.click();
+});
 $("record").onclick = async () => {
   const on = !(latest && latest.recording);
-  if (!on || await act({ do: "labels", labels: formLabels() })) act({ do: "record", on });
+  if (!on || await act({ do: "labels", labels: chosenLabels() })) act({ do: "record", on });
 };
 addEventListener("resize", () => latest && draw(latest));
 

@@ -1,11 +1,12 @@
 """Labels of recordings, listed and changed."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from edge.recording import load
-from edge.saving import save
+from edge.saving import find, save
 from edge.tools import label
 
 
@@ -27,6 +28,7 @@ def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, edge
         "event": "labels",
         "file": str(folder / "a.npz"),
         "labels": {"category": "rigid-fixed", "object": "hard 0"},
+        "kinds": [],
     }
     assert (folder / "a.npz").read_bytes() == before
 
@@ -122,3 +124,98 @@ def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
     assert [line["labels"] for line in lines] == [{"object": "brick"}] * 4
     assert "finished a change of labels that was interrupted: 2 recordings" in err
     assert list(tmp_path.glob(".*")) == []
+
+
+def decided(**answers):
+    """Decisions of a kept touch: task=(label, confidence)."""
+    return {
+        task: {"label": label, "confidence": sure, "flags": []}
+        for task, (label, sure) in answers.items()
+    }
+
+
+@pytest.fixture
+def kept(make_touch, tmp_path):
+    """Kept touches: a sure one, an unsure one, a wrong one, and one that is unknown."""
+    touch = make_touch()
+    cases = {
+        "sure": ({}, decided(softness=("soft", 0.95))),
+        "unsure": ({}, decided(softness=("hard", 0.6))),
+        "wrong": ({"softness": "soft"}, decided(softness=("hard", 0.9))),
+        "unknown": ({}, decided(object=("unknown", None), softness=("soft", 0.9))),
+    }
+    for name, (labels, answers) in cases.items():
+        meta = {**touch.meta, "labels": labels, "decided": answers}
+        save(tmp_path / "kept" / f"{name}.npz", replace(touch, meta=meta))
+    return tmp_path / "kept"
+
+
+def names(lines):
+    return [Path(line["file"]).stem for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["unsure"], ["unknown", "unsure"]),
+        (["wrong"], ["wrong"]),
+        (["unlabelled"], ["sure", "unknown", "unsure"]),
+        (["object"], ["unknown"]),
+        (["unlabelled", "unsure"], ["unknown", "unsure"]),
+    ],
+)
+def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected):
+    options = [part for word in words for part in ("--only", word)]
+    assert names(edge("label", kept, *options)[1]) == expected
+
+
+def test_a_touch_is_listed_with_its_decisions_and_what_asks_for_a_look(kept, edge):
+    (line,) = edge("label", kept / "unsure.npz")[1]
+    assert line["decided"]["softness"]["label"] == "hard"
+    assert line["kinds"] == ["unsure", "unlabelled"]
+
+
+def test_a_decision_is_accepted_where_it_names_a_label(kept, edge):
+    edge("label", kept, "--accept", "--yes")
+    assert load(kept / "sure.npz").labels == {"softness": "soft"}
+    assert load(kept / "wrong.npz").labels == {"softness": "hard"}
+    assert load(kept / "unknown.npz").labels == {"softness": "soft"}
+
+
+def test_a_decision_is_accepted_but_for_what_is_corrected(kept, edge):
+    correct = ("--accept", "--set", "softness=soft", "--yes")
+    edge("label", kept / "unsure.npz", *correct)
+    assert load(kept / "unsure.npz").labels == {"softness": "soft"}
+
+
+def test_the_last_change_of_labels_is_taken_back(kept, edge):
+    before = (kept / "wrong.npz").read_bytes()
+    edge("label", kept, "--accept", "--yes")
+    assert edge("label", kept, "--undo")[0] == 0
+    assert (kept / "wrong.npz").read_bytes() == before
+    assert load(kept / "sure.npz").labels == {}
+    status, _, err = edge("label", kept, "--undo")
+    assert status == 2
+    assert "there is no change to take back" in err
+
+
+def test_deleted_recordings_can_be_brought_back(kept, edge):
+    before = (kept / "wrong.npz").read_bytes()
+    edge("label", kept, "--only", "wrong", "--delete", "--yes")
+    assert not (kept / "wrong.npz").exists()
+    assert len(find([str(kept)])) == 3
+    edge("label", kept, "--undo")
+    assert (kept / "wrong.npz").read_bytes() == before
+
+
+def test_nothing_is_deleted_without_a_word(kept, edge):
+    status, _, err = edge("label", kept, "--delete")
+    assert status == 2
+    assert "add --yes to do it" in err
+    assert len(find([str(kept)])) == 4
+
+
+def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
+    status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
+    assert status == 1
+    assert "none of 1 recording is of this kind" in err

@@ -1,6 +1,7 @@
 """The live page shows frames, contacts and decisions, and relabels and deletes
 trials."""
 
+import shutil
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from edge.events import Decided, Onset
 from edge.tools.page import Page
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from tests.browser import chromium
+from tests.browser import chromium, violations
 
 LAYOUT = SkinLayout(
     rows=4, cols=6, threshold_counts=100, dead=(5,), counts_per_newton=1000.0
@@ -218,6 +219,78 @@ def test_what_cannot_be_deleted_is_one_sentence(folder_page, monkeypatch):
     assert "a.npz" in folder_page._trials
 
 
+@pytest.fixture
+def kept(tmp_path):
+    """A folder with a touch that was kept because its decision was unsure."""
+    trial = edge.load(demo.FOLDER / "foam-block-fixed.npz")
+    answer = {"label": "hard", "confidence": 0.55, "flags": ["short"]}
+    meta = {**trial.meta, "labels": {}, "decided": {"softness": answer}}
+    edge.save(tmp_path / "kept-1.npz", replace(trial, meta=meta))
+    return tmp_path
+
+
+@pytest.fixture
+def kept_page(kept):
+    page = Page(
+        "127.0.0.1:0",
+        LAYOUT,
+        title="pad",
+        folder=kept,
+        choices={"softness": ["soft", "hard"]},
+        records=False,
+    )
+    with closing(page.server):
+        yield page
+
+
+def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_page):
+    (touch,) = kept_page._act({"do": "trials"})
+    assert touch["file"] == "kept-1.npz"
+    assert touch["decided"]["softness"]["label"] == "hard"
+    assert touch["kinds"] == ["unsure", "unlabelled"]
+    assert len(touch["curve"]) == 32
+    assert max(touch["curve"]) == 100
+
+
+def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, kept):
+    kept_page._act({"do": "accept", "file": "kept-1.npz"})
+    assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
+    correct = {"do": "relabel", "file": "kept-1.npz", "labels": {"softness": "soft"}}
+    kept_page._act(correct)
+    (touch,) = kept_page._act({"do": "trials"})
+    assert touch["labels"] == {"softness": "soft"}
+    assert touch["kinds"] == ["unsure", "wrong"]
+    kept_page._act({"do": "undo"})
+    assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
+
+
+def test_a_touch_without_decisions_has_none_to_accept(folder_page):
+    with pytest.raises(InputError, match="no decision names a label to accept"):
+        folder_page._act({"do": "accept", "file": "a.npz"})
+
+
+def test_touches_that_come_into_the_folder_are_shown(kept_page, kept):
+    shutil.copy(kept / "kept-1.npz", kept / "kept-2.npz")
+    files = [touch["file"] for touch in kept_page._act({"do": "trials"})]
+    assert files == ["kept-1.npz", "kept-2.npz"]
+    (kept / "kept-1.npz").unlink()
+    files = [touch["file"] for touch in kept_page._act({"do": "trials"})]
+    assert files == ["kept-2.npz"]
+
+
+def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
+    for frame in frames(6):
+        folder_page.push(
+            replace(frame, counts=np.zeros((16, 24), np.uint16), valid=None)
+        )
+    before = pictures[-1]["trials"]
+    folder_page._act({"do": "delete", "file": "a.npz"})
+    for frame in frames(6):
+        later = replace(frame, t=frame.t + 1.0, valid=None)
+        folder_page.push(replace(later, counts=np.zeros((16, 24), np.uint16)))
+    assert pictures[-1]["trials"] > before
+
+
 class TestInABrowser:
     """The page in headless Chromium."""
 
@@ -255,3 +328,50 @@ class TestInABrowser:
         address = f"http://127.0.0.1:{page.server.server_port}/?token=wrong"
         with closing(page.server), chromium(390, address) as browser:
             assert browser.find_elements("id", "skin") == []
+
+    def test_a_kept_touch_is_filtered_corrected_and_undone(self, kept_page, kept):
+        stream = frames(10_000, touched_from=0)
+        with chromium(390, kept_page.server.link) as browser:
+
+            def until(condition):
+                for _ in range(400):
+                    kept_page.push(next(stream))
+                    if condition():
+                        return
+                    browser.execute_script("return 1")
+                raise AssertionError("it never came")
+
+            def rows():
+                return browser.find_elements("css selector", "#trials tr")
+
+            def labels():
+                return edge.load(kept / "kept-1.npz").labels
+
+            until(lambda: len(rows()) == 1)
+            assert violations(browser) == []
+            text = rows()[0].text
+            assert "softness: hard (55 %, short)" in text
+            assert "unsure" in text
+            browser.execute_script(
+                "const f = document.getElementById('filter'); f.value = 'wrong';"
+                "f.dispatchEvent(new Event('change'));"
+            )
+            until(lambda: rows() == [])
+            browser.execute_script(
+                "const f = document.getElementById('filter'); f.value = '';"
+                "f.dispatchEvent(new Event('change'));"
+            )
+            until(lambda: len(rows()) == 1)
+            browser.find_element("css selector", "body").send_keys("1")
+            until(lambda: kept_page.labels == {"softness": "soft"})
+            pressed = "#choices button[aria-pressed=true]"
+            until(lambda: browser.find_elements("css selector", pressed))
+            assert browser.find_element("css selector", pressed).text == "1 soft"
+            accept, correct, _ = rows()[0].find_elements("css selector", "button")
+            assert (accept.text, correct.text) == ("Accept", "Correct")
+            browser.execute_script("arguments[0].click()", correct)
+            until(lambda: labels() == {"softness": "soft"})
+            until(lambda: browser.find_element("id", "undo").is_displayed())
+            undo = browser.find_element("id", "undo")
+            browser.execute_script("arguments[0].click()", undo)
+            until(lambda: labels() == {})

@@ -1,0 +1,96 @@
+"""What a person sees of a recorded touch: its curve, its decisions, and which touches ask
+for a look."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from edge.model.novelty import UNKNOWN
+from edge.recording import Recording
+
+UNSURE = 0.8
+"""Confidence below which a decision is unsure."""
+KINDS = ("unsure", "wrong", "unlabelled")
+CURVE = 32
+"""Points of a small curve."""
+BLOCKS = "▁▂▃▄▅▆▇█"
+
+
+def curve(recording: Recording, points: int = CURVE) -> list[int]:
+    """The largest count of a touch over time, in percent of its highest; the largest of
+    each part of the recording."""
+    peaks = recording.frames.reshape(len(recording.t), -1).max(axis=1)
+    parts = np.array_split(peaks, min(points, len(peaks)))
+    highest = max(int(peaks.max()), 1)
+    return [int(part.max()) * 100 // highest for part in parts]
+
+
+def sparkline(percent: Sequence[int]) -> str:
+    """A curve as one line of blocks.
+
+    >>> sparkline([0, 50, 100])
+    '▁▄█'
+    """
+    return "".join(BLOCKS[value * (len(BLOCKS) - 1) // 100] for value in percent)
+
+
+def decisions(meta: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """{task: its decision} of a kept touch; empty of others, and of what is none."""
+    decided = meta.get("decided")
+    if not isinstance(decided, Mapping):
+        return {}
+    return {
+        str(task): {"confidence": None, "flags": [], **answer}
+        for task, answer in decided.items()
+        if isinstance(answer, Mapping) and "label" in answer
+    }
+
+
+def kinds(meta: Mapping[str, Any]) -> list[str]:
+    """The kinds of touches that a recording belongs to.
+
+    A touch is unsure if a decision about it was, or was unknown; it is wrong if its
+    label is another than the decision; it is unlabelled if a task that was decided has
+    no label.
+    """
+    labels = meta.get("labels", {})
+    decided = decisions(meta)
+    found = set()
+    if not labels or any(task not in labels for task in decided):
+        found.add("unlabelled")
+    for task, answer in decided.items():
+        confidence = answer["confidence"]
+        if confidence is None or confidence < UNSURE or UNKNOWN in answer["flags"]:
+            found.add("unsure")
+        if task in labels and labels[task] != answer["label"]:
+            found.add("wrong")
+    return [kind for kind in KINDS if kind in found]
+
+
+def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
+    """{task: label} that accepts the decisions of a kept touch, where they name a
+    label."""
+    return {
+        task: answer["label"]
+        for task, answer in decisions(meta).items()
+        if isinstance(answer["label"], str) and answer["label"] != UNKNOWN
+    }
+
+
+def kind_or_task(text: str) -> str:
+    """A word that selects touches: one of `KINDS`, or the name of a task.
+
+    Raises:
+        ArgumentTypeError: the word is empty.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"must be {', '.join(KINDS)} or a task")
+    return text
+
+
+def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:
+    """Whether a recording is of every kind, or has every task, that some words name."""
+    known = {*kinds(meta), *meta.get("labels", {}), *decisions(meta)}
+    return known.issuperset(words)

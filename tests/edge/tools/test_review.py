@@ -1,0 +1,69 @@
+"""What asks for a look at a touch, and its course in a few numbers."""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from edge.tools import review
+
+
+def meta(labels, **answers):
+    """Metadata with decisions, task=(label, confidence, flags)."""
+    decided = {
+        task: {"label": label, "confidence": sure, "flags": list(flags)}
+        for task, (label, sure, *flags) in answers.items()
+    }
+    return {"labels": labels, "decided": decided}
+
+
+@pytest.mark.parametrize(
+    ("given", "kinds"),
+    [
+        (meta({"a": "x"}, a=("x", 0.9)), []),
+        (meta({"a": "x"}, a=("x", 0.8)), []),
+        (meta({"a": "x"}, a=("x", 0.79)), ["unsure"]),
+        (meta({"a": "x"}, a=("x", None)), ["unsure"]),
+        (meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
+        (meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
+        (meta({}, a=("x", 0.9)), ["unlabelled"]),
+        (meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),
+        ({"labels": {}}, ["unlabelled"]),
+        ({"labels": {"a": "x"}}, []),
+        ({"labels": {"a": "x"}, "decided": 5}, []),
+        ({"labels": {"a": "x"}, "decided": {"a": 5}}, []),
+    ],
+)
+def test_a_touch_is_unsure_wrong_or_unlabelled(given, kinds):
+    assert review.kinds(given) == kinds
+
+
+def test_what_is_unknown_or_out_of_range_is_not_accepted():
+    given = meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
+    assert review.accepted(given) == {"a": "x"}
+
+
+def test_a_recording_is_selected_by_all_words():
+    given = meta({"b": "z"}, a=("x", 0.5))
+    assert review.selected(given, [])
+    assert review.selected(given, ["unsure", "a", "b"])
+    assert not review.selected(given, ["unsure", "c"])
+
+
+def test_a_word_that_selects_is_not_empty():
+    assert review.kind_or_task("softness") == "softness"
+    with pytest.raises(argparse.ArgumentTypeError, match="unsure, wrong, unlabelled"):
+        review.kind_or_task(" ")
+
+
+def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
+    touch = make_touch()
+    frames = np.zeros_like(touch.frames)
+    frames[7, 2, 3] = 400
+    frames[-1, 0, 0] = 100
+    course = review.curve(replace(touch, frames=frames), 10)
+    assert len(course) == 10
+    assert max(course) == 100
+    assert course[-1] == 25
+    assert review.curve(replace(touch, frames=0 * frames), 10) == [0] * 10
