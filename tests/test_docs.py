@@ -1,9 +1,13 @@
 """docs/: the tutorial and the notebook run as written, and links and paths exist."""
 
 import json
+import os
 import re
 import shlex
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,6 +53,31 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
         "pillow",
         "foam block",
     }
+
+
+def test_the_two_evenings_mend_a_mistake(tmp_path):
+    text = (DOCS / "evenings.md").read_text()
+    script = "".join(re.findall(r"```sh\n(.*?)```", text, re.S))
+    programs = Path(sys.executable).parent
+    environment = {
+        **os.environ,
+        "PATH": f"{programs}:{os.environ['PATH']}",
+        "PROJECT": str(ROOT),
+    }
+    ran = subprocess.run(
+        ["bash", "-e", "-c", script],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    events = [json.loads(x) for x in ran.stdout.splitlines() if x.startswith("{")]
+    objects = [e["label"] for e in events if e.get("task") == "object"]
+    before, after = objects[0], objects[-1]
+    assert before != "pillow"
+    assert after == "pillow"
 
 
 def test_the_notebook_runs(tmp_path):

@@ -121,7 +121,8 @@ class Keeper:
 
     def _write(self, frames: list[Frame], decided: list[Decided]) -> None:
         now = datetime.now(UTC)
-        name = f"{STEM}-{now:%Y%m%dT%H%M%S}-{self.kept:05}"
+        # Another run may keep touches in this folder in the same second.
+        name = f"{STEM}-{now:%Y%m%dT%H%M%S}-{now.microsecond:06}"
         meta = {
             **self._meta,
             "trial": name,
@@ -129,7 +130,8 @@ class Keeper:
             "kept": now.isoformat(timespec="seconds"),
             "decided": decisions_of(decided),
         }
-        save(self._folder / f"{name}.npz", recording(frames, meta), lasting=False)
+        path = self._folder / f"{name}.npz"
+        save(path, recording(frames, meta), lasting=False, overwrite=False)
         self.kept += 1
         self._make_room()
 

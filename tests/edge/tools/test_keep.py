@@ -78,3 +78,9 @@ def test_the_oldest_go_first(edge, tmp_path):
     assert names[0] == "20200101T000001"
     assert len(names) == 3
     assert other.exists()
+
+
+def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):
+    for _ in range(2):
+        assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
+    assert len(list(tmp_path.glob("kept-*.npz"))) == 2
