@@ -339,8 +339,15 @@ def _check(info: ModelInfo, name: str) -> None:
         contradiction = f"names {len(info.trials)} of {info.rows} trials"
     elif (info.motion_frame == "world") != (info.chain is not None):
         contradiction = "its motion frame contradicts its arm"
-    for task in info.products:
-        if not contradiction and not _factors_fit(info, task):
+    elif not all(name.isprintable() for name in (info.name, *info.tasks)):
+        contradiction = "its name and its tasks' names must be printable"
+    for task, entry in info.tasks.items():
+        if entry.components > info.width:
+            contradiction = (
+                f"task {task!r} has {entry.components} components of {info.width} "
+                "features"
+            )
+        if entry.factors and not _factors_fit(info, task):
             contradiction = f"task {task!r} is not the product of its factors"
     if contradiction:
         raise InputError(f"{name}: {contradiction}; export it again")
@@ -363,13 +370,28 @@ def _factors_fit(info: ModelInfo, task: str) -> bool:
     lengths = {len(labels) for labels in indices.values()}
     if len(ranges) != 2 or lengths != {len(info.tasks[task].labels)}:
         return False
-    return sorted(zip(*indices.values(), strict=True)) == list(product(*ranges))
+    pairs = list(zip(*indices.values(), strict=True))
+    return sorted(pairs) == list(product(*ranges)) and _names_fit(info, task, pairs)
+
+
+def _names_fit(info: ModelInfo, task: str, pairs: Sequence[tuple[int, ...]]) -> bool:
+    """Whether labels that are made of their factors' labels, as `rigid-fixed` is, stand
+    for these. Labels may have other names."""
+    labels = info.tasks[task].labels
+    first, second = (info.tasks[factor].labels for factor in info.products[task])
+    forward = [f"{first[a]}-{second[b]}" for a, b in pairs]
+    backward = [f"{second[b]}-{first[a]}" for a, b in pairs]
+    return all(
+        tuple(names) == labels or set(names) != set(labels)
+        for names in (forward, backward)
+    )
 
 
 def _task(table: ConfigTable) -> Task:
     labels = table.texts("labels")
-    if not labels:
-        raise table.fail("labels", "a list of at least one text")
+    printable = all(label.strip() and label.isprintable() for label in labels)
+    if not labels or not printable or len(set(labels)) < len(labels):
+        raise table.fail("labels", "a list of different, printable texts")
     factors = table.table("factors")
     task = Task(
         labels,

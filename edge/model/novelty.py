@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from edge.config import ConfigTable
 from edge.errors import InputError
@@ -98,4 +99,9 @@ class Novelty:
             ConfigTable({"limits": row}, table.where, table.prefix) for row in rows
         )
         limits = tuple(line.numbers("limits", len(rates)) for line in lines)
+        falling = all(a > b for a, b in pairwise((1.0, *rates, 0.0)))
+        if not falling:
+            raise table.fail("rates", "numbers between 0 and 1 that fall")
+        if any(a > b for line in limits for a, b in pairwise((0.0, *line))):
+            raise table.fail("limits", "rows of numbers from 0 on that rise")
         return cls(table.text("task"), rates, limits)

@@ -17,6 +17,8 @@ RELEASE_S = 0.3
 """Longer than an arm bounces off a rigid object, and shorter than the time to a second
 tap."""
 LONGEST_RELEASE_S = 60.0
+LONGEST_M = 1000.0
+"""Greatest length of a skin: far beyond any, so that no product of two overflows."""
 MOST_LINES = 1024
 """Most rows, and most columns."""
 
@@ -166,15 +168,25 @@ class SkinLayout:
             if table.has(name):
                 values[name] = table.whole(name, allowed=range(65536))
         values["wraps"] = table.flag("wraps", False)
-        for name in ("radius_m", "counts_per_newton", "release_s"):
-            high = LONGEST_RELEASE_S if name == "release_s" else math.inf
+        highest = {
+            "radius_m": LONGEST_M,
+            "counts_per_newton": math.inf,
+            "release_s": LONGEST_RELEASE_S,
+        }
+        for name, high in highest.items():
             if table.has(name):
                 values[name] = table.number(name, low=0.0, high=high, open_low=True)
-        values["row0_z_m"] = table.number("row0_z_m", 0.0)
+        values["row0_z_m"] = table.number(
+            "row0_z_m", 0.0, low=-LONGEST_M, high=LONGEST_M
+        )
         if isinstance(table.get("pitch_m", None), list | tuple):
-            values["pitch_m"] = table.numbers("pitch_m", 2, low=0.0, open_low=True)
+            values["pitch_m"] = table.numbers(
+                "pitch_m", 2, low=0.0, high=LONGEST_M, open_low=True
+            )
         elif table.has("pitch_m"):
-            values["pitch_m"] = table.number("pitch_m", low=0.0, open_low=True)
+            values["pitch_m"] = table.number(
+                "pitch_m", low=0.0, high=LONGEST_M, open_low=True
+            )
         if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:
             values["axes"] = 3
         if table.has("column_angles_deg"):

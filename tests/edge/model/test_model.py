@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from edge.errors import InputError
 from edge.model import onnx_file
-from edge.model.info import FORMAT, METADATA_KEY
+from edge.model.info import FORMAT, METADATA_KEY, ModelInfo
 from edge.model.model import Model
 
 
@@ -173,6 +174,19 @@ REFUSED = {
             factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
         )
     ): "task 'object' is not the product of its factors",
+    edited(
+        lambda m: m["tasks"]["category"].update(labels=["soft", "soft"])
+    ): "labels must be a list of different, printable texts",
+    edited(
+        lambda m: m["tasks"]["category"].update(labels=["soft", "rig\x1b[2Jid"])
+    ): "labels must be a list of different, printable texts, not",
+    edited(
+        lambda m: m["tasks"]["category"].update(components=10**9)
+    ): "task 'category' has 1000000000 components of 120 features",
+    edited(lambda m: m["skin"].update(pitch_m=1e308)): "skin.pitch_m must be a number",
+    meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 1000",
+    meta(tracking={"debounce": 1001}): "debounce must be a whole number from 1",
+    meta(name="arm\n"): "its name and its tasks' names must be printable",
 }
 
 
@@ -183,6 +197,38 @@ def test_a_model_that_is_not_ours_is_refused_in_one_sentence(change, altered):
         Model(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def with_factors(info, labels, softness, mobility):
+    """Metadata whose category is a product of softness and mobility."""
+    task = info.tasks["category"]
+    tasks = {
+        "category": replace(
+            task,
+            labels=labels,
+            factors={"softness": softness, "mobility": mobility},
+        ),
+        "softness": replace(task, labels=("rigid", "soft")),
+        "mobility": replace(task, labels=("fixed", "movable")),
+    }
+    return replace(info, tasks=tasks).to_json()
+
+
+def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
+    names = ("rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable")
+    text = with_factors(model.info, names, [0, 0, 1, 1], [0, 1, 0, 1])
+    assert ModelInfo.from_json(text, "m").tasks["category"].labels == names
+    lying = with_factors(model.info, names, [1, 1, 0, 0], [0, 1, 0, 1])
+    with pytest.raises(InputError, match="'category' is not the product of its"):
+        ModelInfo.from_json(lying, "m")
+    others = ("wall", "box", "sofa", "pillow")
+    free = with_factors(model.info, others, [1, 1, 0, 0], [0, 1, 0, 1])
+    assert ModelInfo.from_json(free, "m").tasks["category"].labels == others
+
+
+@pytest.mark.parametrize("frames", [1, 1000])
+def test_a_contact_may_take_1_to_1000_frames_to_be_confirmed(frames, altered):
+    assert Model(altered(meta(tracking={"debounce": frames}))).info.debounce == frames
 
 
 def test_contents_are_those_that_onnx_reads(exported):

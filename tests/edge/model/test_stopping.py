@@ -165,6 +165,21 @@ def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
         Novelty.from_table(table(novelty), 3)
 
 
+@pytest.mark.parametrize(
+    ("rates", "limits", "says"),
+    [
+        ((0.05, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
+        ((1.5, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
+        ((0.1, 0.0), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
+        ((0.1, 0.05), (2.0, 1.0), "limits must be rows of numbers from 0 on that rise"),
+        ((0.1, 0.05), (-1.0, 1.0), "limits must be rows of numbers from 0 on"),
+    ],
+)
+def test_limits_of_novelty_in_another_order_are_refused(rates, limits, says):
+    with pytest.raises(InputError, match=says):
+        Novelty.from_table(table(Novelty("t", rates, (limits,))), 1)
+
+
 def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
     novelty = Novelty("t", (0.2, 0.1, 0.05), ((1.0, 2.0, 3.0),))
     assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [
