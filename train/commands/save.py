@@ -9,6 +9,7 @@ taxels in `frames`.
 
 import argparse
 import io
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ from edge.saving import find
 from train.progress import bar
 
 FORMATS = ("parquet", "hdf5")
+COLUMN = re.compile(r"trial|t_s|(taxel|joint)_.*")
+"""Names of a table's columns that are no tasks."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +65,7 @@ def check_alike(paths: Sequence[Path], recordings: Sequence[Recording]) -> None:
     for path, recording in zip(paths, recordings, strict=True):
         same = (
             recording.frames.shape[1:] == first.frames.shape[1:]
-            and recording.dof == first.dof
+            and joint_columns(recording) == joint_columns(first)
             and (recording.shear is None) == (first.shear is None)
         )
         if not same:
@@ -109,6 +112,10 @@ def write_parquet(
     first = recordings[0]
     columns: dict[str, Any] = {"trial": by_frame(recordings, names)}
     for task in tasks_of(recordings):
+        if COLUMN.fullmatch(task):
+            raise InputError(
+                f"{out}: the task {task!r} has the name of another column; save as hdf5"
+            )
         labels = [recording.labels.get(task) for recording in recordings]
         columns[task] = by_frame(recordings, labels)
     columns["t_s"] = np.concatenate([recording.t for recording in recordings])

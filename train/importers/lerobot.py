@@ -8,7 +8,7 @@ in radians.
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,7 @@ def trials(
     table = ConfigTable(read_json(info), str(info))
     names = joint_names(table, options.joints)
     episodes = list(_episodes(path, options))
+    check_alike(path, episodes)
     rest = rest_of([episode.values for episode in episodes], options)
     shape = _shape(path, episodes[0], options)
     first = episodes[0].values.normal.shape[1]
@@ -98,6 +99,27 @@ def trials(
             f"episode_{episode.number:06}",
             _recording(path, episode, rest, shape, meta),
         )
+
+
+def check_alike(path: Path, episodes: Sequence[Episode]) -> None:
+    """Refuse episodes that cannot be recordings of one skin.
+
+    Raises:
+        InputError: two have one number, or other taxels.
+    """
+    numbers: set[int] = set()
+    for episode in episodes:
+        if episode.number in numbers:
+            raise InputError(
+                f"{path}: episode {episode.number} stands in two files; fetch the data "
+                "set again"
+            )
+        numbers.add(episode.number)
+        if episode.shape != episodes[0].shape:
+            raise InputError(
+                f"{path}: episode {episode.number} has values {episode.shape} a frame, "
+                f"but episode {episodes[0].number} {episodes[0].shape}"
+            )
 
 
 def joint_names(info: ConfigTable, column: str | None) -> list[str] | None:

@@ -5,14 +5,17 @@ Needs the dependency group `ros`, which `make venv` installs: pip install --grou
 """
 
 import argparse
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from edge.errors import printable
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers.topics import Log, add_options, needs
+from train.progress import say
 
 __all__ = ["add_options", "trials"]
 
@@ -26,6 +29,7 @@ def trials(
     with needs("rosbags"):
         from rosbags.typesys import Stores, get_typestore
     log = Log.of(path, arm, options)
+    unread: dict[str, set[str]] = defaultdict(set)
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (
         parsing(str(path), "a complete MCAP file", "; copy it again"),
@@ -36,12 +40,20 @@ def trials(
         ).iter_messages():
             logged_s = message.log_time * 1e-9
             kind = "" if schema is None else schema.name
-            if channel.message_encoding == "json":
+            encoding = channel.message_encoding
+            if encoding == "json":
                 log.json(channel.topic, message.data, logged_s)
-            elif channel.message_encoding == "cdr" and log.takes(channel.topic, kind):
+            elif encoding != "cdr":
+                unread[encoding].add(channel.topic)
+            elif log.takes(channel.topic, kind):
                 define(types, schema)
                 data = types.deserialize_cdr(message.data, kind)
                 log.ros(channel.topic, kind, data, logged_s)
+    for encoding, topics in unread.items():
+        say(
+            f"{path}: left out {', '.join(sorted(topics))}, in the encoding "
+            f"{printable(encoding)!r}; cdr and json are read"
+        )
     yield path.stem, log.recording()
 
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -125,7 +125,9 @@ class Log:
     )
     """{topic: {joint: its angles}}"""
     _left_out: dict[str, str] = field(default_factory=dict)
-    """{topic: why no frame can be read from it}."""
+    """{topic: why no frame can be read from one of its messages}."""
+    _unusable: Counter[str] = field(default_factory=Counter)
+    """{topic: its messages without a frame}."""
     _seen: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     """{`frames` or `joints`: all topics of such a kind}."""
 
@@ -167,6 +169,7 @@ class Log:
             values = self._values(kind, message)
         except Unusable as reason:
             self._left_out.setdefault(topic, str(reason))
+            self._unusable[topic] += 1
             return
         self._frames[topic].add(t, logged_s, values)
 
@@ -247,7 +250,12 @@ class Log:
         if frames is None:
             raise InputError(f"{self.path}: {self._why_empty()}")
         for topic, reason in self._left_out.items():
-            say(f"{self.path}: left out {topic}, which {reason}")
+            part = f"{topic},"
+            if topic == name:
+                unusable = self._unusable[topic]
+                messages = unusable + len(frames.values)
+                part = f"{unusable} of {messages} messages of {topic}, the first of"
+            say(f"{self.path}: left out {part} which {reason}")
         shapes = {np.shape(values) for values in frames.values}
         if len(shapes) > 1:
             raise InputError(

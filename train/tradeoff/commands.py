@@ -63,9 +63,10 @@ class Commands:
 
     @property
     def _by_make(self) -> bool:
-        """Whether make can say it: it takes no name with a space."""
+        """Whether make can say it: it takes no name that a shell must have quoted."""
         names = [*self.data, str(self.out)]
-        return self.out.name == "tradeoff" and not any(" " in name for name in names)
+        plain = all(shlex.quote(name) == name for name in names)
+        return self.out.name == "tradeoff" and plain
 
     @property
     def _facts(self) -> str:

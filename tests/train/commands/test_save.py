@@ -101,3 +101,24 @@ def test_recordings_that_do_not_fit_together_are_named(folder, make_touch, capsy
     assert main(words) == 2
     assert "z.npz: its skin or joints are not those of" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_joints_of_other_names_are_not_saved_under_the_firsts(folder, capsys):
+    path = folder / "touch_1.npz"
+    touch = edge.load(path)
+    names = [f"other {i}" for i in range(touch.dof)]
+    edge.save(path, replace(touch, meta={**touch.meta, "joint_names": names}))
+    out = folder.parent / "all.parquet"
+    words = ["save", str(folder), "--as", "parquet", "--out", str(out)]
+    assert main(words) == 2
+    assert "touch_1.npz: its skin or joints are not" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("task", ["trial", "t_s", "taxel_0_0", "joint_1"])
+def test_a_task_with_the_name_of_a_column_is_refused(folder, task, capsys):
+    path = folder / "touch_1.npz"
+    touch = edge.load(path)
+    edge.save(path, replace(touch, meta={**touch.meta, "labels": {task: "a"}}))
+    words = ["save", str(folder), "--as", "parquet", "--out", str(folder / "all")]
+    assert main(words) == 2
+    assert "has the name of another column; save as hdf5" in capsys.readouterr().err

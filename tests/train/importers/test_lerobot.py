@@ -131,3 +131,22 @@ def test_frames_of_several_lengths_are_named_with_their_episode(tmp_path, capsys
     assert main([*words, "--taxels", "observation.tactile"]) == 2
     said = capsys.readouterr().err
     assert "episode 2: observation.tactile does not hold numbers of one shape" in said
+
+
+def test_an_episode_in_two_files_is_refused(tmp_path, capsys):
+    folder = data_set(tmp_path / "set", "v2.1")
+    episode(2).to_parquet(folder / "data" / "chunk-000" / "again.parquet")
+    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
+    assert main([*words, "--taxels", "observation.tactile"]) == 2
+    assert "episode 2 stands in two files" in capsys.readouterr().err
+
+
+def test_episodes_of_several_skins_are_named(tmp_path, capsys):
+    folder = data_set(tmp_path / "set", "v2.1")
+    data = episode(2)
+    data["observation.tactile"] = [[1.0, 2.0]] * N
+    data.to_parquet(folder / "data" / "chunk-000" / "episode_000002.parquet")
+    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
+    assert main([*words, "--taxels", "observation.tactile"]) == 2
+    said = capsys.readouterr().err
+    assert "episode 2 has values (2,) a frame, but episode 0 (6,)" in said

@@ -252,7 +252,7 @@ def test_a_file_beside_the_log_that_cannot_be_used_is_one_sentence(
     assert sentence in refusal("import", "rosbag", path, "--out", tmp_path / "out")
 
 
-def write_mcap(path, *, cdr, **options):
+def write_mcap(path, *, cdr, protobuf=(), **options):
     types = STORES[2]
 
     def data(kind, message, fields):
@@ -284,6 +284,9 @@ def write_mcap(path, *, cdr, **options):
                 writer.add_message(
                     channel, nanoseconds(t), bytes(message), nanoseconds(t)
                 )
+        for topic in protobuf:
+            channel = writer.register_channel(topic, "protobuf", 0)
+            writer.add_message(channel, nanoseconds(T[0]), b"", nanoseconds(T[0]))
         writer.finish()
     return path
 
@@ -347,6 +350,23 @@ def test_a_colour_camera_beside_the_skin_is_left_out_and_said(tmp_path, capsys):
     assert (
         "left out /camera, which is rgb8; frames are mono16" in capsys.readouterr().out
     )
+
+
+def test_a_damaged_frame_is_left_out_and_counted(tmp_path, capsys):
+    frames = list(images())
+    frames[3].step = 1
+    skin = list(zip(T, frames, strict=True))
+    path = skin_and(tmp_path / "grasp", frames=skin)
+    assert len(imported(tmp_path, "rosbag", path).t) == len(T) - 1
+    said = f"left out 1 of {len(T)} messages of /skin, the first of which has an image"
+    assert said in capsys.readouterr().out
+
+
+def test_an_encoding_that_is_not_read_is_said(tmp_path, capsys):
+    path = write_mcap(tmp_path / "grasp.mcap", cdr=True, protobuf=("/tf",))
+    assert differences(imported(tmp_path, "mcap", path)) == []
+    said = capsys.readouterr().out
+    assert "left out /tf, in the encoding 'protobuf'; cdr and json are read" in said
 
 
 def test_a_topic_that_is_not_named_is_never_read(tmp_path, capsys):
