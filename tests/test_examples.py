@@ -98,7 +98,8 @@ class Ros:
             def __init__(self, name):
                 self.name = name
 
-            def declare_parameter(self, name, default):
+            def declare_parameter(self, name, default, descriptor):
+                assert descriptor.dynamic_typing
                 return types.SimpleNamespace(value=parameters.get(name, default))
 
             def create_publisher(self, kind, topic, depth):
@@ -106,6 +107,9 @@ class Ros:
 
             def create_subscription(self, kind, topic, callback, depth):
                 ros.heard[topic] = callback
+
+            def create_timer(self, period_s, callback):
+                assert period_s == 1.0
 
             def get_clock(self):
                 stamp = types.SimpleNamespace(to_msg=lambda: "now")
@@ -118,13 +122,27 @@ class Ros:
             def __init__(self, **fields):
                 super().__init__(header=types.SimpleNamespace(), **fields)
 
-        names = ("String", "JointState", "Classification", "ObjectHypothesis")
-        messages = types.SimpleNamespace(**dict.fromkeys(names, Message))
+        class DiagnosticStatus(Message):
+            OK, WARN = "ok", "warn"
+
+        kinds = (
+            *("String", "JointState", "Classification", "ObjectHypothesis"),
+            *("DiagnosticArray", "KeyValue", "ParameterDescriptor"),
+        )
+        messages = types.SimpleNamespace(
+            DiagnosticStatus=DiagnosticStatus, **dict.fromkeys(kinds, Message)
+        )
         spin = types.SimpleNamespace(
             init=lambda: None, spin=self.spin, try_shutdown=lambda: None
         )
-        self.modules = {"rclpy": spin, "rclpy.node": types.SimpleNamespace(Node=Node)}
-        for package in ("sensor_msgs", "std_msgs", "vision_msgs"):
+        stopped = type("ExternalShutdownException", (Exception,), {})
+        self.modules = {
+            "rclpy": spin,
+            "rclpy.node": types.SimpleNamespace(Node=Node),
+            "rclpy.executors": types.SimpleNamespace(ExternalShutdownException=stopped),
+        }
+        packages = "diagnostic_msgs rcl_interfaces sensor_msgs std_msgs vision_msgs"
+        for package in packages.split():
             self.modules |= {
                 package: types.ModuleType(package),
                 f"{package}.msg": messages,
@@ -132,13 +150,14 @@ class Ros:
 
     def spin(self, node):
         node._reading.join(timeout=30)
+        node.diagnose()
 
     def run(self, monkeypatch):
         for name, module in self.modules.items():
             monkeypatch.setitem(sys.modules, name, module)
         monkeypatch.syspath_prepend(str(PACKAGE))
         monkeypatch.delitem(sys.modules, "edge_classify_ros.node", raising=False)
-        import_module("edge_classify_ros.node").main()
+        return import_module("edge_classify_ros.node").main()
 
 
 def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
@@ -183,6 +202,57 @@ def test_the_ros_node_takes_joint_angles_by_name(monkeypatch):
     ros.run(monkeypatch)
     assert spun[0] is None
     assert spun[1].tolist() == [4.0, 3.0, 2.0, 1.0, 0.0]
+
+
+def test_the_ros_node_ends_with_the_error_that_ended_its_reading(monkeypatch, capsys):
+    def unplugged(self, skin, **more):
+        raise edge.EdgeError("i2c-1: no chip answers")
+        yield
+
+    monkeypatch.setattr(edge.Classifier, "watch", unplugged)
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
+    assert ros.run(monkeypatch) == 2
+    assert capsys.readouterr().err == "edge_classify: i2c-1: no chip answers\n"
+    assert ros.destroyed.name == "edge_classify"
+
+
+def test_the_ros_node_without_a_model_says_so(monkeypatch, capsys):
+    assert Ros(model="no.onnx", fake=str(PILLOW)).run(monkeypatch) == 2
+    assert "no.onnx: no such model" in capsys.readouterr().err
+
+
+def test_the_ros_node_takes_a_whole_number_as_error(monkeypatch):
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW), error=0)
+    assert ros.run(monkeypatch) == 0
+
+
+def test_the_ros_node_tells_whether_its_chips_are_read(monkeypatch):
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
+    assert ros.run(monkeypatch) == 0
+    (told,) = ros.topics["/diagnostics"]
+    (status,) = told.status
+    assert (status.level, status.message) == ("ok", "all chips are read")
+    values = {pair.key: pair.value for pair in status.values}
+    tasks = len(edge.Model(demo.MODEL).info.tasks)
+    assert values == {"chips": "32", "decisions": str(tasks)}
+
+
+def test_the_ros_node_names_the_chips_that_are_not_read(monkeypatch):
+    ros = Ros(model=str(demo.MODEL), fake=str(PILLOW))
+
+    def spin(node):
+        node._reading.join(timeout=30)
+        first, second, *_ = node._skin.status()
+        down = [replace(first, state="down"), second]
+        monkeypatch.setattr(node._skin, "status", lambda: down)
+        node.diagnose()
+
+    ros.modules["rclpy"].spin = spin
+    ros.run(monkeypatch)
+    (status,) = ros.topics["/diagnostics"][0].status
+    assert status.level == "warn"
+    assert status.message.startswith("not read: ")
+    assert status.message.count("0x") >= 1
 
 
 def test_a_task_becomes_a_valid_topic(monkeypatch):

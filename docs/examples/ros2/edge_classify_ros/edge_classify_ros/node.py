@@ -1,11 +1,16 @@
-"""Reads the skin, takes in joint angles, and publishes each decision with its time."""
+"""Reads the skin, takes in joint angles, publishes each decision with its time, and
+ends with the error where the skin can no longer be read."""
 
 import json
 import re
+import sys
 import threading
 from collections import deque
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -29,13 +34,20 @@ def topic(task: str) -> str:
 
 
 class ClassifyNode(Node):
-    """Publishes `~/TASK` (vision_msgs/Classification) and `~/events` (JSON in
-    std_msgs/String)."""
+    """Publishes `~/TASK` (vision_msgs/Classification), `~/events` (JSON in
+    std_msgs/String), and `/diagnostics` once a second.
+
+    Attributes:
+        failure: what ended the reading; None where it was closed or played to its end.
+    """
 
     def __init__(self) -> None:
         super().__init__("edge_classify")
+        self.failure: Exception | None = None
+        # `error:=0` is a whole number to ROS, and so is a model called 7.
+        any_type = ParameterDescriptor(dynamic_typing=True)
         given = {
-            name: self.declare_parameter(name, default).value
+            name: type(default)(self.declare_parameter(name, default, any_type).value)
             for name, default in (
                 ("model", ""),
                 ("skin", ""),
@@ -57,6 +69,9 @@ class ClassifyNode(Node):
             task: self.create_publisher(Classification, f"~/{topic(task)}", 10)
             for task in self._model.info.tasks
         }
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._decisions = 0
+        self.create_timer(1.0, self.diagnose)
         self._reading = threading.Thread(target=self._read, daemon=True)
         self._closing = False
         self._reading.start()
@@ -93,7 +108,16 @@ class ClassifyNode(Node):
         return opened, stream, float("inf")
 
     def _read(self) -> None:
-        """Watch the skin until the node is destroyed or the recording has ended."""
+        """Watch the skin until the node is destroyed, the recording has ended, or
+        reading fails; then the node ends too."""
+        try:
+            self._watch()
+        except Exception as error:  # whatever it is, `main` tells it
+            self.failure = error
+        finally:
+            rclpy.try_shutdown()
+
+    def _watch(self) -> None:
         with self._skin as skin:
             for event in self._classifier.watch(
                 skin, joints=self._joints, lasts_s=self._lasts_s
@@ -102,10 +126,31 @@ class ClassifyNode(Node):
                     return
                 self._publish(event)
 
+    def diagnose(self) -> None:
+        """Publish whether each chip of the skin is read."""
+        chips = self._skin.status()
+        down = [chip for chip in chips if chip.state != "running"]
+        silent = [f"{chip.bus} {chip.spec.route}" for chip in down]
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if silent else DiagnosticStatus.OK,
+            name="edge_classify: skin",
+            message=f"not read: {', '.join(silent)}"
+            if silent
+            else "all chips are read",
+            values=[
+                KeyValue(key="chips", value=str(len(chips))),
+                KeyValue(key="decisions", value=str(self._decisions)),
+            ],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
     def _publish(self, event) -> None:
         self._events.publish(String(data=json.dumps(event.to_dict())))
         if not isinstance(event, edge.Decided) or event.label is None:
             return
+        self._decisions += 1
         message = Classification()
         message.header.stamp = self.get_clock().now().to_msg()
         message.header.frame_id = self._frame_id
@@ -120,13 +165,23 @@ class ClassifyNode(Node):
         super().destroy_node()
 
 
-def main() -> None:
+def main() -> int:
+    """Run the node until it is stopped; the exit status, 2 after an error."""
     rclpy.init()
-    node = ClassifyNode()
+    try:
+        node = ClassifyNode()
+    except edge.EdgeError as error:
+        print(f"edge_classify: {error}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
     try:
         rclpy.spin(node)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+    if node.failure is None:
+        return 0
+    print(f"edge_classify: {node.failure}", file=sys.stderr)
+    return 2

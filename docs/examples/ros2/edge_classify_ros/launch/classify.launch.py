@@ -4,6 +4,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 ARGUMENTS = {
     "model": ("", "the model file, model.onnx"),
@@ -22,11 +23,17 @@ def generate_launch_description():
     ]
     given = {name: LaunchConfiguration(name) for name in ARGUMENTS}
     topics = [("joint_states", given.pop("joint_states"))]
+    # Without a type, ROS would read `error:=0` as a whole number.
+    kinds = {name: float if name == "error" else str for name in given}
+    parameters = {
+        name: ParameterValue(value, value_type=kinds[name])
+        for name, value in given.items()
+    }
     node = Node(
         package="edge_classify_ros",
         executable="classify",
         name="edge_classify",
-        parameters=[given],
+        parameters=[parameters],
         remappings=topics,
         output="screen",
     )
