@@ -96,45 +96,61 @@ def run(arguments: argparse.Namespace) -> int:
     output = Output.of(arguments)
     if arguments.undo:
         return undo(arguments.data, output)
-    change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
     every = find(arguments.data)
-    for folder in sorted({path.parent for path in every}):
-        finish_interrupted(folder)
-    loaded = [(path, load(path)) for path in every]
-    chosen = [
-        (path, recording)
-        for path, recording in loaded
-        if review.selected(recording.meta, arguments.only)
-    ]
+    chosen = _chosen(every, arguments.only)
     if not chosen:
         output.text(f"none of {counted(len(every), 'recording')} is of this kind")
         return 1
-    paths = [path for path, _ in chosen]
-    former = [recording.meta for _, recording in chosen]
     if arguments.delete:
+        paths = [path for path, _ in chosen]
         return _delete(output, paths, agreed=arguments.yes)
-    metas = []
-    for path, meta in zip(paths, former, strict=True):
+    if arguments.accept or arguments.rename or arguments.set or arguments.unset:
+        return _relabel(arguments, output, chosen)
+    _print(output, chosen)
+    return 0
+
+
+def _chosen(
+    paths: Sequence[Path], kinds: Sequence[str]
+) -> list[tuple[Path, Recording]]:
+    """The recordings that are of all kinds, after interrupted changes are finished."""
+    for folder in sorted({path.parent for path in paths}):
+        finish_interrupted(folder)
+    loaded = [(path, load(path)) for path in paths]
+    return [
+        (path, recording)
+        for path, recording in loaded
+        if review.selected(recording.meta, kinds)
+    ]
+
+
+def _relabel(
+    arguments: argparse.Namespace,
+    output: Output,
+    chosen: Sequence[tuple[Path, Recording]],
+) -> int:
+    """Show what labels become, ask, and change them."""
+    change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
+    differing = []
+    for path, recording in chosen:
+        meta = recording.meta
         labels = review.accepted(meta) if arguments.accept else {}
         wanted = replace(change, labels={**labels, **change.labels})
-        metas.append(changed(str(path), meta, wanted))
-    if not (arguments.accept or arguments.rename or arguments.set or arguments.unset):
-        _print(output, chosen)
-        return 0
-    differing = []
-    for path, before, after in zip(paths, former, metas, strict=True):
-        if before.get("labels", {}) != after.get("labels", {}):
+        after = changed(str(path), meta, wanted)
+        if recording.labels != after.get("labels", {}):
             differing.append((path, after))
-            old = _text(before.get("labels", {}))
-            output.text(f"{path}: {old} becomes {_text(after.get('labels', {}))}")
     if not differing:
         output.text("every recording has these labels already")
         return 0
+    former = {path: recording.labels for path, recording in chosen}
+    for path, after in differing:
+        old = _text(former[path])
+        output.text(f"{path}: {old} becomes {_text(after.get('labels', {}))}")
     if not (arguments.yes or _agreed(output, len(differing))):
         output.text("nothing is changed")
         return 1
     change_all(differing)
-    _print(output, [(path, load(path)) for path in paths])
+    _print(output, [(path, load(path)) for path, _ in chosen])
     return 0
 
 
@@ -169,25 +185,45 @@ def undo(data: Sequence[str], output: Output) -> int:
     )
     brought = []
     for folder in folders:
-        for path in sorted((folder / DELETED).glob("*.npz")):
-            path.rename(folder / path.name)
-            brought.append(folder / path.name)
-        file = folder / UNDO
-        entries = parse_json(read_text(file), str(file)) if file.is_file() else []
-        for name, labels in entries if isinstance(entries, list) else []:
-            path = Path(name)
-            if path.is_file():
-                recording = load(path)
-                meta = {**recording.meta, "labels": labels}
-                save(path, replace(recording, meta=meta))
-                brought.append(path)
-        file.unlink(missing_ok=True)
+        brought += _brought_back(folder)
+        brought += _labelled_back(folder / UNDO)
     if not brought:
         where = ", ".join(map(str, folders))
         raise InputError(f"{where}: there is no change to take back")
     for path in brought:
         output.text(f"{path}: is as it was before")
     return 0
+
+
+def _brought_back(folder: Path) -> list[Path]:
+    """Bring the deleted recordings of a folder back.
+
+    Raises:
+        InputError: another one has the name of one of them by now.
+    """
+    deleted = sorted((folder / DELETED).glob("*.npz"))
+    places = [folder / path.name for path in deleted]
+    for place in places:
+        if place.exists():
+            raise InputError(f"{place}: exists again; rename it, and undo then")
+    for path, place in zip(deleted, places, strict=True):
+        path.rename(place)
+    return places
+
+
+def _labelled_back(file: Path) -> list[Path]:
+    """Give recordings the labels that a file of former ones holds, and remove it."""
+    entries = parse_json(read_text(file), str(file)) if file.is_file() else []
+    brought = []
+    for name, labels in entries if isinstance(entries, list) else []:
+        path = Path(name)
+        if path.is_file():
+            recording = load(path)
+            meta = {**recording.meta, "labels": labels}
+            save(path, replace(recording, meta=meta))
+            brought.append(path)
+    file.unlink(missing_ok=True)
+    return brought
 
 
 def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:

@@ -1,5 +1,6 @@
 """Labels of recordings, listed and changed."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -206,6 +207,19 @@ def test_deleted_recordings_can_be_brought_back(kept, edge):
     assert len(find([str(kept)])) == 3
     edge("label", kept, "--undo")
     assert (kept / "wrong.npz").read_bytes() == before
+
+
+def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge):
+    edge("label", kept, "--only", "wrong", "--delete", "--yes")
+    shutil.copy(kept / "sure.npz", kept / "wrong.npz")
+    newer = (kept / "wrong.npz").read_bytes()
+    status, _, err = edge("label", kept, "--undo")
+    assert status == 2
+    assert "wrong.npz: exists again; rename it, and undo then" in err
+    assert (kept / "wrong.npz").read_bytes() == newer
+    (kept / "wrong.npz").rename(kept / "newer.npz")
+    assert edge("label", kept, "--undo")[0] == 0
+    assert len(find([str(kept)])) == 5
 
 
 def test_nothing_is_deleted_without_a_word(kept, edge):
