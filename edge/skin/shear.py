@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.chips.chip import UNUSED
 from edge.chips.three_axes import ZERO, axes
 from edge.skin.baseline import Baseline, dead_band_of
 from edge.skin.file import SkinFile, TaxelCalibration
@@ -31,7 +32,11 @@ class ShearReader:
 
     def __init__(self, file: SkinFile, rows: Sequence[NDArray[np.uint8]]) -> None:
         """Take the chips' buffers, in the file's order."""
-        self._chips = list(zip(file.chips, rows, strict=True))
+        self._chips = []
+        for chip, data in zip(file.chips, rows, strict=True):
+            taxels = np.array(chip.taxels)
+            stages = np.flatnonzero(taxels != UNUSED)
+            self._chips.append((data, len(taxels), stages, taxels[stages]))
         self._shape = file.layout.shape
         self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
         noise = None
@@ -52,11 +57,8 @@ class ShearReader:
             valid: (taxels,) which values of this frame are valid.
             settled: whether the baseline follows drift in this frame.
         """
-        for chip, data in self._chips:
-            parsed = axes(data[None], len(chip.taxels))[0, :, 1:]
-            for stage, taxel in enumerate(chip.taxels):
-                if taxel >= 0:
-                    self.raw[taxel] = parsed[stage]
+        for data, count, stages, taxels in self._chips:
+            self.raw[taxels] = axes(data[None], count)[0, stages, 1:]
         flat = self.raw.ravel()
         both = np.repeat(valid, 2)
         counts = self._baseline.away(flat) * both

@@ -20,7 +20,7 @@ from edge.commands.options import task_label
 from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
-from edge.files import read_text, refusing, write_whole
+from edge.files import parsing, read_text, refusing, write_whole
 from edge.recording import Recording, load
 from edge.saving import find, save
 from edge.tools import review
@@ -178,13 +178,13 @@ def undo(data: Sequence[str], output: Output) -> int:
     """Take the last change of labels, or the last deletion, in some folders back.
 
     Raises:
-        InputError: there is nothing to take back.
+        InputError: there is nothing to take back, or no such folder.
     """
-    folders = sorted(
-        {path if path.is_dir() else path.parent for path in map(Path, data)}
-    )
+    folders = sorted({Path(name) for name in data})
     brought = []
     for folder in folders:
+        if not folder.is_dir():
+            raise InputError(f"{folder}: --undo takes the folder of the recordings")
         brought += _brought_back(folder)
         brought += _labelled_back(folder / UNDO)
     if not brought:
@@ -213,17 +213,29 @@ def _brought_back(folder: Path) -> list[Path]:
 
 def _labelled_back(file: Path) -> list[Path]:
     """Give recordings the labels that a file of former ones holds, and remove it."""
-    entries = parse_json(read_text(file), str(file)) if file.is_file() else []
-    brought = []
-    for name, labels in entries if isinstance(entries, list) else []:
-        path = Path(name)
-        if path.is_file():
-            recording = load(path)
-            meta = {**recording.meta, "labels": labels}
-            save(path, replace(recording, meta=meta))
-            brought.append(path)
+    brought = _relabelled(file) if file.is_file() else []
     file.unlink(missing_ok=True)
     return brought
+
+
+def _relabelled(journal: Path) -> list[Path]:
+    """Give recordings the labels that a journal names; those that changed.
+
+    Raises:
+        InputError: the journal is damaged, or a recording cannot be written.
+    """
+    entries = parse_json(read_text(journal), str(journal))
+    with parsing(str(journal), "a list of files and labels", "; delete it"):
+        wanted = [(Path(name), dict(labels)) for name, labels in entries]
+    relabelled = []
+    for path, labels in wanted:
+        if path.is_file():
+            recording = load(path)
+            if recording.labels != labels:
+                meta = {**recording.meta, "labels": labels}
+                save(path, replace(recording, meta=meta))
+                relabelled.append(path)
+    return relabelled
 
 
 def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
@@ -235,9 +247,11 @@ def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
     entries = [[str(path.absolute()), meta["labels"]] for path, meta in metas]
     with write_whole(journal) as file:
         file.write(json.dumps(entries).encode())
-    former = [[str(path.absolute()), load(path).labels] for path, _ in metas]
+    former = []
     for path, meta in metas:
-        save(path, replace(load(path), meta=dict(meta)))
+        recording = load(path)
+        former.append([str(path.absolute()), recording.labels])
+        save(path, replace(recording, meta=dict(meta)))
     with write_whole(journal.with_name(UNDO)) as file:
         file.write(json.dumps(former).encode())
     shutil.rmtree(journal.with_name(DELETED), ignore_errors=True)
@@ -249,16 +263,7 @@ def finish_interrupted(folder: Path) -> None:
     journal = folder / JOURNAL
     if not journal.is_file():
         return
-    finished = 0
-    entries = parse_json(read_text(journal), str(journal))
-    for name, labels in entries if isinstance(entries, list) else []:
-        path = Path(name)
-        if path.is_file():
-            recording = load(path)
-            if recording.labels != labels:
-                meta = {**recording.meta, "labels": labels}
-                save(path, replace(recording, meta=meta))
-                finished += 1
+    finished = len(_relabelled(journal))
     journal.unlink()
     LOG.warning(
         f"{folder}: finished a change of labels that was interrupted: "

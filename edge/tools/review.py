@@ -41,11 +41,24 @@ def decisions(meta: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     decided = meta.get("decided")
     if not isinstance(decided, Mapping):
         return {}
-    return {
-        str(task): {"confidence": None, "flags": [], **answer}
-        for task, answer in decided.items()
-        if isinstance(answer, Mapping) and "label" in answer
-    }
+    out = {}
+    for task, answer in decided.items():
+        if isinstance(answer, Mapping) and "label" in answer:
+            full = {"confidence": None, "flags": [], **answer}
+            if _is_decision(full):
+                out[str(task)] = full
+    return out
+
+
+def _is_decision(answer: Mapping[str, Any]) -> bool:
+    """Whether the label, the confidence and the flags are of their types."""
+    flags = answer["flags"]
+    return (
+        isinstance(answer["label"], str | None)
+        and isinstance(answer["confidence"], float | int | None)
+        and isinstance(flags, list)
+        and all(isinstance(flag, str) for flag in flags)
+    )
 
 
 def kinds(meta: Mapping[str, Any]) -> list[str]:

@@ -78,6 +78,23 @@ class Axes:
         """1, or -1 for an axis that is turned round."""
         return -1.0 if letter in self.flipped else 1.0
 
+    def split(
+        self, values: NDArray[np.float64], where: object
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Normal values (n, ...) and shear (n, ..., 2) of values (n, ..., 3) of x, y
+        and z.
+
+        Raises:
+            InputError: the values of a taxel are not three.
+        """
+        if values.shape[-1] != 3:
+            raise InputError(
+                f"{where}: --axes needs values of x, y and z, not {values.shape[1:]}"
+            )
+        turned = values * [self.sign(letter) for letter in LETTERS]
+        places = [LETTERS.index(letter) for letter in (self.along, self.around)]
+        return turned[..., LETTERS.index(self.normal)], turned[..., places]
+
     @property
     def text(self) -> str:
         """What was taken, in words."""
@@ -201,9 +218,7 @@ def shear_of(
                 ]
             )
         )
-    values = np.stack(pairs, axis=1)
-    values[~np.isfinite(values)] = 0.0
-    return values
+    return np.stack(pairs, axis=1)
 
 
 def counts_of(

@@ -1,14 +1,16 @@
 """Values of any sensor as counts: what they are at rest, and their scale."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.commands.options import within
 from edge.errors import InputError
+from edge.recording import Recording
 from train.importers.axes import axis_letters, counts_of, flipped_letters
 
 START = 3
@@ -18,7 +20,6 @@ DECIMALS = 6
 """Most decimals that signed values keep."""
 PART = 1 << 16
 """Frames that are converted at a time."""
-LARGEST_SHAPE = 4096
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -67,26 +68,20 @@ class Values:
 
     Attributes:
         normal: (n, taxels); NaN where one is missing.
-        shear: (n, taxels, 2) of the other two axes, or None.
+        shear: (n, taxels, 2) of the other two axes, or None; a taxel without one of
+            them is missing.
     """
 
     normal: NDArray[np.float64]
     shear: NDArray[np.float64] | None = None
 
-
-@dataclass(frozen=True)
-class Counted:
-    """The counts of a trial.
-
-    Attributes:
-        frames: (n, taxels) whole counts.
-        valid: (n, taxels) which are known, or None where all are.
-        shear: (n, taxels, 2) whole counts, or None.
-    """
-
-    frames: NDArray[np.uint16]
-    valid: NDArray[np.bool_] | None
-    shear: NDArray[np.int16] | None
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """(n, taxels) which values are missing."""
+        missing = ~np.isfinite(self.normal)
+        if self.shear is not None:
+            missing |= ~np.isfinite(self.shear).all(axis=2)
+        return missing
 
 
 @dataclass(frozen=True)
@@ -114,30 +109,63 @@ class Rest:
             deviations = np.maximum(self.sign * deviations, 0.0)
         return np.abs(deviations) * self.scale
 
-    def counted(self, path: object, values: Values) -> Counted:
-        """The whole counts of a trial.
+    def recording(
+        self,
+        where: object,
+        t: NDArray[np.float64],
+        values: Values,
+        shape: tuple[int, ...],
+        meta: Mapping[str, Any],
+        joints: NDArray[np.float64] | None,
+    ) -> Recording:
+        """The recording of a trial in whole counts, from the time 0.
+
+        Args:
+            where: names the file in errors.
+            t: (n,) seconds.
+            values: of its taxels.
+            shape: rows and columns.
+            meta: what else it says; its `skin` gets the shape.
+            joints: (n, dof) radians, or None.
 
         Raises:
-            InputError: they are none, or too large.
+            InputError: the values are no counts, or too large.
         """
+        valid = ~values.missing
+        if self.values is not None:
+            valid &= np.isfinite(self.values)
+        frames = self._frames(where, values.normal, valid)
+        skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
+        shear = None
+        if values.shear is not None:
+            unloaded = np.float64(0.0) if self.shear is None else self.shear
+            known = np.where(valid[:, :, None], values.shear - unloaded, 0.0)
+            shear = counts_of(where, known, self.scale).reshape(-1, *shape, 2)
+            skin["axes"] = 3
+        return Recording(
+            t=t - t[0],
+            frames=frames.reshape(-1, *shape),
+            joints=joints,
+            valid=None if valid.all() else valid.reshape(-1, *shape),
+            meta={**meta, "skin": skin, **self.meta},
+            shear=shear,
+        )
+
+    def _frames(
+        self, where: object, normal: NDArray[np.float64], valid: NDArray[np.bool_]
+    ) -> NDArray[np.uint16]:
+        """(n, taxels) whole counts; 0 of those that are not valid."""
         exact = self.scale == 1.0 and self.values is None
-        normal = values.normal
         frames = np.empty(normal.shape, dtype=np.uint16)
-        valid = np.empty(normal.shape, dtype=np.bool_)
         # A part at a time, as a long recording would else fill the memory several
         # times.
         for begin in range(0, len(frames), PART):
             rows = slice(begin, begin + PART)
             counts = self.counts(normal[rows])
-            valid[rows] = np.isfinite(counts)
             counts = np.where(valid[rows], counts, 0.0)
-            _check_counts(path, counts, exact)
+            _check_counts(where, counts, exact)
             frames[rows] = np.rint(counts)
-        shear = None
-        if values.shear is not None:
-            unloaded = np.float64(0.0) if self.shear is None else self.shear
-            shear = counts_of(path, values.shear - unloaded, self.scale)
-        return Counted(frames, None if valid.all() else valid, shear)
+        return frames
 
     @property
     def meta(self) -> dict[str, object]:

@@ -41,7 +41,7 @@ from train.importers.columns import (
     meaning,
     times_of,
 )
-from train.importers.counts import Rest, Values, asked_shape, rest_of
+from train.importers.counts import Values, asked_shape, rest_of
 from train.importers.reading import (
     PACKED,
     TEXTS,
@@ -170,12 +170,19 @@ def trials(
     imported = 0
     for trial in measured:
         try:
-            recording = _recording(trial, rest, shape, skin)
+            recording = rest.recording(
+                trial.source.table.path,
+                trial.t,
+                trial.values,
+                shape,
+                {"skin": skin.raw, "trial": trial.source.name},
+                trial.joints,
+            )
         except InputError as error:
             _skip(options, error)
             continue
         imported += 1
-        missing += int(np.isnan(trial.values.normal).sum())
+        missing += int(trial.values.missing.sum())
         labels = trial.source.labels
         if beside is not None:
             labels = {
@@ -534,30 +541,6 @@ def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
         return wishes
     taxels = ",".join(fitting[0])
     return Wishes(wishes.time, taxels, wishes.joints, wishes.unit, wishes.rate)
-
-
-def _recording(
-    trial: Measured,
-    rest: Rest,
-    shape: tuple[int, ...],
-    skin: ConfigTable,
-) -> Recording:
-    """The recording of a trial, without labels."""
-    counted = rest.counted(trial.source.table.path, trial.values)
-    skin_meta = {**skin.raw, "rows": shape[0], "cols": shape[1]}
-    shear = None
-    if counted.shear is not None:
-        shear = counted.shear.reshape(-1, *shape, 2)
-        skin_meta["axes"] = 3
-    valid = counted.valid
-    return Recording(
-        t=trial.t - trial.t[0],
-        frames=counted.frames.reshape(-1, *shape),
-        joints=trial.joints,
-        valid=None if valid is None else valid.reshape(-1, *shape),
-        meta={"skin": skin_meta, "trial": trial.source.name, **rest.meta},
-        shear=shear,
-    )
 
 
 def _shape(text: str | None, first: Measured, skin: ConfigTable) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers import clock, counts
 from train.importers.axes import Axes
-from train.importers.counts import Rest, Values, asked_shape, rest_of
+from train.importers.counts import Values, asked_shape, rest_of
 from train.importers.reading import read_parquet
 from train.progress import say
 
@@ -88,17 +88,18 @@ def trials(
         f"{shape[0]} x {shape[1]}), label: the episode's task"
     )
     for episode in episodes:
-        meta: dict[str, Any] = {"source": path.name}
+        meta: dict[str, Any] = {"source": path.name, "trial": episode.number}
         if episode.label:
             meta["labels"] = {options.task: episode.label}
         if episode.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
             if names is not None:
                 meta["joint_names"] = names
-        yield (
-            f"episode_{episode.number:06}",
-            _recording(path, episode, rest, shape, meta),
+        where = f"{path}: episode {episode.number}"
+        recording = rest.recording(
+            where, episode.t, episode.values, shape, meta, episode.joints
         )
+        yield f"episode_{episode.number:06}", recording
 
 
 def check_alike(path: Path, episodes: Sequence[Episode]) -> None:
@@ -173,14 +174,8 @@ def _episode(
         joints = stacked(where, rows[options.joints])[kept].reshape(len(kept), -1)
     shear = None
     if axes is not None:
-        if frames.shape[-1] != 3:
-            raise InputError(f"{where}: --axes needs values of x, y and z a taxel")
-        parts = [
-            axes.sign(letter) * frames[..., "xyz".index(letter)]
-            for letter in (axes.along, axes.around)
-        ]
-        shear = np.stack(parts, axis=-1).reshape(len(kept), -1, 2)
-        frames = axes.sign(axes.normal) * frames[..., "xyz".index(axes.normal)]
+        frames, both = axes.split(frames, where)
+        shear = both.reshape(len(kept), -1, 2)
     label = ""
     if "task_index" in rows.columns:
         label = tasks.get(int(rows["task_index"].iloc[0]), "")
@@ -246,28 +241,3 @@ def _shape(
             "--shape"
         )
     return rows, cols
-
-
-def _recording(
-    path: Path,
-    episode: Episode,
-    rest: Rest,
-    shape: tuple[int, int],
-    meta: dict[str, Any],
-) -> Recording:
-    """The recording of an episode."""
-    counted = rest.counted(f"{path}: episode {episode.number}", episode.values)
-    skin: dict[str, Any] = {"rows": shape[0], "cols": shape[1]}
-    shear = counted.shear
-    if shear is not None:
-        skin["axes"] = 3
-        shear = shear.reshape(-1, *shape, 2)
-    valid = counted.valid
-    return Recording(
-        t=episode.t - episode.t[0],
-        frames=counted.frames.reshape(-1, *shape),
-        joints=episode.joints,
-        valid=None if valid is None else valid.reshape(-1, *shape),
-        meta={**meta, "skin": skin, "trial": episode.number, **rest.meta},
-        shear=shear,
-    )

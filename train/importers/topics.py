@@ -304,33 +304,14 @@ class Log:
         """The recording of values (n, ...) as counts."""
         shear = None
         if self.axes is not None:
-            if values.shape[-1] != 3:
-                raise InputError(
-                    f"{self.path}: --axes needs values of x, y and z, not {values.shape[1:]}"
-                )
-            letters = (self.axes.along, self.axes.around)
-            parts = [self.axes.sign(a) * values[..., "xyz".index(a)] for a in letters]
-            shear = np.stack(parts, axis=-1).reshape(len(t), -1, 2)
-            normal = self.axes.normal
-            values = self.axes.sign(normal) * values[..., "xyz".index(normal)]
+            values, both = self.axes.split(values, self.path)
+            shear = both.reshape(len(t), -1, 2)
             say(self.axes.text)
         shape = self._shape(values.shape[1:])
         flat = Values(values.reshape(len(t), -1), shear)
         rest = rest_of([flat], self.options)
-        counted = rest.counted(self.path, flat)
-        skin = {**self.beside.table("skin", {}).raw, "rows": shape[0], "cols": shape[1]}
-        if shear is not None:
-            skin["axes"] = 3
-        valid = counted.valid
-        tangential = counted.shear
-        return Recording(
-            t=t - t[0],
-            frames=counted.frames.reshape(-1, *shape),
-            joints=angles,
-            valid=None if valid is None else valid.reshape(-1, *shape),
-            meta={**meta, "skin": skin, **rest.meta},
-            shear=None if tangential is None else tangential.reshape(-1, *shape, 2),
-        )
+        skin = self.beside.table("skin", {}).raw
+        return rest.recording(self.path, t, flat, shape, {**meta, "skin": skin}, angles)
 
     def _shape(self, told: tuple[int, ...]) -> tuple[int, int]:
         """The rows and columns of frames whose messages tell a shape.

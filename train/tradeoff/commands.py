@@ -28,23 +28,15 @@ class Commands:
         """The command that exports a model of these recordings."""
         words = ("--quick", *options) if self.quick else options
         if not self._by_make:
-            data = shlex.join(self.data)
-            line = (
-                f"python -m export --data {data} --out {shlex.quote(str(self._models))}"
-            )
-            return " ".join([line, *words])
+            return " ".join([self._export, *words])
         line = f"make export{self._facts}"
         return f"{line} EXPORT='{' '.join(words)}'" if words else line
 
     def front(self, wanted: str) -> str:
         """The command that exports a measured model."""
         if not self._by_make:
-            data = shlex.join(self.data)
             file = shlex.quote(str(self.out / "front.json"))
-            line = (
-                f"python -m export --data {data} --out {shlex.quote(str(self._models))}"
-            )
-            return f"{line} --front {wanted} --fronts {file}"
+            return f"{self._export} --front {wanted} --fronts {file}"
         return f"make export{self._facts} FRONT={wanted}"
 
     def tradeoff(self, options: str) -> str:
@@ -62,9 +54,15 @@ class Commands:
         return self.out.parent if self.out.name == "tradeoff" else self.out
 
     @property
+    def _export(self) -> str:
+        """The program that exports, with its data and folder."""
+        data = shlex.join(self.data)
+        return f"python -m export --data {data} --out {shlex.quote(str(self._models))}"
+
+    @property
     def _by_make(self) -> bool:
         """Whether make can say it: it takes no name that a shell must have quoted."""
-        names = [*self.data, str(self.out)]
+        names = [*self.data, str(self.out), self.scene or "-"]
         plain = all(shlex.quote(name) == name for name in names)
         return self.out.name == "tradeoff" and plain
 

@@ -233,3 +233,24 @@ def test_that_no_touch_is_of_a_kind_is_said(kept, edge):
     status, _, err = edge("label", kept / "sure.npz", "--only", "wrong")
     assert status == 1
     assert "none of 1 recording is of this kind" in err
+
+
+@pytest.mark.parametrize(
+    "name", [".edge-classify-undo.json", ".edge-classify-labels.json"]
+)
+@pytest.mark.parametrize("text", ["[1]", '[["a.npz", 5]]', "{}x", "7"])
+def test_a_damaged_journal_is_one_sentence(kept, edge, name, text):
+    (kept / name).write_text(text)
+    undo = ("--undo",) if "undo" in name else ()
+    status, _, err = edge("label", kept, *undo)
+    assert status == 2
+    assert name in err
+    assert err.count("\n") == 1
+
+
+def test_undo_of_a_folder_that_is_not_there_changes_nothing_beside_it(kept, edge):
+    edge("label", kept, "--accept", "--yes")
+    status, _, err = edge("label", kept / "mistyped", "--undo")
+    assert status == 2
+    assert "mistyped: --undo takes the folder of the recordings" in err
+    assert load(kept / "sure.npz").labels

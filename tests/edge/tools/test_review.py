@@ -67,3 +67,20 @@ def test_a_course_is_in_percent_of_its_highest_and_misses_no_peak(make_touch):
     assert max(course) == 100
     assert course[-1] == 25
     assert review.curve(replace(touch, frames=0 * frames), 10) == [0] * 10
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"label": "box", "confidence": "high"},
+        {"label": "box", "flags": 5},
+        {"label": "box", "flags": [1]},
+        {"label": ["box"]},
+        {"confidence": 0.9},
+        "box",
+    ],
+)
+def test_what_is_no_decision_is_left_out(answer):
+    meta = {"decided": {"object": answer}}
+    assert review.decisions(meta) == {}
+    assert review.kinds(meta) == ["unlabelled"]

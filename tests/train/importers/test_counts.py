@@ -18,11 +18,21 @@ def trial(*rows, shear=None) -> Values:
     return Values(np.array(rows, dtype=float), shear)
 
 
+def recorded(rest, values, where="a"):
+    """A recording of one row of taxels, a frame each 10 ms."""
+    n, taxels = values.normal.shape
+    return rest.recording(
+        where, 5.0 + 0.01 * np.arange(n), values, (1, taxels), {}, None
+    )
+
+
 def test_counts_stay_as_they_are():
-    counted = rest_of([trial([0, 5], [7, 9])], options()).counted("a", trial([0, 5]))
-    assert counted.frames.tolist() == [[0, 5]]
+    counted = recorded(rest_of([trial([0, 5], [7, 9])], options()), trial([0, 5]))
+    assert counted.frames.tolist() == [[[0, 5]]]
     assert counted.valid is None
     assert counted.shear is None
+    assert counted.t.tolist() == [0.0]
+    assert counted.meta == {"skin": {"rows": 1, "cols": 2}}
 
 
 def test_values_that_fall_are_subtracted_from_the_quietest_start():
@@ -30,30 +40,48 @@ def test_values_that_fall_are_subtracted_from_the_quietest_start():
     touched = trial([50, 90], [50, 90], [50, 90], [40, 90])
     rest = rest_of([touched, first], options(falls=True))
     assert rest.values.tolist() == [100, 90]
-    assert rest.counted("a", first).frames[3].tolist() == [40, 0]
+    assert recorded(rest, first).frames[3].tolist() == [[40, 0]]
 
 
 def test_signed_values_count_their_distance_with_all_their_digits():
     values = trial([0.5, -1.0], [0.5, -1.0], [0.5, -1.0], [0.25, -1.5])
     rest = rest_of([values], options(signed=True))
     assert rest.scale == 100.0
-    assert rest.counted("a", values).frames[3].tolist() == [25, 50]
+    assert recorded(rest, values).frames[3].tolist() == [[25, 50]]
     assert rest.meta == {"values": {"counts_per_unit": 100.0, "rest": [0.5, -1.0]}}
 
 
 def test_shear_loses_its_rest_where_the_normal_does():
     shear = np.array([[[3.0, -4.0]]] * 3 + [[[5.0, -10.0]]])
     values = trial([1], [1], [1], [2], shear=shear)
-    signed = rest_of([values], options(signed=True)).counted("a", values)
-    assert signed.shear[3].tolist() == [[2, -6]]
-    plain = rest_of([values], options()).counted("a", values)
-    assert plain.shear[3].tolist() == [[5, -10]]
+    signed = recorded(rest_of([values], options(signed=True)), values)
+    assert signed.shear[3].tolist() == [[[2, -6]]]
+    assert signed.meta["skin"]["axes"] == 3
+    plain = recorded(rest_of([values], options()), values)
+    assert plain.shear[3].tolist() == [[[5, -10]]]
 
 
 def test_a_missing_value_is_not_valid():
-    counted = Rest(None, 1, 1.0).counted("a", trial([1, np.nan]))
-    assert counted.valid.tolist() == [[True, False]]
-    assert counted.frames.tolist() == [[1, 0]]
+    counted = recorded(Rest(None, 1, 1.0), trial([1, np.nan]))
+    assert counted.valid.tolist() == [[[True, False]]]
+    assert counted.frames.tolist() == [[[1, 0]]]
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
+def test_a_taxel_without_one_of_its_axes_is_not_valid(unknown):
+    shear = np.array([[[1.0, 2.0], [unknown, 4.0], [5.0, 6.0]]])
+    values = trial([7, 8, 9], shear=shear)
+    counted = recorded(Rest(None, 1, 1.0), values)
+    assert counted.valid.tolist() == [[[True, False, True]]]
+    assert counted.frames.tolist() == [[[7, 0, 9]]]
+    assert counted.shear.tolist() == [[[[1, 2], [0, 0], [5, 6]]]]
+
+
+def test_a_taxel_without_a_value_at_rest_is_never_valid():
+    rest = Rest(np.array([1.0, np.nan]), 1, 1.0)
+    counted = recorded(rest, trial([3, 4], [5, 6]))
+    assert counted.valid.tolist() == [[[True, False]], [[True, False]]]
+    assert counted.frames.tolist() == [[[2, 0]], [[4, 0]]]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +90,7 @@ def test_a_missing_value_is_not_valid():
 )
 def test_what_is_no_count_is_refused(values, hint):
     with pytest.raises(InputError, match=rf"a.csv: .* are no counts .*; {hint}"):
-        Rest(None, 1, 1.0).counted("a.csv", trial(values))
+        recorded(Rest(None, 1, 1.0), trial(values), "a.csv")
 
 
 def test_values_cannot_fall_and_be_signed():

@@ -38,6 +38,10 @@ BUILD = Path("build/tradeoff")
             "python -m export --data 'my touches' --out build --window 1",
         ),
         (
+            Commands(("build/b c",), BUILD, "b c.toml"),
+            "python -m export --data 'build/b c' --out build --window 1",
+        ),
+        (
             Commands(("mine",), Path("elsewhere")),
             "python -m export --data mine --out elsewhere --window 1",
         ),
