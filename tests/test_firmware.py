@@ -192,7 +192,7 @@ def test_the_sketch_agrees_with_the_example_skin():
 def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
     """Checked against the declarations of Arduino's core, without a board's compiler."""
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
-    subprocess.run(
+    compiled = subprocess.run(
         [
             "g++",
             "-std=c++11",
@@ -205,5 +205,8 @@ def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
             "-xc++",
             str(MATRIX / "matrix.ino"),
         ],
-        check=True,
+        capture_output=True,
+        text=True,
+        check=False,
     )
+    assert compiled.returncode == 0, compiled.stderr
