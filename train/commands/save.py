@@ -10,9 +10,10 @@ taxels in `frames`.
 import argparse
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -49,9 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
     if len(set(names)) < len(names):
         names = [str(path.with_suffix("")) for path in paths]
     write = write_parquet if arguments.form == "parquet" else write_hdf5
-    write(out, names, recordings)
-    frames = sum(len(recording.t) for recording in recordings)
-    print(f"{out}: {frames} frames of {len(recordings)} recordings")
+    long = Long.of(names, recordings)
+    write(out, long)
+    print(f"{out}: {len(long.t)} frames of {len(recordings)} recordings")
     return 0
 
 
@@ -83,12 +84,6 @@ def tasks_of(recordings: Sequence[Recording]) -> list[str]:
     return sorted(tasks)
 
 
-def by_frame(recordings: Sequence[Recording], values: Sequence[Any]) -> NDArray[Any]:
-    """A value of each recording, repeated for each of its frames."""
-    lengths = [len(recording.t) for recording in recordings]
-    return np.repeat(np.array(values), lengths)
-
-
 def valid_of(recording: Recording) -> NDArray[np.bool_]:
     """(n, rows, cols) which taxels could be read."""
     valid = np.True_ if recording.valid is None else recording.valid
@@ -101,42 +96,80 @@ def joint_columns(recording: Recording) -> list[str]:
     return [f"joint_{name}" for name in names]
 
 
-def write_parquet(
-    out: Path, names: Sequence[str], recordings: Sequence[Recording]
-) -> None:
+@dataclass(frozen=True)
+class Long:
+    """All frames of some recordings, one after another.
+
+    Attributes:
+        trial: (n,) name of each frame's recording.
+        labels: {task: (n,) labels; None where a recording has none}.
+        t: (n,) seconds.
+        frames, valid, shear, joints: as those of `Recording`; None where they are.
+        joint_columns: a name for each joint.
+    """
+
+    trial: NDArray[Any]
+    labels: Mapping[str, NDArray[Any]]
+    t: NDArray[np.float64]
+    frames: NDArray[np.uint16]
+    valid: NDArray[np.bool_]
+    shear: NDArray[np.int16] | None
+    joints: NDArray[np.float64] | None
+    joint_columns: list[str]
+
+    @classmethod
+    def of(cls, names: Sequence[str], recordings: Sequence[Recording]) -> Self:
+        """The frames of recordings that fit together."""
+        lengths = [len(recording.t) for recording in recordings]
+        labels = {}
+        for task in tasks_of(recordings):
+            texts = [recording.labels.get(task) for recording in recordings]
+            labels[task] = np.repeat(np.array(texts, dtype=object), lengths)
+        shear = [r.shear for r in recordings if r.shear is not None]
+        joints = [r.joints for r in recordings if r.joints is not None]
+        return cls(
+            trial=np.repeat(np.array(names, dtype=object), lengths),
+            labels=labels,
+            t=np.concatenate([recording.t for recording in recordings]),
+            frames=np.concatenate([recording.frames for recording in recordings]),
+            valid=np.concatenate([valid_of(recording) for recording in recordings]),
+            shear=np.concatenate(shear) if shear else None,
+            joints=np.concatenate(joints) if joints else None,
+            joint_columns=joint_columns(recordings[0]),
+        )
+
+    def taxel_columns(self) -> dict[str, Any]:
+        """A column for each taxel, and for each axis of its shear."""
+        columns: dict[str, Any] = {}
+        places = list(np.ndindex(self.frames.shape[1:]))
+        for row, col in places:
+            counts = pd.array(self.frames[:, row, col], dtype="UInt16")
+            counts[~self.valid[:, row, col]] = pd.NA
+            columns[f"taxel_{row}_{col}"] = counts
+        if self.shear is not None:
+            for row, col in places:
+                along, around = self.shear[:, row, col].T
+                columns[f"taxel_{row}_{col}_along"] = along
+                columns[f"taxel_{row}_{col}_around"] = around
+        return columns
+
+
+def write_parquet(out: Path, long: Long) -> None:
     """Write one table, a column for each taxel.
 
     Raises:
-        InputError: its writer is not installed, or the file cannot be written.
+        InputError: its writer is not installed, a task is called like another column,
+            or the file cannot be written.
     """
-    first = recordings[0]
-    columns: dict[str, Any] = {"trial": by_frame(recordings, names)}
-    for task in tasks_of(recordings):
+    for task in long.labels:
         if COLUMN.fullmatch(task):
             raise InputError(
                 f"{out}: the task {task!r} has the name of another column; save as hdf5"
             )
-        labels = [recording.labels.get(task) for recording in recordings]
-        columns[task] = by_frame(recordings, labels)
-    columns["t_s"] = np.concatenate([recording.t for recording in recordings])
-    frames = np.concatenate([recording.frames for recording in recordings])
-    valid = np.concatenate([valid_of(recording) for recording in recordings])
-    for row in range(frames.shape[1]):
-        for col in range(frames.shape[2]):
-            counts = pd.array(frames[:, row, col], dtype="UInt16")
-            counts[~valid[:, row, col]] = pd.NA
-            columns[f"taxel_{row}_{col}"] = counts
-    if first.shear is not None:
-        shear = np.concatenate([r.shear for r in recordings if r.shear is not None])
-        for row in range(frames.shape[1]):
-            for col in range(frames.shape[2]):
-                for axis, name in enumerate(("along", "around")):
-                    key = f"taxel_{row}_{col}_{name}"
-                    columns[key] = shear[:, row, col, axis]
-    if first.joints is not None:
-        joints = np.concatenate([r.joints for r in recordings if r.joints is not None])
-        for place, name in enumerate(joint_columns(first)):
-            columns[name] = joints[:, place]
+    columns = {"trial": long.trial, **long.labels, "t_s": long.t}
+    columns |= long.taxel_columns()
+    if long.joints is not None:
+        columns |= dict(zip(long.joint_columns, long.joints.T, strict=True))
     table = pd.DataFrame(columns)
     with write_whole(out) as file:
         try:
@@ -147,9 +180,7 @@ def write_parquet(
             ) from None
 
 
-def write_hdf5(
-    out: Path, names: Sequence[str], recordings: Sequence[Recording]
-) -> None:
+def write_hdf5(out: Path, long: Long) -> None:
     """Write one array for each quantity, a row for each frame.
 
     Raises:
@@ -162,30 +193,19 @@ def write_hdf5(
             f"{out}: writing HDF5 needs h5py; `pip install h5py`"
         ) from None
     text = h5py.string_dtype()
-    first = recordings[0]
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as target:
-        trial = by_frame(recordings, names).astype(object)
-        target.create_dataset("trial", data=trial, dtype=text)
-        for task in tasks_of(recordings):
-            labels = [recording.labels.get(task, "") for recording in recordings]
-            data = by_frame(recordings, labels).astype(object)
-            target.create_dataset(f"labels/{task}", data=data, dtype=text)
-        target["t"] = np.concatenate([recording.t for recording in recordings])
-        target["frames"] = np.concatenate(
-            [recording.frames for recording in recordings]
-        )
-        target["valid"] = np.concatenate(
-            [valid_of(recording) for recording in recordings]
-        )
-        if first.shear is not None:
-            target["shear"] = np.concatenate(
-                [r.shear for r in recordings if r.shear is not None]
-            )
-        if first.joints is not None:
-            target["joints"] = np.concatenate(
-                [r.joints for r in recordings if r.joints is not None]
-            )
-            target["joints"].attrs["names"] = joint_columns(first)
+        target.create_dataset("trial", data=long.trial, dtype=text)
+        for task, labels in long.labels.items():
+            known = [label or "" for label in labels]
+            target.create_dataset(f"labels/{task}", data=known, dtype=text)
+        target["t"] = long.t
+        target["frames"] = long.frames
+        target["valid"] = long.valid
+        if long.shear is not None:
+            target["shear"] = long.shear
+        if long.joints is not None:
+            target["joints"] = long.joints
+            target["joints"].attrs["names"] = long.joint_columns
     with write_whole(out) as file:
         file.write(buffer.getvalue())
