@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz accuracy bench transfer matched shear shear-transfer docs faults risk \
+  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk \
   stopping soak soak-day constraints clean
 
 help:
@@ -46,9 +46,10 @@ help:
 	@echo "  make soak-day      24 hours of the same at 15 Hz"
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
-	@echo "  make hard-cases-versions   the same answers from another ONNX Runtime"
+	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes, and not from OpenVINO"
 	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
 	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
+	@echo "  make kills         kill record, label, teach, a map and export 60 times each: no damaged file"
 	@echo "Upkeep"
 	@echo "  make golden        renew the small model and outputs that the tests compare with"
 	@echo "  make demo-data     renew the model and the touches that the wheel carries"
@@ -297,21 +298,32 @@ HARD := $(OUT)/hard-cases
 
 # Includes the answers of another ONNX Runtime.
 hard-cases: hard-cases-versions
-	$(BIN)/python -m tests.hard_cases --out $(HARD)
+	$(BIN)/python -m tests.hard_cases
 
-# Writes golden files of the hard cases, then checks them with another ONNX Runtime.
-OTHER_RUNTIME ?= 1.22.1
-OTHER := $(HARD)/onnxruntime-$(OTHER_RUNTIME)
+# Writes golden files of the hard cases, then checks them with other ONNX Runtimes, and that
+# verify refuses an engine that computes in float32.
+OTHER_RUNTIMES ?= 1.22.1 1.26.0 1.32.0
+OTHERS := $(OTHER_RUNTIMES:%=$(HARD)/onnxruntime-%)
+FLOAT32 := $(HARD)/openvino-2026.4.1
+ELSEWHERE = -m pip install --quiet --disable-pip-version-check \
+  $$(grep -E '^(numpy|smbus2)==' constraints.txt)
 
-$(OTHER)/.ready: constraints.txt
-	$(PYTHON) -m venv $(OTHER)
-	$(OTHER)/bin/python -m pip install --quiet --disable-pip-version-check \
-	  $$(grep -E '^(numpy|smbus2)==' constraints.txt) onnxruntime==$(OTHER_RUNTIME)
+$(OTHERS:%=%/.ready): $(HARD)/onnxruntime-%/.ready: constraints.txt
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python $(ELSEWHERE) onnxruntime==$*
 	@touch $@
 
-hard-cases-versions: $(DEV) $(OTHER)/.ready
+$(FLOAT32)/.ready: constraints.txt
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python $(ELSEWHERE) openvino==$(lastword $(subst -, ,$(@D)))
+	@touch $@
+
+hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready) $(FLOAT32)/.ready
 	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
-	$(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $(OTHER)/bin/python
+	for other in $(OTHERS); do \
+	  $(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
+	  || exit 1; done
+	$(FLOAT32)/bin/python -m tests.hard_cases.float32 --golden $(HARD)/golden
 
 $(VENV)/.mutants: $(DEV)
 	$(PIP) --group mutants
@@ -333,6 +345,10 @@ constraints: $(VENV)/.upkeep
 # FUZZ="-k scene": only the readers whose names contain this.
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
+
+# KILLS="--count 10 --only teach": fewer of them, and of one command.
+kills: $(DEV)
+	$(BIN)/python -m tests.kills $(KILLS)
 
 clean:
 	rm -rf build dist mutants

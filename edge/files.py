@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from edge.errors import EdgeError, InputError
+from edge.leftovers import PREFIX, lock, remove_leftovers
 
 LARGEST_TEXT = 16 << 20
 """Largest text file in bytes; the calibration of a skin of a million taxels takes 12
@@ -115,6 +116,8 @@ class NameTaken(InputError):
 def check_writable(folder: str | os.PathLike[str]) -> None:
     """Make a folder if it is missing, and check that a file can be created in it.
 
+    Temporary files of dead runs are removed from it.
+
     Raises:
         InputError: the folder cannot be made or written to.
     """
@@ -123,6 +126,7 @@ def check_writable(folder: str | os.PathLike[str]) -> None:
     with refusing(f"{os.fspath(folder)}: cannot be written"):
         os.makedirs(folder, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        remove_leftovers(folder)
 
 
 def _name_free(temporary: Path, target: Path) -> None:
@@ -180,13 +184,15 @@ def write_whole(
         )
     # The target's own name may already have the greatest length that the file system
     # allows.
-    temporary = folder / f".edge-classify-{os.urandom(8).hex()}"
+    temporary = folder / f"{PREFIX}{os.urandom(8).hex()}"
     try:
         # Renamed by root, a file would take the place of /dev/null.
         if target.exists() and not target.is_file():
             raise InputError(f"{target}: cannot be written: it is not a regular file")
         folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "xb") as file:
+            with suppress(OSError):  # not every file system has locks
+                lock(file)
             yield file
             file.flush()
             if lasting:

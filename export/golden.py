@@ -18,14 +18,12 @@ TRIALS = 24
 VECTORS = 256
 """Feature vectors beyond the trials' own."""
 BOUNDS = {
-    "scores": 1e-15,
     "features": 1e-12,
     "time_s": 1e-9,
 }
-"""Scores are quotients of small integers, correctly rounded everywhere. Features are
-interpolated in a few operations, and motion passes through sines and cosines that
-differ by an ulp between C libraries: below 100 ulp of metres. The bounds leave a factor
-of 40 and more. All other outputs of the graph must be equal, to the bit."""
+"""Features are interpolated in a few operations, and motion passes through sines and
+cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
+leave a factor of 40 and more. All outputs of the graph must be equal, to the bit."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:

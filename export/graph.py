@@ -141,8 +141,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         for space in last.projections_
     }
     off = [off for _, off in projected.values()]
-    off_most = off[0] if len(off) == 1 else build.node("Max", off)
-    build.node("Squeeze", [off_most, build.ints(1)], names["out_of_range"])
+    _out_of_range(build, off, names["out_of_range"])
     if isinstance(model, SequentialClassifier):
         _novelty(build, x, model.space_, names["novelty"])
     for task, choice in model.choices.items():
@@ -187,6 +186,18 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
             )
             roots = _label_distances(build, output, all_squares, labels, classes)
             build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
+
+
+def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
+    """Nodes that say whether any space cut something off: 1, or 0.
+
+    The excess (n, 1) itself is a sum of fractions, whose last bits depend on the order
+    of summation. Whether it is above 0 does not.
+    """
+    most = excesses[0] if len(excesses) == 1 else build.node("Max", list(excesses))
+    within = build.node("LessOrEqual", [most, build.constant(0.0)])
+    answers = [within, build.constant(0.0), build.constant(1.0)]
+    build.node("Squeeze", [build.node("Where", answers), build.ints(1)], output)
 
 
 def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:

@@ -7,6 +7,7 @@ import pytest
 from edge.touch.features import WINDOW_S
 from tests.bench import tables
 from tests.conftest import ROOT
+from tests.hard_cases.registry import CASES
 from train.fitting import STEPS_S
 from train.rules import RISK, TEST_SHARE, upper_limit
 
@@ -53,12 +54,20 @@ def test_each_table_names_its_command_commit_machine_and_date(name):
     )
 
 
-def test_each_table_is_on_the_page_and_each_link_has_its_table():
-    page = (ROOT / "docs" / "measured.md").read_text()
-    linked = re.findall(r"^\[[^\]]+\]\(measured/([\w-]+)\.md\)$", page, re.M)
+def test_each_table_is_on_a_page_and_each_link_has_its_table():
+    pages = [ROOT / "docs" / name for name in ("measured.md", "hard-cases.md")]
+    text = "\n".join(page.read_text() for page in pages)
+    linked = re.findall(r"^\[[^\]]+\]\(measured/([\w-]+)\.md\)$", text, re.M)
     assert sorted(linked) == sorted(TABLES)
 
 
 def test_a_page_of_the_site_includes_its_tables():
     text = tables.markdown([{"a": 1, "b": "x"}, {"a": 2, "b": "y"}])
     assert text == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | y |"
+
+
+def test_every_hard_case_is_in_its_table():
+    rows = TABLES["hard_cases"].splitlines()[4:]
+    assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == [
+        case.key for case in CASES
+    ]

@@ -25,11 +25,14 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
+from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
 """The noise is this many frames, repeated, each of which lasts for this many
 seconds."""
+PAUSES = 2.0
+"""Times `release_s` that a looped recording pauses before it starts again."""
 Scene = Callable[[float], NDArray[np.uint16]]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
@@ -47,13 +50,18 @@ class Playback:
 
         Args:
             recording: the contact that the skin feels.
-            loop: start again at its end.
+            loop: start again after its end, and after a pause without a touch that
+                ends every contact.
         """
         self.recording, self._frames = recording, list(recording)
         self._t = recording.t - recording.t[0]
         steps = np.diff(self._t)
         last = float(np.median(steps)) if steps.size else 0.01
         self._length = float(self._t[-1]) + last
+        if loop:
+            self._frames.append(_untouched(self._frames[-1]))
+            self._t = np.append(self._t, self._length)
+            self._length += PAUSES * recording.layout.release_s
         self.ends = math.inf if loop else self._length
         """Length in seconds; infinity where it loops."""
         self.start = 0.0
@@ -78,6 +86,12 @@ class Playback:
     def at(self, t: float) -> NDArray[np.float64] | None:
         """Joint angles (dof,) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].joints
+
+
+def _untouched(frame: Frame) -> Frame:
+    """The frame without a touch."""
+    shear = None if frame.shear is None else np.zeros_like(frame.shear)
+    return replace(frame, counts=np.zeros_like(frame.counts), shear=shear)
 
 
 def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:

@@ -2,9 +2,7 @@
 
 Each operator follows its definition in ONNX's operator set 18
 (onnx.ai/onnx/operators). All that decides is made of whole numbers below 2^53, which no
-order of summation rounds, so that numpy and ONNX Runtime agree to the last bit. Where
-features are cut off, the size of the excess is a sum of fractions, and may differ in
-its last bits; whether there is an excess may not.
+order of summation rounds, so that numpy and ONNX Runtime agree to the last bit.
 """
 
 from collections.abc import Callable, Mapping, Sequence

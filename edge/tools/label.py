@@ -21,6 +21,7 @@ from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import parsing, read_text, refusing, write_whole
+from edge.leftovers import remove_leftovers
 from edge.recording import Recording, load
 from edge.saving import find, save
 from edge.tools import review
@@ -260,6 +261,7 @@ def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
 
 def finish_interrupted(folder: Path) -> None:
     """Finish a change of labels that was interrupted, where a journal tells of one."""
+    remove_leftovers(folder)
     journal = folder / JOURNAL
     if not journal.is_file():
         return

@@ -15,6 +15,7 @@ import numpy as np
 
 from edge.commands.output import LOG, Output, counted
 from edge.files import write_whole
+from edge.leftovers import remove_leftovers
 from edge.model.model import Model
 from edge.model.verify import renew
 from edge.recording import load
@@ -42,6 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the taught model and its golden file."""
     model, output = Model(arguments.model), Output.of(arguments)
+    remove_leftovers(arguments.out)
     names, vectors, labels = [], [], []
     for path in find(arguments.recordings):
         recording = load(path)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from onnxruntime import GraphOptimizationLevel
 
 import train
 from edge.classifier import Classifier
@@ -23,7 +24,6 @@ from export.api import save as save_model
 from export.graph import to_onnx
 from tests.conftest import PAPER, export, save_touches
 from tests.edge.model.test_engines import assert_same_bits, hostile
-from tests.hard_cases.everywhere import LEVELS
 from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.dataset import load_trials
@@ -205,7 +205,10 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(
     X = load_trials([folder / "data"]).features(early.info.window_s)
     expected = early.run(X)
     data = Path(early.path).read_bytes()
-    for level in (LEVELS.ORT_DISABLE_ALL, LEVELS.ORT_ENABLE_ALL):
+    for level in (
+        GraphOptimizationLevel.ORT_DISABLE_ALL,
+        GraphOptimizationLevel.ORT_ENABLE_ALL,
+    ):
         runtime = session(data, level)
         names = [output.name for output in runtime.get_outputs()]
         seen = runtime.run(names, {"features": X})

@@ -48,4 +48,4 @@ def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_fini
     assert (golden["object_distances"][: trials + 16, 0] == 0.0).all()
     assert golden["frames"].dtype == np.uint16
     bounds = json.loads(str(golden["meta"]))["bounds"]
-    assert set(bounds) == {"scores", "features", "time_s"}
+    assert set(bounds) == {"features", "time_s"}

@@ -1,6 +1,6 @@
-"""The same bits with other threads, batches, types, optimisations and engines."""
+"""The oracle's bits with other threads, batches, types, optimisations and engines."""
 
-from functools import cache
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,70 +8,74 @@ import onnxruntime
 from hypothesis import strategies as st
 from onnx.reference import ReferenceEvaluator
 
+from edge.model import onnx_file
+from edge.model.graph import Graph
 from tests.hard_cases.cases import SEEDS, Case, Ladder, seeded
-from tests.hard_cases.models import (
-    Array,
-    Ours,
-    converted,
-    features,
-    session,
-    usual_pipeline,
+from tests.hard_cases.models import Array, converted, session, usual_pipeline
+from tests.hard_cases.neighbours import near_duplicates
+from tests.hard_cases.outputs import (
+    KINDS,
+    POINTS_S,
+    Outputs,
+    Whole,
+    differing,
+    whole,
 )
-from tests.hard_cases.neighbours import MANY, near_duplicates
-from train.pipeline import Choice
 
-LEVELS = onnxruntime.GraphOptimizationLevel
-KINDS = ("contacts", "near-duplicates")
-ENGINES = ("one by one", "two threads", "optimised", "onnx.reference", "float32 input")
+OPTIMISED = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_ALL
+Run = Callable[[list[str], dict[str, Any]], list[Any]]
 
 
-@cache
-def model(n: int, kind: str) -> Ours:
-    X = near_duplicates(n, 1e-7, 0)[0] if kind == "near-duplicates" else features(n)
-    return Ours(X, choice=Choice("IV", 20, 4))
+def engine(name: str, tried: Whole) -> Run:
+    """What runs the graph of a model."""
+    if name == "onnx.reference":
+        evaluator = ReferenceEvaluator(tried.data)
+        return lambda names, inputs: list(evaluator.run(names, inputs))
+    if name == "numpy":
+        return Graph(onnx_file.read(tried.data, "the model")).run
+    level = OPTIMISED if name == "optimised" else None
+    threads = 2 if name == "two threads" else 1
+    run: Run = session(tried.data, level, threads).run
+    return run
 
 
-def queries_for(kind: str, seed: int, count: int) -> Array:
-    near = kind == "near-duplicates"
-    X = (
-        near_duplicates(160, 1e-7, seed, count)[1]
-        if near
-        else features(count, seed + 1)
-    )
-    return X.astype(np.float32).astype(np.float64)
+ENGINES = ("one by one", "two threads", "optimised", "numpy", "onnx.reference")
 
 
-def engine_error(engine: str, n: int, kind: str, seed: int, count: int = 40) -> float:
-    """Outputs with another bit than the board's session gives for all queries at
-    once."""
-    ours, X = model(n, kind), queries_for(kind, seed, count)
-    expected = ours.model.run(X)
-    names = list(expected)
-    answers: list[Any]
-    if engine == "one by one":
-        answers = list(ours.alone(X).values())
-    elif engine == "onnx.reference":
-        answers = list(ReferenceEvaluator(ours.data).run(names, {"features": X}))
-    elif engine == "float32 input":
-        single = X.astype(np.float32)
-        decisions = [ours.model.decide(x)["t"] for x in single]
-        names = ["t_distances", "t_neighbours", "t_scores"]
-        answers = [
-            np.array([getattr(d, name[2:]) for d in decisions]) for name in names
-        ]
-    else:
-        options = (
-            {"threads": 2}
-            if engine == "two threads"
-            else {"level": LEVELS.ORT_ENABLE_ALL}
-        )
-        answers = session(ours.data, **options).run(names, {"features": X})
-    return float(
-        sum(
-            a.tobytes() != expected[name].tobytes()
-            for a, name in zip(answers, names, strict=True)
-        )
-    )
+def answers(name: str, tried: Whole, vectors: Array, point: int) -> Outputs:
+    """All outputs for vectors, which only the first of the engines gets one by one."""
+    run = engine(name, tried)
+    names = [output.name for output in session(tried.data).get_outputs()]
+    at = np.array([point])
+    batches = vectors[:, None] if name == "one by one" else vectors[None]
+    seen = [run(names, {"features": x, "decision_point": at}) for x in batches]
+    columns = zip(*seen, strict=True)
+    joined = [np.concatenate(column) for column in columns]
+    return dict(zip(names, joined, strict=True))
+
+
+def engine_error(
+    name: str, kind: str, point: int, factor: float, seed: int, count: int = 20
+) -> float:
+    """Values of all outputs that are not the oracle's."""
+    tried = whole(160, kind)
+    vectors = tried.queries(seed, factor, count)
+    seen = answers(name, tried, vectors, point)
+    return differing(seen, tried.outputs(vectors, point))
+
+
+def single_error(kind: str, point: int, seed: int) -> float:
+    """Values that a vector of float32 gets, and its copy in float64 does not."""
+    tried = whole(160, kind)
+    vectors = tried.queries(seed, 1.0).astype(np.float32)
+    expected = tried.outputs(vectors.astype(np.float64), point)
+    wrong = 0
+    for row, vector in enumerate(vectors):
+        for task, decision in tried.model.decide(vector, point).items():
+            for end in ("scores", "distances", "neighbours"):
+                truth = expected[f"{task}_{end}"][row]
+                wrong += int((getattr(decision, end) != truth).sum())
+    return float(wrong)
 
 
 def engine_usual() -> str:
@@ -79,40 +83,58 @@ def engine_usual() -> str:
     circumstances."""
     X, queries = near_duplicates(160, 1e-7, 0, 200)
     pipe = usual_pipeline(X, 20, 1, np.arange(len(X)))
-    shares = ", ".join(
-        f"{name} "
-        f"{np.mean(answer(queries) != [answer(q[None])[0] for q in queries]):.0%}"
-        for name, answer in (
-            ("skl2onnx", converted(pipe, X)),
-            ("scikit-learn", pipe.predict),
-        )
+    shares = []
+    for name, answer in (
+        ("skl2onnx", converted(pipe, X)),
+        ("scikit-learn", pipe.predict),
+    ):
+        alone = [answer(query[None])[0] for query in queries]
+        shares.append(f"{name} {np.mean(answer(queries) != alone):.0%}")
+    return (
+        f"nearest of near-duplicates differs alone and in a batch: {', '.join(shares)}"
     )
-    return f"nearest of near-duplicates differs alone and in a batch: {shares}"
 
 
 CASES = [
     Case(
-        "everywhere: threads, batches, optimisation, another engine, float32 input",
-        "the board's session, all at once",
-        "outputs with another bit",
+        "everywhere: threads, batches, optimisation, numpy, another engine",
+        "whole numbers and fractions, from the fitted numbers",
+        "values with another bit",
         engine_error,
         [
-            {"engine": engine, "n": n, "kind": kind, "seed": 0}
-            for engine in ENGINES
-            for n in (160, MANY)
-            for kind in KINDS
+            {"name": name, "kind": kind, "point": 1, "factor": factor, "seed": 0}
+            for name in ENGINES
+            for kind, factor in (("contacts", 1.0), ("near-duplicates", 1e12))
         ],
         {
-            "engine": st.sampled_from(ENGINES),
-            "n": st.just(160),
+            "name": st.sampled_from(ENGINES),
             "kind": st.sampled_from(KINDS),
+            "point": st.integers(0, len(POINTS_S) - 1),
+            "factor": st.sampled_from((1.0, 1e12)),
             "seed": SEEDS,
         },
         Ladder(
             "vectors at once",
-            [1, 10, 100, 1000],
-            seeded("count", engine="one by one", n=160, kind="contacts", seed=0),
+            [1, 10, 100, 400],
+            seeded(
+                "count",
+                name="two threads",
+                kind="contacts",
+                point=2,
+                factor=1.0,
+                seed=0,
+            ),
         ),
         engine_usual,
+        examples=6,
+    ),
+    Case(
+        "everywhere: features in float32",
+        "whole numbers and fractions, from the fitted numbers",
+        "values with another bit",
+        single_error,
+        [{"kind": kind, "point": 2, "seed": 0} for kind in KINDS],
+        {"kind": st.sampled_from(KINDS), "point": st.just(0), "seed": SEEDS},
+        examples=4,
     ),
 ]

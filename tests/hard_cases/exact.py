@@ -2,7 +2,7 @@
 
 import math
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,33 +36,54 @@ def smallest_bit(values: NDArray[np.float64]) -> float:
     return math.ldexp(1.0, min(bits, default=0))
 
 
-def coordinates(vectors: NDArray[np.float64], p: Projection, components: int) -> Whole:
-    """(n, c) whole coordinates of vectors by the rule of `train.projection`.
+class Projected(NamedTuple):
+    """Vectors in a projection's whole numbers.
+
+    Attributes:
+        units: (n, c) coordinates, cut off at the limit.
+        cut: (n,) whether a step or a coordinate was cut off.
+    """
+
+    units: Whole
+    cut: NDArray[np.bool_]
+
+
+def clipped(values: Whole, limit: int) -> Whole:
+    """Whole numbers, cut off at plus and minus a limit."""
+    inside = [max(-limit, min(limit, value)) for value in values.ravel().tolist()]
+    return np.array(inside, dtype=object).reshape(values.shape)
+
+
+def rounded(values: Any, scale: Fraction = Fraction(1)) -> Whole:
+    """Numbers times a scale, to the nearest whole number, halves to the even one."""
+    array = np.asarray(values)
+    wholes = [round(Fraction(value) * scale) for value in array.ravel().tolist()]
+    return np.array(wholes, dtype=object).reshape(array.shape)
+
+
+def projected(vectors: NDArray[np.float64], p: Projection) -> Projected:
+    """Whole coordinates of vectors by the rule of `train.projection`.
 
     The difference from the mean and its product with the gain are rounded once each, as
     IEEE 754 says; all that follows is in Python's whole numbers.
     """
-    d = (vectors - p.mean_) * p.gain_ / p.grid_.step
-    bound = int(MOST_STEPS)
-    rounded = [
-        max(-bound, min(bound, round(Fraction(value))))
-        for value in np.ravel(d).tolist()
-    ]
-    steps = np.array(rounded, dtype=object).reshape(d.shape)
-    weights = p.weights_[:, :components]
-    bit = smallest_bit(weights)
+    steps = rounded((vectors - p.mean_) * p.gain_ / p.grid_.step)
+    inside = clipped(steps, int(MOST_STEPS))
+    bit = smallest_bit(p.weights_)
     scale = Fraction(bit) * Fraction(p.grid_.step) / Fraction(p.grid_.unit)
-    sums = (
-        steps @ multiples(weights, bit)
-        if components
-        else np.zeros((len(d), 0), dtype=object)
-    )
-    limit = int(p.grid_.limit)
-    units = [
-        max(-limit, min(limit, round(value * scale)))
-        for value in np.ravel(sums).tolist()
-    ]
-    return np.array(units, dtype=object).reshape(sums.shape)
+    if p.weights_.shape[1]:
+        sums = inside @ multiples(p.weights_, bit)
+    else:
+        sums = np.zeros((len(vectors), 0), dtype=object)
+    whole = rounded(sums, scale)
+    units = clipped(whole, int(p.grid_.limit))
+    cut = (inside != steps).any(axis=1) | (units != whole).any(axis=1)
+    return Projected(units, cut)
+
+
+def coordinates(vectors: NDArray[np.float64], p: Projection, components: int) -> Whole:
+    """(n, components) the first whole coordinates of vectors."""
+    return projected(vectors, p).units[:, :components]
 
 
 def unrounded(
@@ -94,8 +115,15 @@ def winner(labels: list[Any]) -> Any:
     return next(label for label in labels if votes[label] == most)
 
 
+def root(square: int) -> float:
+    """The root of a whole number, rounded once, by whole numbers alone."""
+    digits = 64
+    part = math.isqrt(square << 2 * digits)
+    inexact = part * part != square << 2 * digits
+    # Half a last digit more stands for all that was cut off.
+    return float(Fraction(2 * part + inexact, 2 << digits))
+
+
 def distance(square: int, unit: float) -> float:
-    """The root of a whole number, correctly rounded, in units of a power of two."""
-    return (
-        math.sqrt(square) * unit
-    )  # below 2^53 the number is a float64, whose root IEEE rounds
+    """The root of a whole number, rounded once, in units of a power of two."""
+    return root(square) * unit

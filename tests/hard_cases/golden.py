@@ -92,6 +92,10 @@ def hard_trials(folder: Path) -> DataSet:
     return load_trials([folder])
 
 
+MANY_LABELS = "many-labels"
+"""The set whose labels need more than 64 bits, with neighbours that outvote each other."""
+
+
 def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
     """Training vectors of each hard case, which are the queries too, and the model's
     settings."""
@@ -103,6 +107,7 @@ def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
             Choice("none", 6, 5),
         ),
         "many": (features(MANY), Choice("IV", 20, 4)),
+        MANY_LABELS: (features(MANY), Choice("none", 6, 9)),
         "offset": (offset_data(1e6, 0.01, 0)[0], Choice("none", 6, 5)),
         "tiny": (features(160) * 1e-24, Choice("none", 6, 5)),
         "huge": (features(MANY) * 1e20, Choice("none", 6, 5)),
@@ -120,7 +125,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as trials:
         dataset = hard_trials(Path(trials))
         for name, (X, choice) in vectors(dataset).items():
-            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels_for(X)})
+            labels = labels_for(X, 80 if name == MANY_LABELS else 5)
+            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels})
             info = describe(dataset, fitted, {}, 1.2, X.shape[1] // 3)
             folder = arguments.out / name
             with write_whole(folder / "model.onnx") as file:

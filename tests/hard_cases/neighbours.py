@@ -20,6 +20,8 @@ from tests.hard_cases.models import (
     usual_pipeline,
 )
 from train.pipeline import Choice
+from train.projection import FEWEST_UNITS
+from train.report.summary import coarseness
 
 MANY = 1400
 WHOLE = "Python's whole numbers"
@@ -143,6 +145,49 @@ def far_error(factor: float, seed: int, n: int = 160) -> float:
     return ours.wrong(queries) + float((off != flags).sum())
 
 
+class Outlier:
+    """A training set of which one row lies far outside all others.
+
+    Args:
+        factor: by which it is moved away from the mean.
+        seed: of the set.
+
+    Attributes:
+        named: whether export warns of the row.
+        changed: share of queries whose nearest row is not that of unrounded numbers.
+    """
+
+    def __init__(self, factor: float, seed: int) -> None:
+        X = features(160, seed)
+        X[80] += (factor - 1.0) * (X[80] - X.mean(axis=0))
+        queries = features(200, seed + 1)
+        ours = Ours(X, choice=Choice("none", 6, 1))
+        p = ours.projection
+        rows = ours.fitted.rows_[ours.fitted.spaces_["t"]]
+        self.named = coarseness(rows, p.grid_.unit) < FEWEST_UNITS
+        both = np.concatenate([X, queries])
+        points = exact.unrounded(both, p.mean_, p.weights_)
+        truth = [exact.nearest(points[:160], point, 1)[0][0] for point in points[160:]]
+        seen = ours.alone(queries)["neighbours"][:, 0]
+        self.changed = float(np.mean(seen != truth))
+
+
+def outlier_error(factor: float, seed: int) -> float:
+    """Share of other nearest rows; 0 where export names the row that is to blame."""
+    outlier = Outlier(factor, seed)
+    return 0.0 if outlier.named else outlier.changed
+
+
+def outlier_price() -> str:
+    """The share of other nearest rows for rows farther and farther out."""
+    shares = []
+    for power in (2, 3, 4, 5, 6):
+        outlier = Outlier(10.0**power, 0)
+        named = ", named" if outlier.named else ""
+        shares.append(f"1e{power}: {outlier.changed:.1%}{named}")
+    return f"no warning; our other nearest rows, at a factor of {'; '.join(shares)}"
+
+
 def grid_error(spread: float, seed: int) -> float:
     """Largest error of a distance, over the longest training row, against unrounded
     numbers."""
@@ -226,6 +271,12 @@ CASES = [
         wrong(near_duplicates, USUAL),
         [{"n": n, "spread": 1e-7, "seed": 0} for n in (160, MANY)],
         {"n": st.just(160), "spread": powers_of_ten(-7, -2)},
+        Ladder(
+            "spread over norm",
+            decades(-2, -14, 0.5),
+            seeded("spread", n=160, seed=0),
+            "1e-6 (856 real grasps) and 3e-5 (cody18)",
+        ),
     ),
     Case(
         "neighbours: distances of near-duplicates",
@@ -249,6 +300,19 @@ CASES = [
         ),
         examples=3,
         bound=1e-6,
+    ),
+    Case(
+        "neighbours: one training row far outside all others",
+        "fractions, nothing rounded",
+        "share of other nearest rows, unless export names the row",
+        outlier_error,
+        [{"factor": factor, "seed": 0} for factor in (1e2, 1e3, 1e6)],
+        {"factor": powers_of_ten(0.0, 8.0), "seed": SEEDS},
+        Ladder("times as far out", decades(0, 12, 0.5), seeded("factor", seed=0), "1"),
+        outlier_price,
+        guard="scaling",
+        examples=4,
+        bound=0.02,
     ),
     answers(
         "offset 1e6, deviation 0.01",
@@ -314,6 +378,7 @@ CASES = [
         wrong(denormals, Choice("III", 6, 5)),
         [{"times": 1, "seed": 0}],
         {"times": st.integers(1, 2**30)},
+        Ladder("of the smallest numbers", [2**20, 2**10, 1], seeded("times", seed=0)),
     ),
     answers(
         "discriminants",

@@ -4,7 +4,9 @@ from importlib import import_module
 
 from tests.hard_cases.cases import Case
 
-GROUPS = "neighbours scaling frames kinematics limits refusals everywhere simulator"
+GROUPS = (
+    "neighbours outputs scaling frames kinematics limits refusals everywhere simulator"
+)
 CASES: list[Case] = [
     case
     for name in GROUPS.split()

@@ -42,5 +42,7 @@ def test_a_case_that_draws_holds_only_if_it_holds_with_every_seed():
     assert margin(case) == "x: holds to 4, fails from 5; recordings lie at 3"
 
 
-def test_a_case_without_a_parameter_says_so():
-    assert margin(Case("", "", "", lambda: 0.0)).startswith("no parameter")
+def test_a_case_without_a_parameter_is_exact_or_refused():
+    assert margin(Case("", "", "", lambda: 0.0)) == "exact"
+    with pytest.raises(ValueError, match="needs a ladder"):
+        margin(Case("", "", "", lambda: 0.0, bound=1e-9))

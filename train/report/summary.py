@@ -25,6 +25,8 @@ MISSING_SHARE = 0.02
 """Share of recordings without a contact above which the thresholds get a warning."""
 LEAK = 0.5
 """Share of labels that the posture at onset tells, above which it gets a warning."""
+MOST_JUDGED = 1000
+"""Of more trials, every second, third and so on is judged."""
 NAMED = 3
 """A sentence names so many files and counts the rest."""
 Prices = Sequence[tuple[float, float]]
@@ -198,9 +200,11 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
             "label"
         )
     projection = classifier.projections_[space]
-    steps, place = coarseness(rows, projection.grid_.unit)
+    members = classifier.members_[space]
+    _, different = np.unique(fitted.X[members], axis=0, return_index=True)
+    steps = coarseness(rows[different], projection.grid_.unit)
     if steps < FEWEST_UNITS:
-        farthest = dataset.trials[classifier.members_[space][place]].path
+        farthest = dataset.trials[members[(rows**2).sum(axis=1).argmax()]].path
         lines.append(
             f"warning: {task}: half of the trials lie within {steps:.0f} of the "
             "model's steps from "
@@ -224,25 +228,24 @@ def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> 
     return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
 
 
-def coarseness(rows: NDArray[np.float64], unit: float) -> tuple[float, int]:
+def coarseness(rows: NDArray[np.float64], unit: float) -> float:
     """The coarseness of a model's grid for its trials, judged by at most a thousand of
     them.
 
     Args:
-        rows: (n, c) projected trials.
+        rows: (n, c) projected trials, of which no two have the same features.
         unit: of their coordinates.
 
     Returns:
-        The median distance, in units, from a trial to the nearest one that differs from
-        it, or infinity if all are equal; and the number of the trial that lies farthest
-        out.
+        The median distance, in units, from a trial to the nearest other one. It is 0 if
+        a trial so far outside leaves all others the same coordinates, and infinite for
+        a single trial.
     """
-    squares = squared_distances(rows[:: -(-len(rows) // 1000)], rows)
-    squares[squares == 0.0] = np.inf
-    nearest = float(np.sqrt(np.median(squares.min(axis=1)))) if rows.size else np.inf
-    return nearest / unit, int(
-        squared_distances(rows, np.zeros_like(rows[:1])).argmax()
-    )
+    every = -(-len(rows) // MOST_JUDGED)
+    squares = squared_distances(rows[::every], rows)
+    judged = np.arange(len(squares))
+    squares[judged, every * judged] = np.inf
+    return float(np.sqrt(np.median(squares.min(axis=1)))) / unit
 
 
 def posture_accuracy(dataset: DataSet, task: str) -> float:

@@ -95,7 +95,10 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     assert [line.split(" have")[0] for line in said] == ["warning: object: 3 trials"]
 
 
-def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recordings):
+@pytest.mark.parametrize("factor", [3e6, 1e12])
+def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(
+    recordings, factor
+):
     """A skin that was stored with a scale of its own: one trial of newtons a million
     times too many leaves a few steps for all others."""
     fixed = {
@@ -108,14 +111,14 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recording
     fitted = train.fit(str(recordings), components=5, **fixed)
     assert not any("steps" in line for line in warnings(fitted))
     outlier = fitted.X.copy()
-    outlier[7] *= 3e6
+    outlier[7] *= factor
     classifier = ContactClassifier(fitted.classifier.choices, fitted.dataset.names)
     classifier.fit(
         outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen}
     )
     said = [
         line
-        for line in warnings(replace(fitted, classifier=classifier))
+        for line in warnings(replace(fitted, classifier=classifier, X=outlier))
         if "steps" in line
     ]
     assert len(said) == len(fitted.chosen)
@@ -126,15 +129,16 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(recording
 
 
 @pytest.mark.parametrize(
-    ("rows", "steps", "farthest"),
+    ("rows", "steps"),
     [
-        ([[0.0], [0.0], [3.0], [10.0]], 3.0, 3),  # equal rows are skipped: 3, 3, 3, 7
-        ([[2.0], [2.0]], np.inf, 0),
-        ([[0.0, 0.0], [6.0, 8.0]], 10.0, 1),
+        ([[0.0], [3.0], [10.0]], 3.0),
+        ([[0.0], [0.0], [0.0], [10.0]], 0.0),  # others all the same, on the grid
+        ([[0.0, 0.0], [6.0, 8.0]], 10.0),
+        ([[5.0]], np.inf),
     ],
 )
-def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps, farthest):
-    assert coarseness(0.5 * np.array(rows), 0.5) == (steps, farthest)
+def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps):
+    assert coarseness(0.5 * np.array(rows), 0.5) == steps
 
 
 def test_rows_that_are_equal_but_for_rounding_are_not_equal():

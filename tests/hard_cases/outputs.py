@@ -1,0 +1,374 @@
+"""Every output of a model with decision points and a product, and what follows from it.
+
+The oracle knows the fitted numbers of a model and the rules that the documentation
+states. It shares no code with the graph, with `train` or with `edge`: it computes in
+whole numbers and fractions, and rounds where IEEE 754 says that an operation rounds.
+"""
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from edge.model.info import Task
+from edge.model.model import Model
+from export.graph import to_onnx
+from tests.hard_cases import exact
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.models import Array, features, shipped
+from tests.hard_cases.neighbours import near_duplicates, offset_data
+from train.evaluate import stratified_folds
+from train.novelty import CLIP, FARTHEST, STEP_BITS
+from train.pipeline import Choice, ContactClassifier
+from train.stopping import SequentialClassifier
+
+POINTS_S = (0.4, 0.8, 1.2)
+LDA = {"projection": "lda", "shrinkage": 0.1}
+CHOICES = {
+    "category": Choice("III", 4, 5, **LDA),
+    "mobility": Choice("none", 6, 1),
+    "softness": Choice("IV", 12, 2),
+    "object": Choice("none", 20, 4),
+    "surface": Choice("III", 5, 7),
+}
+"""Of every number of neighbours that the graph treats in its own way: one, two, more."""
+KINDS = ("contacts", "near-duplicates", "duplicates", "offset", "tiny")
+TASK_OUTPUTS = ("label", "scores", "distances", "neighbours", "label_distances")
+Outputs = Mapping[str, NDArray[Any]]
+
+
+def labels_of(n: int) -> dict[str, NDArray[np.str_]]:
+    """A product and its factors, objects, and surfaces that every third trial lacks."""
+    rng = np.random.default_rng(2012)
+    objects = rng.permutation(np.arange(n) % 12)
+    mobility = np.array(["fixed", "movable"])[objects % 2]
+    softness = np.array(["rigid", "soft"])[objects // 2 % 2]
+    surface = np.array(["bark", "cloth", "foam"])[objects % 3]
+    surface[::3] = ""
+    return {
+        "category": np.char.add(np.char.add(softness, "-"), mobility),
+        "mobility": mobility,
+        "softness": softness,
+        "object": np.char.add("o", objects.astype(str)),
+        "surface": surface,
+    }
+
+
+def trials(n: int, kind: str) -> Array:
+    """(n, 120) training vectors of a kind."""
+    if kind == "near-duplicates":
+        return near_duplicates(n, 1e-6, 0)[0]
+    if kind == "duplicates":
+        return np.repeat(features(n // 4), 4, axis=0)
+    if kind == "offset":
+        return offset_data(1e6, 0.01, 0, n)[0]
+    return features(n) * (1e-24 if kind == "tiny" else 1.0)
+
+
+class Whole:
+    """A fitted model with decision points, its exported graph, and the oracle of the two.
+
+    Args:
+        n: training trials, a multiple of eight.
+        kind: one of `KINDS`.
+    """
+
+    def __init__(self, n: int, kind: str) -> None:
+        X = trials(n, kind)
+        self.y = labels_of(n)
+        # Early windows: of the same trials, with less of what tells them apart.
+        self.X = np.stack([X[::-1], 0.5 * (X + X[::-1]), X])
+        classifier = SequentialClassifier(CHOICES, POINTS_S)
+        folds = stratified_folds(self.y["object"])
+        self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "model.onnx"
+            self.data = to_onnx(self.fitted, self._info(n))
+            path.write_bytes(self.data)
+            self.model = Model(path)
+
+    def _info(self, n: int) -> Any:
+        tasks = {
+            task: Task(
+                tuple(sorted({*self.y[task]} - {""})),
+                choice.k,
+                self.fitted.decision_points_[-1].components_[task],
+                choice.scaling,
+                0.0,
+                factors=self.fitted.products_.get(task, {}),
+            )
+            for task, choice in CHOICES.items()
+        }
+        return replace(
+            shipped().info,
+            tasks=tasks,
+            rows=n,
+            trials=(),
+            decision_points_s=POINTS_S,
+            stopping=self.fitted.stopping_,
+            novelty=self.fitted.novelty_,
+        )
+
+    def queries(self, seed: int, factor: float, count: int = 10) -> Array:
+        """Vectors between training rows, on them, and `factor` times as far away."""
+        rng = np.random.default_rng(seed)
+        X = self.X[-1]
+        first, second = X[rng.integers(0, len(X), (2, count))]
+        middle = X.mean(axis=0)
+        mixed = middle + factor * (0.5 * (first + second) - middle)
+        return np.concatenate([first[:2], mixed])
+
+    def outputs(self, vectors: Array, point: int) -> dict[str, NDArray[Any]]:
+        """What the graph is to answer to vectors (n, 120) at a decision point."""
+        fitted = self.fitted.decision_points_[point]
+        spaces = {
+            space: exact.projected(vectors[:, fitted.columns_[space]], projection)
+            for space, projection in fitted.projections_.items()
+        }
+        cut = np.any([projected.cut for projected in spaces.values()], axis=0)
+        expected: dict[str, NDArray[Any]] = {
+            "out_of_range": cut.astype(np.float64),
+            "novelty": self._novelty(vectors, point),
+        }
+        for task in CHOICES:
+            points = spaces[fitted.spaces_[task]].units
+            expected |= self._task(task, fitted, points, point)
+        return expected
+
+    def _task(
+        self, task: str, fitted: ContactClassifier, points: exact.Whole, point: int
+    ) -> dict[str, NDArray[Any]]:
+        space = fitted.spaces_[task]
+        members = np.flatnonzero(self.y[task] != "")
+        labels = self.y[task][members].tolist()
+        classes = sorted(set(labels))
+        columns = fitted.columns_[space]
+        X = self.X[point][members][:, columns]
+        rows = exact.projected(X, fitted.projections_[space]).units
+        kept = fitted.components_[task]
+        unit = fitted.projections_[space].grid_.unit
+        scale = Fraction(unit) * Fraction(fitted.slopes_[task])
+        answers: list[tuple[Any, ...]] = []
+        for query in points:
+            k = CHOICES[task].k
+            near, squares = exact.nearest(rows[:, :kept], query[:kept], k)
+            votes = [labels[i] for i in near]
+            answers.append(
+                (
+                    classes.index(exact.winner(votes)),
+                    [float(Fraction(votes.count(label), k)) for label in classes],
+                    [exact.distance(squares[i], unit) for i in near],
+                    members[near],
+                    [_far(label, labels, squares, scale) for label in classes],
+                )
+            )
+        columns_of = zip(*answers, strict=True)
+        named = zip(TASK_OUTPUTS, columns_of, strict=True)
+        return {f"{task}_{end}": np.array(column) for end, column in named}
+
+    def _novelty(self, vectors: Array, point: int) -> Array:
+        space = self.fitted.space_
+        at = space.points[point]
+        steps = exact.rounded((vectors - at.mean) * at.gain)
+        steps = exact.clipped(steps, int(CLIP * 2**STEP_BITS))
+        whole = exact.multiples(space.weights, 1.0)
+        inside = exact.rounded(steps @ whole, Fraction(2) ** -space.shift)
+        squares = (steps**2).sum(axis=1) - (inside**2).sum(axis=1)
+        whitening = exact.multiples(at.whitening, 1.0)
+        places = exact.rounded(inside @ whitening, Fraction(2) ** -at.shift)
+        places = exact.clipped(places, int(FARTHEST))
+        rows = exact.multiples(at.rows, 1.0)
+        scores = []
+        for outside, place in zip(squares.tolist(), places, strict=True):
+            nearest = min(((rows - place) ** 2).sum(axis=1).tolist())
+            lengths = exact.root(max(outside, 1)), exact.root(nearest)
+            product = float(Fraction(lengths[0]) * Fraction(lengths[1]))
+            scores.append(float(Fraction(product) * Fraction(at.unit)))
+        return np.array(scores)
+
+
+def _far(label: str, labels: list[str], squares: list[int], scale: Fraction) -> float:
+    """The mean distance of a label's nearest twentieth, at least three, in log odds."""
+    distances = sorted(
+        s for s, other in zip(squares, labels, strict=True) if other == label
+    )
+    count = min(len(distances), max(-(-len(distances) // 20), 3))
+    wholes = [round(exact.root(square)) for square in distances[:count]]
+    mean = float(Fraction(sum(wholes), count))
+    return float(Fraction(mean) * Fraction(float(scale)))
+
+
+@cache
+def whole(n: int, kind: str) -> Whole:
+    return Whole(n, kind)
+
+
+def differing(seen: Outputs, expected: Outputs) -> float:
+    """Values of the expected outputs that have another bit."""
+    assert seen.keys() == expected.keys()
+    return float(
+        sum(
+            int((np.asarray(seen[name]) != value).sum())
+            if np.shape(seen[name]) == value.shape
+            else value.size
+            for name, value in expected.items()
+        )
+    )
+
+
+def outputs_error(kind: str, point: int, factor: float, seed: int) -> float:
+    """Values of all outputs that are not the oracle's."""
+    tried = whole(160, kind)
+    vectors = tried.queries(seed, factor)
+    single = [tried.model.run(vector[None], point) for vector in vectors]
+    seen = {name: np.concatenate([one[name] for one in single]) for name in single[0]}
+    return differing(seen, tried.outputs(vectors, point))
+
+
+def agreed(task: str, factors: Mapping[str, Any], distances: Outputs) -> dict[str, Any]:
+    """{task: label and distance of each label} of a product and its factors, for a
+    vector.
+
+    The three distances of an answer are added one by one, and each sum is rounded once.
+    """
+    totals = [Fraction(value) for value in distances[task].tolist()]
+    for factor, indices in factors.items():
+        further = [Fraction(distances[factor][i]) for i in indices]
+        totals = [Fraction(float(a + b)) for a, b in zip(totals, further, strict=True)]
+    best = totals.index(min(totals))
+    answers = {task: (best, [float(total) for total in totals])}
+    for factor, indices in factors.items():
+        nearest = [
+            float(min(t for t, of in zip(totals, indices, strict=True) if of == label))
+            for label in sorted(set(indices))
+        ]
+        answers[factor] = indices[best], nearest
+    return answers
+
+
+def agreement_error(kind: str, point: int, factor: float, seed: int) -> float:
+    """Decisions whose label, distances or tie is not the oracle's."""
+    tried = whole(160, kind)
+    vectors = tried.queries(seed, factor)
+    outputs = tried.outputs(vectors, point)
+    classes = {task: tried.model.info.tasks[task].labels for task in CHOICES}
+    wrong = 0
+    for row, vector in enumerate(vectors):
+        distances = {t: outputs[f"{t}_label_distances"][row] for t in CHOICES}
+        answers = {t: (int(outputs[f"{t}_label"][row]), distances[t]) for t in CHOICES}
+        for task, factors in tried.fitted.products_.items():
+            answers |= agreed(task, factors, distances)
+        for task, decision in tried.model.decide(vector, point).items():
+            label, nearest = answers[task]
+            scores = outputs[f"{task}_scores"][row].tolist()
+            tie = sorted(scores)[-1] == sorted(scores)[-2]
+            same = (
+                decision.label == classes[task][label]
+                and np.array_equal(decision.label_distances, nearest)
+                and decision.tie == tie
+            )
+            wrong += not same
+    return float(wrong)
+
+
+def contradictions() -> str:
+    """How often tasks that are decided one by one contradict each other."""
+    tried = whole(160, "contacts")
+    vectors = np.concatenate([tried.queries(seed, 1.0) for seed in range(20)])
+    seen = tried.model.run(vectors)
+    factors = tried.fitted.products_["category"]
+    pairs = list(zip(*factors.values(), strict=True))
+    named = zip(*(seen[f"{factor}_label"].tolist() for factor in factors), strict=True)
+    joined = np.array([pairs.index(pair) for pair in named])
+    share = float(np.mean(joined != seen["category_label"]))
+    return f"decided one by one, category contradicts its factors in {share:.0%} of answers"
+
+
+def confidence_error(kind: str, point: int, factor: float, seed: int) -> float:
+    """Largest error of a confidence, over what its log odds resolve."""
+    tried = whole(160, kind)
+    info = tried.model.info
+    worst = 0.0
+    for vector in tried.queries(seed, factor, 4):
+        for task, decision in tried.model.decide(vector, point).items():
+            label = info.tasks[task].labels.index(decision.label)
+            rule = info.stopping[task]
+            with mpmath.workdps(50):
+                far = [mpmath.mpf(float(d)) for d in decision.label_distances]
+                others = min(d for i, d in enumerate(far) if i != label)
+                typical = mpmath.mpf(info.novelty.limits[point][0])
+                novelty = mpmath.mpf(decision.novelty) / typical
+                excess = mpmath.log(novelty) if novelty > 1 else mpmath.mpf(0)
+                terms = [
+                    mpmath.mpf(rule.slopes[point]) * (others - far[label]),
+                    mpmath.mpf(rule.intercepts[point]),
+                    -mpmath.mpf(rule.doubts[point]) * excess,
+                ]
+                log_odds = sum(terms)
+                true = 1 / (1 + mpmath.exp(-log_odds))
+                # An ulp of each term moves the probability by p (1 - p) of it.
+                resolved = 1 + true * (1 - true) * sum(map(abs, terms))
+                error = abs(mpmath.mpf(decision.confidence) - true) / resolved
+            worst = max(worst, float(error))
+    return worst
+
+
+HAZARDS = [
+    {"kind": kind, "point": i % 3, "factor": factor, "seed": 0}
+    for i, kind in enumerate(KINDS)
+    for factor in (1.0, 1e12)
+]
+AROUND = {
+    "kind": st.sampled_from(KINDS),
+    "point": st.integers(0, len(POINTS_S) - 1),
+    "factor": powers_of_ten(-1.0, 15.0),
+    "seed": SEEDS,
+}
+FARTHER = Ladder(
+    "distance over that of training trials",
+    decades(0, 160, 0.05),
+    seeded("factor", kind="contacts", point=1, seed=0),
+    "up to 0.5",
+)
+
+CASES = [
+    Case(
+        "outputs: every output at every decision point, of five tasks",
+        "whole numbers and fractions, from the fitted numbers",
+        "values with another bit",
+        outputs_error,
+        HAZARDS,
+        AROUND,
+        FARTHER,
+    ),
+    Case(
+        "outputs: a product and its factors agree; ties of votes",
+        "fractions, each sum rounded once",
+        "decisions with another label, distance or tie",
+        agreement_error,
+        HAZARDS,
+        AROUND,
+        FARTHER,
+        contradictions,
+        examples=6,
+    ),
+    Case(
+        "outputs: confidence, near certainty and far from all trials",
+        "mpmath, 50 digits",
+        "error over what the log odds resolve",
+        confidence_error,
+        HAZARDS,
+        AROUND,
+        FARTHER,
+        examples=6,
+        bound=1e-15,
+    ),
+]

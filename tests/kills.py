@@ -1,0 +1,320 @@
+"""`make kills`: record, label, teach, a map and export are killed 60 times each.
+
+Each run is killed at a moment that a seed draws: at any time of a whole run, or shortly
+after a file of its folder changed. Then every file must be whole, and the next start of
+the same command must finish or name what was interrupted, and leave no temporary file.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from edge import demo
+from edge.leftovers import PREFIX
+from edge.recording import load
+from edge.saving import find
+from tests.bench import tables
+from train.touch_map import TouchMap
+
+EDGE = (sys.executable, "-m", "edge")
+EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none")
+GOLDEN = Path(__file__).parent / "golden"
+PATIENCE_S = 120.0
+MOST_CHANGES = 4
+CLOSE_S = 0.003
+"""Every other kill comes at most so long after one of the first changes of a file."""
+OTHER_MODEL = "is of another model"
+
+
+@dataclass(frozen=True)
+class Victim:
+    """A command that is killed.
+
+    Attributes:
+        prepare: makes the folder's files before a run.
+        command: given the folder.
+        complaint: what is wrong with the folder after a kill; "" if nothing.
+        finished: the same after the next run; it is given what that run printed.
+    """
+
+    prepare: Callable[[Path], None]
+    command: Callable[[Path], Sequence[object]]
+    complaint: Callable[[Path], str]
+    finished: Callable[[Path, str], str]
+
+
+def called(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        list(map(str, words)),
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+
+
+def loadable(folder: Path) -> str:
+    """All recordings of a folder are whole, or the sentence of the first that is not."""
+    for path in folder.glob("**/*.npz"):
+        if path.name != "golden.npz":
+            load(path)
+    return ""
+
+
+def copied(folder: Path, count: int = 12) -> None:
+    """Fill a folder with the recordings of the demo, over and over."""
+    recordings = demo.recordings()
+    for i in range(count):
+        source = recordings[i % len(recordings)]
+        shutil.copy(source, folder / f"{source.stem}-{i:02d}.npz")
+
+
+def touches(folder: Path) -> Path:
+    """A folder of recordings within a folder."""
+    (folder / "touches").mkdir()
+    copied(folder / "touches")
+    return folder / "touches"
+
+
+def recorded(folder: Path) -> Sequence[object]:
+    fake = demo.recordings()[0]
+    words = ["--loop", "--trials", 5, "--label", "object=box", "--out", folder / "out"]
+    return [*EDGE, "record", "--fake", fake, *words]
+
+
+def all_recorded(folder: Path, printed: str) -> str:
+    count = len(find([folder / "out"]))
+    return "" if 5 <= count <= 10 else f"{count} recordings instead of 5 to 10"
+
+
+def relabelled(folder: Path) -> Sequence[object]:
+    return [*EDGE, "label", "--set", "object=crate", "--yes", folder]
+
+
+def all_or_none(folder: Path, printed: str) -> str:
+    """The next start finished the change of labels: all have it."""
+    changed = [load(path).labels["object"] == "crate" for path in find([folder])]
+    return "" if all(changed) else f"{sum(changed)} of {len(changed)} files changed"
+
+
+def together(folder: Path) -> str:
+    """The model and its golden file agree, or `verify` says that they do not belong
+    together."""
+    model = folder / "model.onnx"
+    done = called(*EDGE, "verify", "--model", model, "--golden", folder / "golden.npz")
+    if done.returncode == 0 or OTHER_MODEL in done.stderr:
+        return ""
+    return f"verify blames the machine: {done.stdout}{done.stderr}"
+
+
+def agreeing(folder: Path, printed: str) -> str:
+    """The model and its golden file belong together after a whole run."""
+    model = folder / "model.onnx"
+    done = called(*EDGE, "verify", "--model", model, "--golden", folder / "golden.npz")
+    return done.stderr if done.returncode else ""
+
+
+def before_teaching(folder: Path) -> None:
+    touches(folder)
+    for name in ("model.onnx", "golden.npz"):
+        shutil.copy(GOLDEN / name, folder / name)
+    (folder / "source").mkdir()
+    for name in ("model.onnx", "golden.npz"):
+        shutil.copy(GOLDEN / name, folder / "source" / name)
+
+
+def teaching(folder: Path) -> Sequence[object]:
+    model = folder / "source" / "model.onnx"
+    words = ["--model", model, "--out", folder, "--new-labels", folder / "touches"]
+    return [*EDGE, "teach", *words]
+
+
+def mapping(folder: Path) -> Sequence[object]:
+    fake = demo.recordings()[0]
+    words = ["--model", demo.MODEL, "--fake", fake, "--loop", "--seconds", 3]
+    return [*EDGE, "run", *words, "--map", folder / "map.jsonl"]
+
+
+def readable_map(folder: Path) -> str:
+    path = folder / "map.jsonl"
+    if path.exists():
+        for line in path.read_bytes().split(b"\n")[:-1]:
+            json.loads(line)
+        if path.stat().st_size:
+            list(TouchMap(path))
+    return ""
+
+
+def longer_map(folder: Path, printed: str) -> str:
+    path = folder / "map.jsonl"
+    return "" if any(True for _ in TouchMap(path)) else "the map holds no touch"
+
+
+def before_exporting(folder: Path) -> None:
+    touches(folder)
+    for name in ("model.onnx", "golden.npz"):
+        shutil.copy(GOLDEN / name, folder / name)
+
+
+def exporting(folder: Path) -> Sequence[object]:
+    words = ["--features", "paper", "--projection", "pca", "--components", 4, "-k", 1]
+    return [*EXPORT, "--data", folder / "touches", "--out", folder, "--jobs", 1, *words]
+
+
+VICTIMS: Mapping[str, Victim] = {
+    "record": Victim(lambda folder: None, recorded, loadable, all_recorded),
+    "label --set": Victim(copied, relabelled, loadable, all_or_none),
+    "teach": Victim(before_teaching, teaching, together, agreeing),
+    "run --map": Victim(lambda folder: None, mapping, readable_map, longer_map),
+    "export": Victim(before_exporting, exporting, together, agreeing),
+}
+
+
+def listing(folder: Path) -> dict[str, int]:
+    """When each file of a folder changed."""
+    seen = {}
+    for path in folder.glob("**/*"):
+        try:
+            seen[str(path)] = path.stat().st_mtime_ns
+        except FileNotFoundError:  # it was a temporary file
+            continue
+    return seen
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When a command is killed.
+
+    Attributes:
+        changes: of the folder's files that it may make before; 0 for none to wait for.
+        delay_s: after these, or after the start.
+    """
+
+    changes: int
+    delay_s: float
+
+
+def killed(command: Sequence[object], folder: Path, moment: Moment) -> bool:
+    """Start a command, kill it, and say whether it was still alive.
+
+    Args:
+        command: the words.
+        folder: whose files it changes.
+        moment: when to kill it.
+    """
+    process = subprocess.Popen(
+        list(map(str, command)),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    seen = listing(folder)
+    changes = 0
+    while changes < moment.changes and process.poll() is None:
+        latest = listing(folder)
+        changes += latest != seen
+        seen = latest
+    try:
+        process.wait(moment.delay_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return True
+    return False
+
+
+def temporaries(folder: Path) -> list[Path]:
+    """Temporary files, made old enough for the next start to remove them."""
+    old = time.time() - 60.0
+    paths = list(folder.glob(f"**/{PREFIX}*"))
+    for path in paths:
+        os.utime(path, (old, old))
+    return paths
+
+
+def tried(victim: Victim, moment: Moment) -> tuple[bool, bool, str]:
+    """Kill a victim once.
+
+    Returns:
+        Whether it was alive, whether it left a temporary file, and what is wrong.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        victim.prepare(folder)
+        command = victim.command(folder)
+        alive = killed(command, folder, moment)
+        left = temporaries(folder)
+        complaint = victim.complaint(folder)
+        again = called(*command)
+        if again.returncode:
+            complaint += again.stderr
+        complaint += victim.finished(folder, again.stderr)
+        remaining = [path for path in left if path.exists()]
+        if remaining:
+            complaint += f"temporary files stay: {remaining}"
+        return alive, bool(left), complaint
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Kill, and write the table; 1 if a file was damaged or a next start failed."""
+    parser = argparse.ArgumentParser(prog="kills", description=__doc__)
+    parser.add_argument("--count", type=int, default=60, help="kills of each command")
+    parser.add_argument(
+        "--only", default="", help="commands whose name holds this text"
+    )
+    arguments = parser.parse_args(argv)
+    rows = []
+    complaints = []
+    for name, victim in VICTIMS.items():
+        if arguments.only not in name:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            victim.prepare(Path(folder))
+            began = time.perf_counter()
+            done = called(*victim.command(Path(folder)))
+            whole_s = time.perf_counter() - began
+            assert done.returncode == 0, done.stderr
+        stream = random.Random(f"kills {name}")
+        alive = left = 0
+        wrong = []
+        for i in tqdm(range(arguments.count), desc=name, leave=False, disable=None):
+            changes = stream.randint(1, MOST_CHANGES) if i % 2 else 0
+            longest_s = CLOSE_S if changes else whole_s
+            seen = tried(victim, Moment(changes, stream.uniform(0.0, longest_s)))
+            alive += seen[0]
+            left += seen[1]
+            wrong += [seen[2]] if seen[2] else []
+        complaints += [f"{name}: {text}" for text in wrong]
+        rows.append(
+            {
+                "command": f"`{name}`",
+                "runs": arguments.count,
+                "killed before their end": alive,
+                "left a temporary file": left,
+                "damage, or a next start that failed": len(wrong),
+            }
+        )
+    for text in complaints:
+        print(text, file=sys.stderr)
+    if arguments.only:
+        print(tables.markdown(rows))
+    else:
+        tables.write("kills", [rows], "make kills")
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
