@@ -40,6 +40,8 @@ BITS = 14
 BIAS_BITS = 21
 """Bits of a bias: 9 channels times 12, the sum of a kernel's weights, times
 2^`BITS`."""
+LOWEST = -(2**BIAS_BITS)
+"""Least bias; no result is above it where a sample does not count."""
 KERNELS = np.array(
     [
         [2 if tap in heavy else -1 for tap in range(TAPS)]
@@ -109,6 +111,13 @@ def _inside() -> NDArray[np.bool_]:
 
 
 @lru_cache
+def _samples_of_bias(biases: int) -> NDArray[np.int64]:
+    """(biases,) how many samples count, from the number of biases."""
+    samples = np.count_nonzero(_inside(), axis=1)
+    return np.asarray(samples[convolution_of_bias(biases)])
+
+
+@lru_cache
 def _mixes(channels: int) -> NDArray[np.float32]:
     """(convolutions, channels) 1 where a convolution takes a channel.
 
@@ -154,12 +163,13 @@ def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float6
         channels: (c, samples) whole numbers from 0.
         table: of training.
     """
-    convolutions = convolution_of_bias(len(table.biases))
-    inside = _inside()[convolutions]
-    results = convolved(shifted(channels, table.shifts))[convolutions]
-    above = results > np.array([table.biases], np.int32).T
-    counts = np.count_nonzero(above & inside, axis=1)
-    return np.asarray(counts / np.count_nonzero(inside, axis=1))
+    results = convolved(shifted(channels, table.shifts))
+    results[~_inside()] = LOWEST
+    biases = len(table.biases)
+    of_bias = results[convolution_of_bias(biases)]
+    above = of_bias > np.array([table.biases], np.int32).T
+    counts = np.count_nonzero(above, axis=1)
+    return np.asarray(counts / _samples_of_bias(biases))
 
 
 def kernel_channels(

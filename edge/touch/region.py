@@ -6,15 +6,22 @@ bits: its last bit is always clear and keeps a shift or a carry from running int
 next row. Every result is an integer and the same on every machine.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
 
+if TYPE_CHECKING:
+    from edge.touch.components import Components
+
+MOST_FLOODED = 4096
+"""Taxels of a frame in which one flood costs less than labelling all."""
 PLAIN_STEPS = 6
 """Steps of one taxel that a flood takes before it goes on by runs of taxels."""
 
@@ -245,6 +252,7 @@ class ActiveTaxels:
         self.counts = counts
         self._grid = grid(rows, cols, wraps)
         padded = np.zeros((rows, self._grid.stride), dtype=np.bool_)
+        self._padded = padded
         self.mask = padded[:, :cols]
         try:
             np.greater(counts, threshold, out=self.mask)
@@ -258,26 +266,42 @@ class ActiveTaxels:
         self.bits = self._grid.pack(padded)
 
     @cached_property
-    def _lone(self) -> int:
-        """The active taxels without an active neighbour."""
-        return self.bits & ~self._grid.neighbours(self.bits)
+    def _components(self) -> Components:
+        from edge.touch.components import components_of  # one flood does for a touch
+
+        return components_of(self._padded, self._grid.wraps)
 
     @cached_property
-    def _connected(self) -> list[int]:
-        """The bits of each region of several taxels."""
-        components, rest = [], self.bits ^ self._lone
-        while rest:
-            components.append(self._grid.flood(rest & -rest, rest))
-            rest ^= components[-1]
-        return components
+    def _taxels(self) -> NDArray[np.intp]:
+        """Indices in the padded frame of the active taxels, rising."""
+        return np.flatnonzero(self._padded)
+
+    @cached_property
+    def _peaks(self) -> NDArray[np.int64]:
+        """The largest count of each component."""
+        components = self._components
+        lowest = self.counts.min()
+        peaks = np.full(len(components.areas), lowest, dtype=np.int64)
+        np.maximum.at(peaks, components.of_taxel, self.counts[self.mask])
+        return peaks
 
     @cached_property
     def regions(self) -> list[Region]:
         """All regions, as `find_regions` returns them."""
-        alone = map(
-            self._grid.bit, np.flatnonzero(self._grid.unpack(self._lone)).tolist()
+        components = self._components
+        bits = [0] * len(components.areas)
+        runs = zip(
+            components.labels.tolist(),
+            components.starts.tolist(),
+            components.lengths.tolist(),
+            strict=True,
         )
-        regions = map(self._region, [*self._connected, *alone])
+        for label, start, length in runs:
+            bits[label] |= ((1 << length) - 1) << start
+        regions = [
+            Region(self._grid, of_region, peak)
+            for of_region, peak in zip(bits, self._peaks.tolist(), strict=True)
+        ]
         return sorted(
             regions, key=lambda region: (-region.area, -region.peak, region.index)
         )
@@ -286,26 +310,29 @@ class ActiveTaxels:
         """The largest region, as `largest_region` returns it."""
         if not self.bits:
             return None
-        # The region with the frame's peak is nearly always larger than all others
-        # together.
-        index = int(self.counts.argmax())
-        bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
-        if 2 * bits.bit_count() > self.bits.bit_count():
-            return Region(self._grid, bits, int(self.counts.item(index)))
-        before = 0 if previous is None else previous.bits
-        if not self._connected:
-            # A flickering skin may have nothing but lone taxels, a hundred and more of
-            # them.
-            lone = np.flatnonzero(self._grid.unpack(self._lone & before or self._lone))
-            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
-            return Region(
-                self._grid, self._grid.bit(index), int(self.counts.item(index))
-            )
-        area = max(map(int.bit_count, self._connected))
-        tied = [self._region(c) for c in self._connected if c.bit_count() == area]
-        return min(
-            tied, key=lambda r: (-(r.bits & before).bit_count(), -r.peak, r.index)
-        )
+        if self.counts.size <= MOST_FLOODED:
+            # The region with the frame's peak is nearly always larger than all others
+            # together.
+            index = int(self.counts.argmax())
+            bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
+            if 2 * bits.bit_count() > self.bits.bit_count():
+                return Region(self._grid, bits, int(self.counts.item(index)))
+        areas = self._components.areas
+        tied = np.flatnonzero(areas == areas.max())
+        label = tied.item(0) if len(tied) == 1 else self._first_of(tied, previous)
+        taxels = np.zeros_like(self._padded)
+        taxels.reshape(-1)[self._taxels[self._components.of_taxel == label]] = True
+        return Region(self._grid, self._grid.pack(taxels), int(self._peaks[label]))
+
+    def _first_of(self, tied: NDArray[np.intp], previous: Region | None) -> int:
+        """Of components of one area, that of the largest overlap with a region, then of
+        the higher peak, then of the lower index."""
+        keys = [-self._peaks[tied]]
+        if previous is not None:
+            common = self._grid.unpack(previous.bits)[self.mask]
+            overlaps = np.bincount(self._components.of_taxel, common)
+            keys.append(-overlaps[tied])
+        return tied.item(np.lexsort(keys)[0])
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""
@@ -313,9 +340,6 @@ class ActiveTaxels:
         if not others:
             return False
         return int(self.counts[self._grid.unpack(others)].max()) > onset
-
-    def _region(self, bits: int) -> Region:
-        return Region(self._grid, bits, int(self.counts[self._grid.unpack(bits)].max()))
 
 
 def find_regions(

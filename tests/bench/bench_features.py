@@ -1,33 +1,57 @@
 """What each set of features costs: a frame in contact, and the vector at the end."""
 
+from collections.abc import Sequence
+from functools import partial
+
 import pytest
 
 from edge.demo import FOLDER
-from edge.recording import load
+from edge.recording import Recording, load
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S, feature_vector
+from edge.touch.kernels import BIASES, kernel_channels
 from edge.touch.track import ContactTracker, first_contact
 from train.feature_sets import SETS
+from train.kernels import kernel_table
+
+WHOLE = "moments contact kernels zone_kernels joints"
+"""Sets that the default model may take together."""
+NUMBERS = dict(zip(("taxel_kernels", "zone_kernels"), BIASES, strict=True))
 
 
-@pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
-def bench_features(against, note, name):
-    features, recording = SETS[name], load(FOLDER / "pillow-movable.npz")
+def together(names: str) -> Sequence[str]:
+    """The features of some sets."""
+    return [feature for name in names.split() for feature in SETS[name]]
+
+
+def tracker(recording: Recording, features: Sequence[str]) -> ContactTracker:
     arm = {"chain": Chain.cody(), "joints": recording.joints.shape[1]}
+    return ContactTracker(recording.layout, features=features, **arm)
 
-    def tracker():
-        return ContactTracker(recording.layout, features=features, **arm)
 
-    onset_s, series = first_contact(recording, tracker())
+@pytest.mark.parametrize("names", [*(name for name in SETS if name != "shear"), WHOLE])
+def bench_features(against, note, names):
+    features = together(names)
+    recording = load(FOLDER / "pillow-movable.npz")
+    onset_s, series = first_contact(recording, tracker(recording, features))
+    felt = series.felt(WINDOW_S)
+    tables = {
+        name: kernel_table(
+            [kernel_channels(felt, WINDOW_S, name)], biases, name == "taxel_kernels"
+        )
+        for name, biases in NUMBERS.items()
+        if name in features
+    }
     frames = [frame for frame in recording if frame.t >= onset_s]
 
     def follow():
-        tracked = tracker()
+        followed = tracker(recording, features)
         for frame in frames:
-            tracked.push(frame)
+            followed.push(frame)
 
     followed_s = against(follow, {}, calls=1) / len(frames)
-    vector_s = against(lambda: feature_vector(series, WINDOW_S, features=features), {})
+    vector = partial(feature_vector, series, WINDOW_S, features=features, tables=tables)
+    vector_s = against(vector, {})
     note(
         f"a 10 ms frame, at {followed_s * 1e6:.0f} us",
         followed_s / 0.010,

@@ -1,4 +1,4 @@
-"""Threshold, largest region, peak, area and centroid of a 16 x 24 frame."""
+"""Threshold, largest region, peak, area and centroid of a frame, and of noise."""
 
 from functools import partial
 
@@ -62,3 +62,30 @@ def bench_region(name, against):
     against(
         partial(ours, frame), rivals, most=MOST if name in TOUCHES else {}, calls=50
     )
+
+
+def loudest(frame):
+    """The labelled areas, without the largest region's centroid, which rivals lack."""
+    return largest_region(frame, THRESHOLD, wraps=False).area
+
+
+def opencv_areas(frame):
+    _, _, stats, _ = cv2.connectedComponentsWithStats(
+        (frame > THRESHOLD).view(np.uint8), connectivity=4
+    )
+    return stats[1:, cv2.CC_STAT_AREA].max()
+
+
+@pytest.mark.parametrize("density", [0.1, 0.5])
+@pytest.mark.parametrize(
+    "shape",
+    [(16, 24), (64, 64), (128, 128), (256, 256)],
+    ids=lambda s: f"{s[0]}x{s[1]}",
+)
+def bench_region_in_noise(shape, density, against):
+    rng = np.random.default_rng(0)
+    counts = (rng.random(shape) < density) * rng.integers(60, 60000, shape)
+    frame = counts.astype(np.uint16)
+    assert loudest(frame) == opencv_areas(frame)
+    rivals = {"OpenCV": partial(opencv_areas, frame)}
+    against(partial(loudest, frame), rivals, most={"OpenCV": 10.0}, calls=20)

@@ -1,0 +1,103 @@
+"""Components labelled by runs are those of scipy.ndimage.label, the seam joined."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.touch.components import components_of
+from edge.touch.region import MOST_FLOODED, find_regions
+from tests.edge.touch.test_region import by_scipy, by_us, reference_masks, serpentine
+
+
+def padded(active):
+    return np.hstack([active, np.zeros((len(active), 1), dtype=bool)])
+
+
+def spiral(side):
+    """One winding run of taxels, whose ends are far apart along it."""
+    out = np.zeros((side, side), dtype=bool)
+    row = col = 0
+    step, length = (0, 1), side - 1
+    out[0, 0] = True
+    turns = 0
+    while length > 0:
+        for _ in range(length):
+            row += step[0]
+            col += step[1]
+            out[row, col] = True
+        step = step[1], -step[0]
+        turns += 1
+        if turns == 3 or (turns > 3 and turns % 2 == 1):
+            length -= 2
+    return out
+
+
+def comb(side):
+    """Teeth that only the last row joins: each is a component until then."""
+    out = np.zeros((side, side), dtype=bool)
+    out[:, ::2] = True
+    out[-1] = True
+    return out
+
+
+SHAPES = {
+    "none": np.zeros((5, 7), dtype=bool),
+    "all": np.ones((5, 7), dtype=bool),
+    "one": np.ones((1, 1), dtype=bool),
+    "row": np.array([[True, False, True, True]]),
+    "spiral": spiral(40),
+    "comb": comb(41),
+    "upside down": comb(41)[::-1],
+    "serpentine": serpentine(64, 96) > 0,
+}
+
+
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize("name", SHAPES)
+def test_shapes_have_the_components_of_scipy(name, wraps):
+    assert_same(SHAPES[name], wraps)
+
+
+def assert_same(active, wraps):
+    components = components_of(padded(active), wraps)
+    seen = np.full(active.shape, -1)
+    seen[active] = components.of_taxel
+    masks = reference_masks(active, wraps)
+    masks.sort(key=lambda mask: np.flatnonzero(mask)[0])
+    expected = np.full(active.shape, -1)
+    for number, mask in enumerate(masks):
+        expected[mask] = number
+    np.testing.assert_array_equal(seen, expected)
+    assert components.areas.tolist() == [int(mask.sum()) for mask in masks]
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    rows=st.integers(1, 90),
+    cols=st.integers(1, 90),
+    density=st.floats(0.0, 1.0),
+    wraps=st.booleans(),
+    seed=st.integers(0, 10**6),
+)
+def test_noise_of_any_density_has_the_components_of_scipy(
+    rows, cols, density, wraps, seed
+):
+    active = np.random.default_rng(seed).random((rows, cols)) < density
+    assert_same(active, wraps)
+
+
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize("density", [0.05, 0.5, 0.7])
+def test_a_frame_too_large_to_flood_has_the_regions_of_scipy(density, wraps):
+    rng = np.random.default_rng(7)
+    counts = (rng.random((72, 72)) < density) * rng.integers(101, 110, (72, 72))
+    assert counts.size > MOST_FLOODED
+    frame = counts.astype(np.uint16), 100, rng.random((72, 72)) < 0.9, wraps
+    assert by_us(*frame) == by_scipy(*frame)
+
+
+def test_counts_below_zero_have_their_peak():
+    counts = np.array([[-5, -3, -9, -4]], dtype=np.int64)
+    regions = find_regions(counts, -6, wraps=False)
+    assert [(region.area, region.peak) for region in regions] == [(2, -3), (1, -4)]
