@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}"
         )
     if arguments.explain:
-        from train.simulate.convergence import explain
+        from train.simulate.account import explain
 
         print(explain(scene))
     if arguments.out:

@@ -1,23 +1,20 @@
-"""Measures the step that a scene's trials need, and accounts for their effects.
+"""Measures the step that a scene's trials need.
 
 The step is halved until another halving changes the force little.
 """
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from train.simulate.arm import Array
 from train.simulate.contact import total
-from train.simulate.engine import begin, readings, run_physics
-from train.simulate.plan import ALL, PACE, Call, make_plan, required_effects
+from train.simulate.engine import begin, run_physics
+from train.simulate.plan import ALL, PACE, make_plan, required_effects
 from train.simulate.scene_model import Scene, TrialSpec, Value
-from train.simulate.schema import EFFECTS
 
 Kind = tuple[str, ...]
 """The effects that trials call for, which name a kind of trials."""
@@ -255,95 +252,3 @@ def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
     )
     steps = np.where(t.plan.also("sliding", ALL), steps, np.inf)
     return [float(of_kind.min()) for of_kind in _by_kind(steps, kinds)]
-
-
-def costs(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, float]:
-    """{effect, or `base`: microseconds for each trial that calls for it}, all trials
-    side by side.
-
-    The time of a hook that another hook calls counts for its own effect alone.
-    """
-    spent: dict[str, float] = {}
-    inner_s = [0.0]
-
-    def timed(call: Call) -> Call:
-        def run(*arguments: Any) -> Any:
-            inner_s.append(0.0)
-            begun = time.perf_counter()
-            answer = call.function(*arguments)
-            took = time.perf_counter() - begun
-            spent[call.owner] = spent.get(call.owner, 0.0) + took - inner_s.pop()
-            inner_s[-1] += took
-            return answer
-
-        return replace(call, function=run)
-
-    plan = make_plan(scene, specs)
-    stages = {
-        stage: [timed(call) for call in calls] for stage, calls in plan.stages.items()
-    }
-    for reading in readings(
-        run_physics(scene, specs, plan=replace(plan, stages=stages))
-    ):
-        reading.frames()
-    trials = {name: int(mask.sum()) for name, mask in plan.calls.items()}
-    return {
-        name: taken / trials.get(name, len(specs)) * 1e6
-        for name, taken in spent.items()
-    }
-
-
-def explain(scene: Scene) -> str:
-    """The account that `simulate --explain` prints."""
-    trials_by_kind = kinds(scene)
-    measured = dict(
-        zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True)
-    )
-    trials_by_kind = kinds(scene, None if scene.step_s else measured)
-    first_trials = {
-        spec.key: spec for specs in trials_by_kind.values() for spec in reversed(specs)
-    }
-    spent = costs(scene, tuple(first_trials.values()))
-    lines = [f"{scene.name}: {sum(map(len, trials_by_kind.values()))} trials"]
-    for effects, specs in trials_by_kind.items():
-        first = {spec.key: spec for spec in specs}
-        step = _step_line(specs[0].step_s, measured[effects], scene)
-        lines += ["", ", ".join(sorted(first)), step]
-        lines.append(f"  {'effect':<16}{'us/trial':>9}  called for by")
-        lines.append(f"  {'(base)':<16}{spent['base']:>9.0f}")
-        for effect in effects:
-            why = {
-                required_effects(scene, s.object, s.condition)[effect]
-                for s in first.values()
-            }
-            lines.append(
-                f"  {effect:<16}{spent.get(effect, 0.0):>9.0f}  "
-                f"{', '.join(sorted(why))}"
-            )
-    unused = [
-        name
-        for name in EFFECTS
-        if not any(name in effects for effects in trials_by_kind)
-    ]
-    lines += ["", "not called for, not loaded: " + (", ".join(unused) or "none")]
-    return "\n".join(lines)
-
-
-def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
-    """The step that the trials take, and the errors of the steps tried."""
-    tried = ", ".join(
-        f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
-        for s, e in zip(measured.steps_s, measured.errors, strict=False)
-    )
-    goal, best = (
-        f"{100.0 * scene.trials['tolerance']:g} %",
-        f"{1e3 * measured.step_s:g} ms",
-    )
-    verdict = f"{best} is enough for {goal}"
-    if not measured.within:
-        verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
-    return (
-        f"  step {1e3 * step_s:g} ms; {verdict} (error {tried}; order "
-        f"{measured.order:.2g}; "
-        f"reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
-    )

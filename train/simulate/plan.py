@@ -256,9 +256,20 @@ def check_heeded(scene: Scene, where: str) -> None:
                 )
 
 
+def given_steps(scene: Scene) -> str:
+    """What the scene says of its steps; "" where they are measured."""
+    if not scene.step_s:
+        return ""
+    steps = ", ".join(f"{name} {1e3 * s:g} ms" for name, s in scene.step_s.items())
+    reason = scene.step_reason or "the scene gives no reason"
+    return (
+        f"steps that the scene gives, whatever trials.tolerance says: {steps}; {reason}"
+    )
+
+
 def summary(scene: Scene) -> list[str]:
-    """Three lines: the effects that a scene's trials call for, those that none does,
-    and how much of the effects' work that leaves out."""
+    """Lines on the effects that a scene's trials call for, those that none does, how
+    much of the effects' work that leaves out, and steps that are not measured."""
     counts = dict.fromkeys(EFFECTS, 0)
     trials = 0
     for item in scene.objects:
@@ -276,4 +287,5 @@ def summary(scene: Scene) -> list[str]:
         f"not called for, and not loaded: {', '.join(unused) or 'none'}",
         f"so {pairs} effects of trials are computed, and {every - pairs} of {every} "
         f"({1.0 - pairs / every:.0%}) are not; --explain gives their times",
+        *filter(None, [given_steps(scene)]),
     ]

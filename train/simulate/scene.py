@@ -95,11 +95,13 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
     skin, taxel = _skin(top.table("skin", {}))
     spread = top.table("spread", {}).fields(schema.SPREAD)
     labels = top.table("labels", {}).fields(schema.LABELS)
+    steps = top.table("step_s", {})
     scene = Scene(
         name=top.text("name", Path(where).stem or "scene"),
         seed=seed,
         trials=per_trial,
-        step_s=_steps(top.table("step_s", {}), per_trial["rate_hz"]),
+        step_s=_steps(steps, per_trial["rate_hz"]),
+        step_reason=steps.text("reason", "", empty=True),
         lead=lead,
         skin=skin,
         taxel_n_m=taxel,
@@ -137,6 +139,7 @@ def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
     frame = 1.0 / rate_hz
     if table.raw:
         table.get("base")  # the step of trials that call for none of the effects named
+    table.has("reason")
     out: dict[str, float] = {}
     for name in filter(table.has, ("base", *EFFECTS)):
         out[name] = table.field(name, schema.STEP)

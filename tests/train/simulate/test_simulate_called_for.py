@@ -238,7 +238,7 @@ def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
 
 
 def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
-    called, unused, saved = summary(scene("noise"))
+    called, unused, saved, *_ = summary(scene("noise"))
     counts = dict(re.findall(r"(\w+) \((\d+)\)", called))
     assert counts
     assert not set(counts) & set(unused.partition(": ")[2].split(", "))

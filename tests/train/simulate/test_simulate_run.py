@@ -131,6 +131,7 @@ class TestCommand:
         )
         err = capsys.readouterr().err
         assert f"recordings written to {tmp_path}: 8" in err
+        assert "base 10 ms, sliding 5 ms; they err by at most 1.2 %" in err
         assert len(list(tmp_path.iterdir())) == 8
 
     def test_explain_lists_effects_reasons_and_costs(self, tmp_path, capsys):
@@ -145,6 +146,7 @@ class TestCommand:
         assert "family foam" in line
         assert float(line.split()[1]) > 0.0
         assert "order" in out
+        assert "1 trials, simulated side by side in" in out
         assert "not called for, not loaded: cover, pop" in out
 
     @pytest.mark.parametrize(

@@ -1,0 +1,63 @@
+"""What `--explain` says that effects cost adds up to the run."""
+
+import pytest
+
+from tests.conftest import ROOT
+from train.simulate.account import BASE, costs
+from train.simulate.convergence import kinds, measure
+from train.simulate.plan import given_steps
+from train.simulate.scene import load
+from train.simulate.schema import SHARED
+
+SCENES = ROOT / "train" / "scenes"
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load(SCENES / "cody18.toml", count=1)
+
+
+@pytest.fixture(scope="module")
+def spent(scene):
+    return costs(scene, [spec for specs in kinds(scene).values() for spec in specs])
+
+
+def test_the_parts_of_all_trials_add_up_to_the_run(scene, spent):
+    together = sum(
+        len(specs) * sum(spent.of(effects).values())
+        for effects, specs in kinds(scene).items()
+    )
+    assert spent.trials == 28
+    assert together == pytest.approx(spent.seconds, rel=1e-9)
+
+
+def test_shared_work_is_parted_among_the_effects_that_call_for_it(spent):
+    assert SHARED == {"viscous": ("relaxation", "inertia")}
+    alone = spent.of(("inertia",))["inertia"]
+    parted = spent.of(("relaxation", "inertia"))
+    assert spent.each["viscous"] > 0.0
+    half = 0.5 * spent.each["viscous"]
+    assert alone == pytest.approx(spent.each["inertia"] + 2.0 * half)
+    assert parted["inertia"] == pytest.approx(spent.each["inertia"] + half)
+    assert parted["relaxation"] == pytest.approx(spent.each["relaxation"] + half)
+    assert parted[BASE] == spent.each[BASE]
+
+
+def test_a_scene_says_why_its_steps_are_not_measured(tmp_path):
+    path = tmp_path / "one.toml"
+    path.write_text('[[object]]\nname = "a"\nfamily = "foam"\nconditions = ["fixed"]\n')
+    assert given_steps(load(path)) == ""
+    path.write_text("[step_s]\nbase = 0.005\n" + path.read_text())
+    assert given_steps(load(path)).endswith("base 5 ms; the scene gives no reason")
+
+
+def test_the_error_that_the_demo_states_is_that_which_is_measured():
+    scene = load(SCENES / "demo.toml")
+    groups = kinds(scene)
+    measured = measure(scene, list(groups.values()))
+    worst = 0.0
+    for specs, convergence in zip(groups.values(), measured, strict=True):
+        place = convergence.steps_s.index(specs[0].step_s)
+        worst = max(worst, convergence.errors[place])
+    assert worst <= 0.012
+    assert "at most 1.2 %" in scene.step_reason
