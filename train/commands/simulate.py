@@ -27,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, or explain."""
     from edge.errors import InputError
     from train.simulate import scene as scenes
+    from train.simulate.account import duration, explain
     from train.simulate.plan import summary
 
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
@@ -37,11 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
             f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}"
         )
     if arguments.explain:
-        from train.simulate.account import explain
-
         print(explain(scene))
     if arguments.out:
-        print("\n".join(summary(scene)), file=sys.stderr)
+        lines = [*summary(scene), *filter(None, [duration(scene)])]
+        print("\n".join(lines), file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from train.simulate.convergence import Convergence, Kind, kinds, measure
-from train.simulate.engine import readings, run_physics
+from train.simulate.engine import frame_count, readings, run_physics
 from train.simulate.plan import Call, make_plan, required_effects
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS, SHARED
@@ -15,6 +15,10 @@ BASE = "(base)"
 """Names the work of all trials: the arm, the skin, and the loop over the steps."""
 MOST_TRIALS = 400
 """Trials that run side by side, as when recordings are written."""
+MANY_STEPS = 100_000
+"""Steps of a trial from which a run says how long it will take."""
+TIMED_FRAMES = 20
+"""Frames that tell the time of a step."""
 
 
 @dataclass
@@ -99,6 +103,33 @@ def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
     each = {name: of_effects[name] / callers[name] for name in callers}
     each[BASE] = (seconds - sum(of_effects.values())) / len(specs)
     return Costs(len(specs), seconds, each)
+
+
+def duration(scene: Scene) -> str:
+    """About how long the physics will take, for scenes of very many steps; "" for
+    others.
+
+    A few frames tell the time of a step.
+    """
+    if not scene.step_s:
+        return ""
+    trials_by_kind = kinds(scene)
+    specs = [spec for of_kind in trials_by_kind.values() for spec in of_kind]
+    seconds = scene.lead.high + scene.trials["after_s"]
+    steps = round(seconds / min(spec.step_s for spec in specs))
+    if steps <= MANY_STEPS:
+        return ""
+    frame_s = 1.0 / scene.trials["rate_hz"]
+    batch = tuple(replace(spec, step_s=frame_s) for spec in specs[:MOST_TRIALS])
+    brief = replace(scene, trials={**scene.trials, "after_s": TIMED_FRAMES * frame_s})
+    begun = time.perf_counter()
+    run_physics(brief, batch)
+    a_step_s = (time.perf_counter() - begun) / (frame_count(brief) - 1)
+    batches = -(-len(specs) // MOST_TRIALS)
+    hours = batches * steps * a_step_s / 3600.0
+    return (
+        f"{steps:,} steps a trial: this will take about {hours:.2g} hours of one core"
+    )
 
 
 def explain(scene: Scene) -> str:

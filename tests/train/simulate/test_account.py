@@ -1,9 +1,11 @@
 """What `--explain` says that effects cost adds up to the run."""
 
+import re
+
 import pytest
 
 from tests.conftest import ROOT
-from train.simulate.account import BASE, costs
+from train.simulate.account import BASE, costs, duration
 from train.simulate.convergence import kinds, measure
 from train.simulate.plan import given_steps
 from train.simulate.scene import load
@@ -61,3 +63,16 @@ def test_the_error_that_the_demo_states_is_that_which_is_measured():
         worst = max(worst, convergence.errors[place])
     assert worst <= 0.012
     assert "at most 1.2 %" in scene.step_reason
+
+
+def test_a_run_of_very_many_steps_says_how_long_it_will_take(tmp_path):
+    path = tmp_path / "one.toml"
+    path.write_text(
+        "[trials]\nafter_s = 60.0\n[step_s]\nbase = 1e-6\n"
+        '[[object]]\nname = "a"\nfamily = "foam"\nconditions = ["fixed"]\n'
+    )
+    assert re.fullmatch(
+        r"60,200,000 steps a trial: this will take about \S+ hours of one core",
+        duration(load(path)),
+    )
+    assert duration(load(SCENES / "cody18.toml")) == ""

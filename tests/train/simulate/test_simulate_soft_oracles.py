@@ -10,6 +10,7 @@ from scipy.linalg import solve, toeplitz
 from tests.train.simulate.scenes import Rig, make, one_object, run
 from train.simulate import contact
 from train.simulate.effects import cover, lateral
+from train.simulate.effects.pop import BREAKS, SLOPES
 from train.simulate.plan import ALL
 from train.simulate.scene_model import Value
 
@@ -394,3 +395,18 @@ def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
     np.testing.assert_allclose(
         t.row_force, (loads * bubbles.alive).sum(axis=0), atol=1e-6
     )
+
+
+def test_the_tangents_of_a_bubble_lie_below_the_gas_law_by_a_third_at_most():
+    depth = np.linspace(0.0, 0.88, 8801)[1:]
+    law = depth / (1.0 - depth)
+    starts = (0.0, *BREAKS)
+    steeper = np.diff((0.0, *SLOPES))
+    tangents = sum(
+        slope * np.maximum(depth - start, 0.0)
+        for slope, start in zip(steeper, starts, strict=True)
+    )
+    below = 1.0 - tangents / law
+    assert below.min() == pytest.approx(0.0, abs=1e-12)
+    assert below.max() == pytest.approx(1.0 / 3.0, abs=1e-4)
+    assert depth[below.argmax()] == pytest.approx(BREAKS[0], abs=1e-4)

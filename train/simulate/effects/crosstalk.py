@@ -1,5 +1,5 @@
 """Each taxel also reads a part of its four neighbours' load; the last column meets the
-first."""
+first. A model of ours, fitted to nothing."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 """Small readings are zero, as in the lab's node (below 6 standard deviations of its
-noise)."""
+noise; its code is the source)."""
 
 import numpy as np
 

@@ -1,4 +1,5 @@
-"""Taxels that read nothing in a trial: known ones are marked invalid as well."""
+"""Taxels that read nothing in a trial: known ones are marked invalid as well. Each is
+drawn by itself, which is a model of ours."""
 
 from train.simulate.readings import Readings
 

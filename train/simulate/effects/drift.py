@@ -1,5 +1,5 @@
 """A drifting baseline: each taxel's reading has its own slope over time in each
-trial."""
+trial. A model of ours, fitted to nothing."""
 
 import numpy as np
 

@@ -1,4 +1,5 @@
-"""Frames that are lost on the way."""
+"""Frames that are lost on the way, each by itself: a model of ours, fitted to
+nothing."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 """Frames come early or late; each shows the load at its own time, and reports that
-time."""
+time. The normal law is ours, fitted to nothing."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Normal noise on each reading."""
+"""Normal noise on each reading: a model of ours; a scene says where its size is from."""
 
 from train.simulate import streams
 from train.simulate.readings import Readings

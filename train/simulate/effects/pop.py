@@ -1,9 +1,11 @@
 """Bubble wrap: a bubble under each taxel stiffens by the gas law, and is gone once it
 bursts.
 
-p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three
+Boyle's law p = p0 V0 / (V0 - A d) gives f = k0 d / (1 - d/b) for a bubble of height b. Three
 tangents (at 0, b/2 and 3b/4) approximate it, each exactly in series with the skin's
-spring. Behind a burst bubble lies the hard backing, b deeper.
+spring. Between the points where they touch the law they lie below it: to a depth of
+0.88 b by a third at most, where the first two cross, and by less in series with the
+skin. Behind a burst bubble lies the hard backing, b deeper.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The coarse steps of a converter."""
+"""The coarse steps of a converter: rounding to the nearest, as an ideal one does."""
 
 import numpy as np
 

@@ -1,5 +1,6 @@
 """Standard linear solid: a second spring, k1 = ratio * k, in series with a dashpot that
-relaxes it (`viscous`)."""
+relaxes it (`viscous`; Zener, Elasticity and anelasticity of metals, 1948). One time
+constant stands for the many of a real foam."""
 
 from train.simulate.trials import Index, Trials, pick
 

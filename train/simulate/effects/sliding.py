@@ -22,6 +22,9 @@ class Mover:
         static, kinetic: (n,) coefficients of friction on the floor.
         weight: (n,) newtons with which it presses on the floor.
         hold, resist: (n,) newtons that hold it at rest, and that resist its motion.
+            `resist` is constant within a step. A drag of c N s/m, which an effect takes
+            at the speed before the step, changes that speed by a part h c / m too much:
+            its step h must be far below m / c, which is 1 ms for 5,000 N s/m on 5 kg.
         leans: (n,) whether it leans; it then moves either way until it stands or lies.
         lies: (n,) metres of its way at which it lies.
         speed, slide: (n,) m/s, and metres of its way.

@@ -1,5 +1,8 @@
 """Foliage: stems at different depths that bend as cantilevers (k = 3 E I / L^3, one
-number here), damp, and slip off the forearm for good once bent too far."""
+number here), damp, and slip off the forearm for good once bent too far.
+
+The cantilever is Euler and Bernoulli's; damping and slipping are a model of ours, which
+was fitted to nothing."""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """Stribeck's law: friction falls from mu_s to mu_k as the object gathers speed,
-mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), taken at the speed before the step."""
+mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), taken at the speed before the step
+(Armstrong-Helouvry, Dupont and Canudas de Wit, A survey of models for the control of
+machines with friction, 1994)."""
 
 import numpy as np
 
