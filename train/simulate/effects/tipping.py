@@ -5,8 +5,9 @@ The block turns about its edge as a rigid body does (Housner, The behavior of in
 pendulum structures during earthquakes, 1963). It takes m g base / (2 height) at the
 height of the contact. As the object leans, the lever of its weight shrinks, and so does
 the push needed. Leaning stores energy: released, the object falls back onto its foot.
-Beyond the balance its weight turns it over, away from the arm, until it lies. The softening is taken at the step's start,
-since an explicit concave potential makes no energy, and the rest implicitly.
+Beyond the balance its weight turns it over, away from the arm, until it lies. The
+softening is taken at the step's start, since an explicit concave potential makes no
+energy, and the rest implicitly.
 """
 
 import math
