@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,8 @@ def frame_doubts(
     within = series.t <= window_s
     t = series.t[within]
     steps = np.diff(np.append(t, min(window_s, float(series.t[-1]))))
-    usual = float(np.median(steps)) if len(t) >= FEWEST else 0.0
+    # numpy.median would import numpy.ma, in the midst of the first decision.
+    usual = statistics.median(steps.tolist()) if len(t) >= FEWEST else 0.0
     longest = max(GAP_SHARE * window_s, GAP_S, PERIODS * usual)
     repeated = series.same[within] & (series.area[within] > 0)
     doubts = {

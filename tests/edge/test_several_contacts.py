@@ -1,0 +1,123 @@
+"""Several contacts at once are decided with a few questions a frame."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from edge.classifier import MOST_ASKED, Classifier
+from edge.events import Decided, Onset
+from edge.model.model import Model
+from edge.touch.frame import Frame
+from tests.conftest import ROOT, export, save_touches
+
+PLACES = [(row, col) for row in (0, 4, 8, 12) for col in (0, 6, 12, 18)]
+POINTS_S = (0.4, 0.8, 1.2)
+ERROR = 0.9
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory):
+    """A model that decides at several points of time."""
+    folder = tmp_path_factory.mktemp("early")
+    touches = save_touches(folder / "touches", 24)
+    fixed = ["--decision-points", "0.4:1.2:0.4", "--features", "paper"]
+    fixed += ["--projection", "pca", "--components", "4", "-k", "1", "--jobs", "1"]
+    return Model(export(folder / "model", "--data", touches, *fixed) / "model.onnx")
+
+
+def frames(places, dof):
+    """Touches of two by two taxels that all begin at once."""
+    for i in range(190):
+        counts = np.zeros((16, 24), np.uint16)
+        for number, (row, col) in enumerate(places):
+            if i >= 20:
+                strength = 400 + (8 + 3 * number) * (i - 20)
+                counts[row : row + 2, col : col + 2] = strength
+        yield Frame(0.01 * i, counts, joints=np.full(dof, 0.001 * i))
+
+
+def decided(model, places, error):
+    """The classifier's answers, and the questions that each frame asked."""
+    asked = [0]
+    decide = model.decide
+
+    def counted(*arguments):
+        asked[-1] += 1
+        return decide(*arguments)
+
+    model.decide = counted
+    classifier = Classifier(model, error=error, max_contacts=len(PLACES))
+    events = []
+    try:
+        for frame in frames(places, model.info.dof or 0):
+            events += classifier.push(frame)
+            asked.append(0)
+        events += classifier.finish()
+    finally:
+        del model.decide
+    return events, asked[:-1]
+
+
+@pytest.mark.parametrize("error", [None, ERROR])
+def test_no_frame_asks_more_than_a_few_questions(early, error):
+    events, asked = decided(early, PLACES, error)
+    assert sum(isinstance(event, Onset) for event in events) == len(PLACES)
+    assert max(asked) == MOST_ASKED
+    tasks = len(early.info.tasks)
+    assert sum(isinstance(event, Decided) for event in events) == tasks * len(PLACES)
+
+
+def answers_of(events):
+    """{contact and task: what was answered}."""
+    return {
+        (event.contact, event.task): (event.label, event.window_s, event.confidence)
+        for event in events
+        if isinstance(event, Decided)
+    }
+
+
+@pytest.mark.parametrize("error", [None, ERROR])
+def test_the_answers_are_those_of_asking_at_once(early, error, monkeypatch):
+    spread, _ = decided(early, PLACES, error)
+    monkeypatch.setattr("edge.classifier.MOST_ASKED", math.inf)
+    at_once, asked = decided(early, PLACES, error)
+    assert max(asked) == len(PLACES)
+    assert len(answers_of(at_once)) == len(PLACES) * len(early.info.tasks)
+    assert answers_of(spread) == answers_of(at_once)
+
+
+def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):
+    """Decision points that have come are not passed over for the full window."""
+    short = list(frames(PLACES, early.info.dof or 0))[:83]
+    limited = Classifier(early, error=ERROR, max_contacts=len(PLACES))
+    spread = [e for frame in short for e in limited.push(frame)] + limited.finish()
+    monkeypatch.setattr("edge.classifier.MOST_ASKED", math.inf)
+    free = Classifier(early, error=ERROR, max_contacts=len(PLACES))
+    at_once = [e for frame in short for e in free.push(frame)] + free.finish()
+    assert answers_of(spread) == answers_of(at_once)
+
+
+FIRST = """\
+import sys, edge
+from edge import demo
+recording = edge.load(demo.recordings()[0])
+classifier = edge.Classifier(edge.Model(demo.MODEL), recording.layout)
+before = set(sys.modules)
+decided = sum(isinstance(e, edge.Decided) for f in recording for e in classifier.push(f))
+print(decided, *sorted(set(sys.modules) - before))
+"""
+
+
+def test_the_first_decision_imports_little():
+    """Importing in the midst of a decision takes a board a tenth of a second."""
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["3"]
