@@ -9,7 +9,7 @@ import logging
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
 
@@ -99,24 +99,39 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
 
             argcomplete.autocomplete(top)
     arguments = top.parse_args(argv)
+    with _messages(top.prog, getattr(arguments, "quiet", False)):
+        return _status(top.prog, arguments)
+
+
+@contextmanager
+def _messages(program: str, quiet: bool) -> Iterator[None]:
+    """Print log messages to stderr meanwhile, or only errors."""
     handler = logging.StreamHandler()
-    handler.setLevel(
-        logging.ERROR if getattr(arguments, "quiet", False) else logging.INFO
-    )
-    handler.setFormatter(logging.Formatter(f"{top.prog}: %(message)s"))
+    handler.setLevel(logging.ERROR if quiet else logging.INFO)
+    handler.setFormatter(logging.Formatter(f"{program}: %(message)s"))
     loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
     for logger in loggers:
         logger.addHandler(handler)
         logger.setLevel(logging.INFO)
     try:
+        yield
+    finally:
+        for logger in loggers:
+            logger.removeHandler(handler)
+
+
+def _status(program: str, arguments: argparse.Namespace) -> int:
+    """Run the command; the exit status."""
+    try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
         return status
+    except InputError as error:
+        print(f"{program}: {error}", file=sys.stderr)
+        return 2
     except EdgeError as error:
-        print(f"{top.prog}: {error}", file=sys.stderr)
-        return (
-            2 if isinstance(error, InputError) else 3
-        )  # a device may be there a moment later
+        print(f"{program}: {error}", file=sys.stderr)
+        return 3  # a device may be there a moment later
     except BrokenPipeError:
         _discard_output()  # the reader of the output has closed the pipe
         return 0
@@ -127,13 +142,10 @@ def dispatch(top: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
             raise
         _discard_output()
         problem = f"standard output cannot be written: {error.strerror}"
-        print(f"{top.prog}: {problem}; redirect it to another place", file=sys.stderr)
+        print(f"{program}: {problem}; redirect it to another place", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
-    finally:
-        for logger in loggers:
-            logger.removeHandler(handler)
 
 
 def _open_missing_streams() -> None:
@@ -167,18 +179,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         that fails.
     """
     words = list(sys.argv[1:] if argv is None else argv)
-    command = [word for word in words[:1] if word in COMMANDS]
-    top = parser(command or COMMANDS)
+    first = words[0] if words else ""
+    top = parser([first] if first in COMMANDS else COMMANDS)
     if not words and "_ARGCOMPLETE" not in os.environ:
         top.print_help()
         return 2
-    if not command and words and not words[0].startswith("-"):
-        from edge.tools import workstation  # rarely needed
+    if not first or first.startswith("-") or first in COMMANDS:
+        return dispatch(top, words)
+    from edge.tools import workstation  # rarely needed
 
-        if words[0] in workstation.COMMANDS:
-            return workstation.run(words)
-        return refuse_command(top.prog, words[0], [*COMMANDS, *workstation.COMMANDS])
-    return dispatch(top, words)
+    if first in workstation.COMMANDS:
+        return workstation.run(words)
+    return refuse_command(top.prog, first, [*COMMANDS, *workstation.COMMANDS])
 
 
 def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:

@@ -256,11 +256,13 @@ def reading(
         opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
-        joints: JointSource | None = opened.playback if opened.dof else None
         if arguments.joints is not None:
-            joints = stack.enter_context(_joints(arguments.joints, arm, dof, opened))
-        elif model is not None and needs_joints:
-            model.require_joints(opened.dof, opened.source)
+            angles = _joints(arguments.joints, arm, dof, opened)
+            joints: JointSource | None = stack.enter_context(angles)
+        else:
+            joints = opened.playback if opened.dof else None
+            if model is not None and needs_joints:
+                model.require_joints(opened.dof, opened.source)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:

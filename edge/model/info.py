@@ -330,27 +330,37 @@ def _check_features(info: ModelInfo, name: str) -> None:
 
 def _check(info: ModelInfo, name: str) -> None:
     """Refuse metadata that contradict themselves."""
-    contradiction = ""
-    if not info.tasks:
-        contradiction = "its metadata names no task"
-    elif info.decision_points_s and not _points_fit(info):
-        contradiction = "its decision points are impossible"
-    elif info.trials and len(info.trials) != info.rows:
-        contradiction = f"names {len(info.trials)} of {info.rows} trials"
-    elif (info.motion_frame == "world") != (info.chain is not None):
-        contradiction = "its motion frame contradicts its arm"
-    elif not all(name.isprintable() for name in (info.name, *info.tasks)):
-        contradiction = "its name and its tasks' names must be printable"
-    for task, entry in info.tasks.items():
-        if entry.components > info.width:
-            contradiction = (
-                f"task {task!r} has {entry.components} components of {info.width} "
-                "features"
-            )
-        if entry.factors and not _factors_fit(info, task):
-            contradiction = f"task {task!r} is not the product of its factors"
-    if contradiction:
+    contradictions = [_contradiction(info)]
+    contradictions += [_contradiction_of_task(info, task) for task in info.tasks]
+    for contradiction in filter(None, contradictions):
         raise InputError(f"{name}: {contradiction}; export it again")
+
+
+def _contradiction(info: ModelInfo) -> str:
+    """What contradicts itself in the whole metadata; "" if nothing does."""
+    if not info.tasks:
+        return "its metadata names no task"
+    if info.decision_points_s and not _points_fit(info):
+        return "its decision points are impossible"
+    if info.trials and len(info.trials) != info.rows:
+        return f"names {len(info.trials)} of {info.rows} trials"
+    if (info.motion_frame == "world") != (info.chain is not None):
+        return "its motion frame contradicts its arm"
+    if not all(name.isprintable() for name in (info.name, *info.tasks)):
+        return "its name and its tasks' names must be printable"
+    return ""
+
+
+def _contradiction_of_task(info: ModelInfo, task: str) -> str:
+    """What contradicts itself in a task; "" if nothing does."""
+    entry = info.tasks[task]
+    if entry.components > info.width:
+        return (
+            f"task {task!r} has {entry.components} components of {info.width} features"
+        )
+    if entry.factors and not _factors_fit(info, task):
+        return f"task {task!r} is not the product of its factors"
+    return ""
 
 
 def _points_fit(info: ModelInfo) -> bool:

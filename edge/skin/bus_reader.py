@@ -238,15 +238,20 @@ class BusReader:
                 self._read(slot)
             return
         mux.verify = False
-        for _ in range(2):
-            on_its_channel = [self._read(slot, mux) for slot in slots]
-            nothing_read = not any(slot.good for slot in slots)
-            if all(on_its_channel) and (nothing_read or self._kept(mux)):
-                break
-            mux.forget()
-            for slot in slots:
-                slot.good = False
+        if not self._read_behind(mux, slots):
+            self._read_behind(mux, slots)
         mux.verify = True
+
+    def _read_behind(self, mux: TCA9548A, slots: Sequence[Slot]) -> bool:
+        """Read the chips on one channel of a mux; whether it was theirs all the time."""
+        on_its_channel = [self._read(slot, mux) for slot in slots]
+        nothing_read = not any(slot.good for slot in slots)
+        if all(on_its_channel) and (nothing_read or self._kept(mux)):
+            return True
+        mux.forget()
+        for slot in slots:
+            slot.good = False
+        return False
 
     def _kept(self, mux: TCA9548A) -> bool:
         for _ in range(2):

@@ -56,11 +56,7 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     if table.has("kind"):
         _kind(table)
     tables = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
-    kinds = [_kind(_shared(chip, table, ("kind",))) for chip in tables]
-    if layout.axes:
-        from edge.chips.three_axes import three_axes  # few skins have them
-
-        kinds = [three_axes(kind, table) for kind in kinds]
+    kinds = _kinds(tables, table, layout)
     options = {name for kind in kinds for name in kind.options}
     for key in ("kind", "mux", "block", *options):
         table.has(key)
@@ -74,6 +70,18 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
         whole = _shared(chip, table, ("kind", "mux", "block", *kind.options))
         specs.append(_chip(whole, kind, layout, sign, serial))
     return BusSpec(device, tuple(specs), clock_hz, serial)
+
+
+def _kinds(
+    tables: Sequence[ConfigTable], bus: ConfigTable, layout: SkinLayout
+) -> list[type[Chip]]:
+    """The kind of each of a bus's chips."""
+    kinds = [_kind(_shared(chip, bus, ("kind",))) for chip in tables]
+    if layout.axes:
+        from edge.chips.three_axes import three_axes  # few skins have them
+
+        kinds = [three_axes(kind, bus) for kind in kinds]
+    return kinds
 
 
 def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigTable:

@@ -165,21 +165,16 @@ class Contact:
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
         zones = measurer.measure(active, region, frame.shear)
-        plain = [0] * PLAIN
         row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
-        before = self._before
-        row["same"] = before is not None and bool((frame.counts == before).all())
+        row["same"] = self._repeats(frame)
         row["beside"] = region is not None and active.has_other(
             region, self.layout.onset
         )
-        self._before = frame.counts
         if region is not None:
             self.region = region
             self.joints = frame.joints
-            plain[:2] = region.peak, region.area
-            if measurer.motion:
-                plain[2:] = region.sums
-        row["counted"] = np.array(plain + zones, dtype=np.int64)
+        counted = [*self._plain(region), *zones]
+        row["counted"] = np.array(counted, dtype=np.int64)
         if measurer.cells is not None:
             row["taxels"] = measurer.cells.read(frame)
         if measurer.kernel_cells is not None:
@@ -188,6 +183,23 @@ class Contact:
             row["joints"] = self._joints_of(frame)
         self._rows.append(row)
         self.age_s = age_s
+
+    def _repeats(self, frame: Frame) -> bool:
+        """Whether a frame's counts are those of the last one."""
+        before = self._before
+        self._before = frame.counts
+        return before is not None and bool((frame.counts == before).all())
+
+    def _plain(self, region: Region | None) -> list[int]:
+        """(`PLAIN`,) peak, area and sums of a region; zeros where they are not
+        measured."""
+        plain = [0] * PLAIN
+        if region is not None:
+            plain[0] = region.peak
+            plain[1] = region.area
+            if self._measurer.motion:
+                plain[2:] = region.sums
+        return plain
 
     def _forget_last(self) -> None:
         """Drop the last frame: of two readings of one instant the later one counts."""

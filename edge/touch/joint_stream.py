@@ -21,6 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,28 +148,52 @@ class Joints:
 
     def _line(self, line: bytes, arrived: float) -> None:
         try:
-            pose = parse_json(line, "a line")
-            t, q = pose["t"], list(pose["q"])
-            if not {type(number) for number in (t, *q)} <= {int, float}:
-                raise TypeError
-        except (InputError, KeyError, TypeError):
-            return self._bad('a line is not {"t": seconds, "q": [angles]}')
-        names = pose.get("names")
-        if names is not None and self._names is not None:
-            if not isinstance(names, list) or len(names) != len(q):
-                return self._bad("a line's names are not one for each angle")
-            try:
-                columns = joint_columns([str(name) for name in names], self._names)
-            except InputError as error:
-                return self._bad(f"a line has {error}")
-            q = [q[column] for column in columns]
-        if len(q) != self._dof:
-            return self._bad(f"a line has {len(q)} angles, the arm has {self._dof}")
+            t, angles = self._pose(line)
+        except InputError as error:
+            return self._bad(str(error))
         if self._poses and t <= self._poses[-1][0]:
             self._poses.clear()
             self._recent.clear()
         self._recent.append(arrived - t)
-        self._poses.append((float(t), np.array(q, dtype=np.float64)))
+        self._poses.append((float(t), np.array(angles, dtype=np.float64)))
+
+    def _pose(self, line: bytes) -> tuple[float, list[float]]:
+        """Time and angles of a line, in the arm's order.
+
+        Raises:
+            InputError: the line has none, or others than the arm's.
+        """
+        try:
+            pose = parse_json(line, "a line")
+            t = pose["t"]
+            angles = list(pose["q"])
+            if not {type(number) for number in (t, *angles)} <= {int, float}:
+                raise TypeError
+        except (InputError, KeyError, TypeError):
+            raise InputError('a line is not {"t": seconds, "q": [angles]}') from None
+        names = pose.get("names")
+        if names is not None and self._names is not None:
+            columns = self._columns(names, len(angles))
+            angles = [angles[column] for column in columns]
+        if len(angles) != self._dof:
+            raise InputError(
+                f"a line has {len(angles)} angles, the arm has {self._dof}"
+            )
+        return t, angles
+
+    def _columns(self, names: Any, count: int) -> Sequence[int]:
+        """Where the arm's joints stand among the names of a line's angles.
+
+        Raises:
+            InputError: there is not one for each angle, or a joint has none.
+        """
+        assert self._names is not None
+        if not isinstance(names, list) or len(names) != count:
+            raise InputError("a line's names are not one for each angle")
+        try:
+            return joint_columns([str(name) for name in names], self._names)
+        except InputError as error:
+            raise InputError(f"a line has {error}") from None
 
 
 @contextmanager

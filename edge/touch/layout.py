@@ -179,14 +179,8 @@ class SkinLayout:
         values["row0_z_m"] = table.number(
             "row0_z_m", 0.0, low=-LONGEST_M, high=LONGEST_M
         )
-        if isinstance(table.get("pitch_m", None), list | tuple):
-            values["pitch_m"] = table.numbers(
-                "pitch_m", 2, low=0.0, high=LONGEST_M, open_low=True
-            )
-        elif table.has("pitch_m"):
-            values["pitch_m"] = table.number(
-                "pitch_m", low=0.0, high=LONGEST_M, open_low=True
-            )
+        if table.has("pitch_m"):
+            values["pitch_m"] = _pitch(table)
         if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:
             values["axes"] = 3
         if table.has("column_angles_deg"):
@@ -197,6 +191,14 @@ class SkinLayout:
         with about(where):
             layout = cls(**values)
         return layout
+
+
+def _pitch(table: ConfigTable) -> float | tuple[float, ...]:
+    """The distance of neighbouring taxels, or one along the rows and one around."""
+    limits: dict[str, Any] = {"low": 0.0, "high": LONGEST_M, "open_low": True}
+    if isinstance(table.get("pitch_m"), list | tuple):
+        return table.numbers("pitch_m", 2, **limits)
+    return table.number("pitch_m", **limits)
 
 
 def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:

@@ -136,8 +136,10 @@ class ContactTracker:
             region = None if share is None else regions[share]
             self._follow(contact, frame, active, region)
         contacts = list(self._contacts)
-        for number, region in enumerate(regions):
-            if number not in shares.values() and self._may_begin(region, contacts):
+        taken = set(shares.values())
+        free = [region for n, region in enumerate(regions) if n not in taken]
+        for region in free:
+            if self._may_begin(region, contacts):
                 contact = self._begin(frame, region)
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)

@@ -25,6 +25,29 @@ def joints_between(
         raise InputError(
             f"{path}: link {tip!r} is both base and tip; name the arm's two ends"
         )
+    root = _root(path)
+    links = [link.get("name") for link in root.findall("link")]
+    for name in (base, tip):
+        if name not in links:
+            raise InputError(
+                f"{path}: no link {name!r}; it has {', '.join(map(str, links))}"
+            )
+    parents = _parents(path, root)
+    joints: list[dict[str, Any]] = []
+    link = tip
+    while link != base:
+        if link not in parents:
+            raise InputError(
+                f"{path}: no chain of joints leads from {base!r} to {tip!r}"
+            )
+        element = parents.pop(link)  # taken out, so that a loop of links ends
+        joints.append(_joint(path, element))
+        link = _link(path, element, "parent")
+    return joints[::-1]
+
+
+def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
+    """The element `robot` of a URDF file."""
     data = read_bytes(path)
     if os.fspath(path).endswith(".xacro") or b"${" in data or b"xacro:" in data:
         raise InputError(
@@ -37,12 +60,13 @@ def joints_between(
         raise InputError(
             f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>"
         )
-    links = [link.get("name") for link in root.findall("link")]
-    for name in (base, tip):
-        if name not in links:
-            raise InputError(
-                f"{path}: no link {name!r}; it has {', '.join(map(str, links))}"
-            )
+    return root
+
+
+def _parents(
+    path: str | os.PathLike[str], root: ElementTree.Element
+) -> dict[str, ElementTree.Element]:
+    """{link: the joint that leads to it}."""
     parents: dict[str, ElementTree.Element] = {}
     names: set[str] = set()
     for element in root.findall("joint"):
@@ -57,17 +81,7 @@ def joints_between(
             raise InputError(f"{path}: two joints are named {name!r}; rename one")
         names.add(name)
         parents[child] = element
-    joints: list[dict[str, Any]] = []
-    link = tip
-    while link != base:
-        if link not in parents:
-            raise InputError(
-                f"{path}: no chain of joints leads from {base!r} to {tip!r}"
-            )
-        element = parents.pop(link)  # taken out, so that a loop of links ends
-        joints.append(_joint(path, element))
-        link = _link(path, element, "parent")
-    return joints[::-1]
+    return parents
 
 
 def _link(path: str | os.PathLike[str], element: ElementTree.Element, tag: str) -> str:
@@ -89,11 +103,9 @@ def _joint(
     if mimic is not None and kind != "fixed":
         raise InputError(
             f"{path}: joint {name!r} follows joint {mimic.get('joint')!r} (<mimic>) "
-            "and "
-            "has no angle of its own; choose another base or tip, or make it fixed"
+            "and has no angle of its own; choose another base or tip, or make it fixed"
         )
     joint: dict[str, Any] = {"name": name, "type": kind, "axis": [1.0, 0.0, 0.0]}
-    limit = element.find("limit")
     with parsing(f"{path}: joint {name!r}", "numbers"):
         for tag, attribute, key in (
             ("axis", "xyz", "axis"),
@@ -105,13 +117,24 @@ def _joint(
                 joint[key] = [
                     float(number) for number in child.attrib[attribute].split()
                 ]
-        if limit is not None and kind in ("revolute", "prismatic"):
-            low, high = (float(limit.get(end, "0")) for end in ("lower", "upper"))
-            if low <= high:
-                joint["limits"] = [low, high]
-            else:
-                LOG.warning(
-                    f"{path}: joint {name!r} has its lower limit {low:g} above its upper "
-                    f"limit {high:g}; both are left out"
-                )
+        limits = _limits(path, element)
+    if limits is not None and kind in ("revolute", "prismatic"):
+        joint["limits"] = limits
     return joint
+
+
+def _limits(
+    path: str | os.PathLike[str], element: ElementTree.Element
+) -> list[float] | None:
+    """Lower and upper limit of a joint; None where it has none, or they are reversed."""
+    limit = element.find("limit")
+    if limit is None:
+        return None
+    low, high = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    if low <= high:
+        return [low, high]
+    LOG.warning(
+        f"{path}: joint {element.get('name')!r} has its lower limit {low:g} above its "
+        f"upper limit {high:g}; both are left out"
+    )
+    return None
