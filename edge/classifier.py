@@ -9,13 +9,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.errors import OutOfRange
 from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
-from edge.touch.contact import Contact
+from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import frame_doubts
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -353,32 +354,47 @@ class Classifier:
         self, pending: Pending, began: float, *, short: bool = False
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
-        point = pending.decision_point
-        window_s = self.model.decision_points_s[point]
+        window_s = self.model.decision_points_s[pending.decision_point]
         series = pending.contact.series()
-        info = self.model.info
-        limits = () if info.chain is None else info.chain.limits
-        doubts = frame_doubts(series, window_s, info.several, limits)
-        if self._max_contacts > 1:
-            del doubts["several"]
+        doubts = self._doubts(series, window_s)
         blank = self._blank(pending, window_s, {"short": short, **doubts})
         try:
             vector = self.model.info.vector(series, window_s)
-            decisions = self.model.decide(vector, None if self.error is None else point)
+            answers = self._answers_to(vector, pending, blank)
         except OutOfRange:
             blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
             answers = [replace(blank, task=task) for task in pending.tasks]
-        else:
-            answers = self._answers(pending, blank, decisions)
-            last = point == len(self.model.decision_points_s) - 1
-            if last and any(UNKNOWN in answer.flags for answer in answers):
-                phrase = info.unusual(vector)
-                answers = [replace(answer, unusual=phrase) for answer in answers]
         pending.decision_point += 1
         for answer in answers:
             pending.tasks.remove(answer.task)
         latency_ms = _milliseconds_since(began)
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
+
+    def _answers_to(
+        self, vector: NDArray[np.float64], pending: Pending, blank: Decided
+    ) -> list[Decided]:
+        """The answers of the tasks that need not wait any longer.
+
+        Raises:
+            OutOfRange: the features cannot be scaled.
+        """
+        point = pending.decision_point
+        decisions = self.model.decide(vector, None if self.error is None else point)
+        answers = self._answers(pending, blank, decisions)
+        last = point == len(self.model.decision_points_s) - 1
+        if last and any(UNKNOWN in answer.flags for answer in answers):
+            phrase = self.model.info.unusual(vector)
+            answers = [replace(answer, unusual=phrase) for answer in answers]
+        return answers
+
+    def _doubts(self, series: FeatureSeries, window_s: float) -> dict[str, bool]:
+        """{flag: whether it holds} for the frames of a contact."""
+        info = self.model.info
+        limits = () if info.chain is None else info.chain.limits
+        doubts = frame_doubts(series, window_s, info.several, limits)
+        if self._max_contacts > 1:
+            del doubts["several"]
+        return doubts
 
     def _blank(
         self, pending: Pending, window_s: float, doubts: Mapping[str, bool]

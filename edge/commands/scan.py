@@ -46,19 +46,30 @@ def run(arguments: argparse.Namespace) -> int:
         statuses = skin.status()
     silent = 0
     for status in statuses:
-        spec = status.spec
-        bad = int(invalid.flat[spec.served].sum())
-        fault = status.error
-        if bad and not fault:
-            fault = f"{spec.route}: {SILENT}: {bad}"
-        if status.state != "running" or bad == len(spec.served):
+        bad = int(invalid.flat[status.spec.served].sum())
+        if status.state != "running" or bad == len(status.spec.served):
             silent += 1
-        if output.as_json or fault:
-            event = chip_event(status, kind=spec.kind.name, invalid=bad)
-            output.event(event, f"{spec.kind.name}: {fault}")
+        _say(output, status, bad)
     output.text(skin_map(statuses, invalid))
     answer = f"{len(statuses) - silent} of {len(statuses)} chips answer"
     if invalid.any():
         answer += f"; {SILENT}: {invalid.sum()}"
     output.text(answer)
     return 1 if silent or invalid.any() else 0
+
+
+def _say(output: Output, status: ChipStatus, bad: int) -> None:
+    """Print a chip's state; for a person, only if it has a fault or invalid taxels.
+
+    Args:
+        output: takes the line.
+        status: of the chip.
+        bad: how many of its taxels are not valid.
+    """
+    spec = status.spec
+    fault = status.error
+    if bad and not fault:
+        fault = f"{spec.route}: {SILENT}: {bad}"
+    if output.as_json or fault:
+        event = chip_event(status, kind=spec.kind.name, invalid=bad)
+        output.event(event, f"{spec.kind.name}: {fault}")

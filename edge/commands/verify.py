@@ -11,7 +11,7 @@ from typing import Any
 from edge.commands.options import add_engine
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
-from edge.model.verify import verify
+from edge.model.verify import Check, verify
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -29,37 +29,43 @@ def run(arguments: argparse.Namespace) -> int:
     checks = verify(Model(arguments.model, arguments.engine), arguments.golden)
     width = max(len(check.name) for check in checks)
     for check in checks:
-        line: dict[str, Any] = {
-            "event": "check",
-            "name": check.name,
-            "rows": check.rows,
-        }
-        line["passed"] = check.passed
-        verdict = "ok" if check.passed else "DIFFERS"
-        text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
-        if check.worst < float("inf"):
-            line["share_of_bound"] = round(check.worst, 6)
-        if check.row is not None:
-            line |= {
-                "worst_row": check.row,
-                "seen": check.seen,
-                "expected": check.expected,
-            }
-        if not check.passed:
-            seen, expected = (
-                " ".join(str(x).split()) for x in (check.seen, check.expected)
-            )
-            text += f"; the worst is row {check.row}: {seen} instead of {expected}"
-        output.event(line, text)
+        output.event(_event(check), _text(check, width))
     failed = [check.name for check in checks if not check.passed]
     if any(name.endswith("distances") for name in failed):
         LOG.error(
             "every engine that computes in float64 gives the same distances; this "
-            "machine may run "
-            "the model in float32, which ONNX Runtime does not"
+            "machine may run the model in float32, which ONNX Runtime does not"
         )
     if failed:
         LOG.error(f"results that differ from the golden file: {', '.join(failed)}")
     else:
         output.text(f"all {len(checks)} results agree with the golden file")
     return 1 if failed else 0
+
+
+def _event(check: Check) -> dict[str, Any]:
+    """The line of a check for programs."""
+    event: dict[str, Any] = {
+        "event": "check",
+        "name": check.name,
+        "rows": check.rows,
+        "passed": check.passed,
+    }
+    if check.worst < float("inf"):
+        event["share_of_bound"] = round(check.worst, 6)
+    if check.row is not None:
+        event["worst_row"] = check.row
+        event["seen"] = check.seen
+        event["expected"] = check.expected
+    return event
+
+
+def _text(check: Check, width: int) -> str:
+    """The line of a check for people, whose name takes a width."""
+    verdict = "ok" if check.passed else "DIFFERS"
+    text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
+    if check.passed:
+        return text
+    seen = " ".join(check.seen.split())
+    expected = " ".join(check.expected.split())
+    return f"{text}; the worst is row {check.row}: {seen} instead of {expected}"

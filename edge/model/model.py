@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -227,31 +228,50 @@ class Model:
             self._agree(labels, distances)
         last = len(self.decision_points_s) - 1
         point = last if decision_point is None else decision_point
+        return {
+            task: self._decision(task, point, int(label), distances[task], answers)
+            for task, label in labels.items()
+        }
+
+    def _decision(
+        self,
+        task: str,
+        decision_point: int,
+        label: int,
+        distances: NDArray[np.float64] | None,
+        answers: Mapping[str, NDArray[Any]],
+    ) -> Decision:
+        """A task's decision.
+
+        Args:
+            task: its name.
+            decision_point: index of the point that was asked for.
+            label: index of the label in which the tasks agree.
+            distances: (labels,) of the nearest answers with each label, if any.
+            answers: {output of the graph: its value}.
+
+        Raises:
+            InputError: the label is none of the task's, or its votes are no share.
+        """
+        scores = answers[f"{task}_scores"]
+        shares = scores.tolist()
+        if label >= len(shares) or not 0.0 <= shares[label] <= 1.0:
+            raise self._broken(f"{task} is answered by label {label} of {len(shares)}")
         novelty = float(answers.get("novelty", 0.0))
-        decisions: dict[str, Decision] = {}
-        for task, entry in tasks.items():
-            index = int(labels[task])
-            scores = answers[f"{task}_scores"]
-            shares = scores.tolist()
-            if index >= len(shares) or not 0.0 <= shares[index] <= 1.0:
-                raise self._broken(
-                    f"{task} is answered by label {index} of {len(shares)}"
-                )
-            decisions[task] = Decision(
-                label=entry.labels[index],
-                confidence=self._confidence(
-                    task, point, distances[task], index, novelty
-                ),
-                votes=shares[index],
-                scores=scores,
-                distances=answers[f"{task}_distances"],
-                neighbours=answers[f"{task}_neighbours"],
-                tie=shares.count(max(shares)) > 1,
-                label_distances=distances[task],
-                out_of_range=bool(answers["out_of_range"] > 0.0),
-                novelty=novelty,
-            )
-        return decisions
+        return Decision(
+            label=self.info.tasks[task].labels[label],
+            confidence=self._confidence(
+                task, decision_point, distances, label, novelty
+            ),
+            votes=shares[label],
+            scores=scores,
+            distances=answers[f"{task}_distances"],
+            neighbours=answers[f"{task}_neighbours"],
+            tie=shares.count(max(shares)) > 1,
+            label_distances=distances,
+            out_of_range=bool(answers["out_of_range"] > 0.0),
+            novelty=novelty,
+        )
 
     def _confidence(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -90,18 +91,24 @@ class Novelty:
         Raises:
             InputError: the table is damaged.
         """
-        rates, rows = table.numbers("rates"), table.get("limits")
+        rates = table.numbers("rates")
+        rows = table.get("limits")
         if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
             raise table.fail(
                 "limits", f"{points} rows of a number for each of the rates"
             )
-        lines = (
+        lines = [
             ConfigTable({"limits": row}, table.where, table.prefix) for row in rows
-        )
+        ]
         limits = tuple(line.numbers("limits", len(rates)) for line in lines)
-        falling = all(a > b for a, b in pairwise((1.0, *rates, 0.0)))
-        if not falling:
+        if not _rise((0.0, *rates[::-1], 1.0), strictly=True):
             raise table.fail("rates", "numbers between 0 and 1 that fall")
-        if any(a > b for line in limits for a, b in pairwise((0.0, *line))):
+        if not all(_rise((0.0, *line)) for line in limits):
             raise table.fail("limits", "rows of numbers from 0 on that rise")
         return cls(table.text("task"), rates, limits)
+
+
+def _rise(numbers: Sequence[float], *, strictly: bool = False) -> bool:
+    """Whether each number is at least the one before it, or above it."""
+    compare = operator.lt if strictly else operator.le
+    return all(compare(before, after) for before, after in pairwise(numbers))

@@ -229,28 +229,30 @@ def answers(
 ) -> dict[str, NDArray[Any]]:
     """{key: the graph's output} for the vectors of a golden file, each at its decision
     point."""
-    ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
-    seen = {"": _outputs(model, arrays["vectors"])}
+    outputs = _outputs(model, arrays["vectors"])
+    results = _named(model, outputs, "")
     if model.info.decision_points_s:
         rows = enumerate(arrays["decision_point_vectors"])
         points = [_outputs(model, vectors, point) for point, vectors in rows]
-        seen["decision_point_"] = {
-            key: np.stack([p[key] for p in points]) for key in points[0]
-        }
-    results = {
-        f"{task}_{prefix}{end}": outputs[f"{task}_{end}"]
-        for prefix, outputs in seen.items()
-        for task in model.info.tasks
-        for end in ends
-    }
-    labels = [f"{task}_label" for task in model.info.tasks]
-    for prefix, outputs in seen.items():
-        # What follows from a vector that is not finite may differ.
-        answered = np.min([outputs[label] for label in labels], axis=0) >= 0
-        for end in OF_ALL_TASKS:
-            if end in outputs:
-                results[f"{prefix}{end}"] = np.where(answered, outputs[end], 0.0)
+        stacked = {key: np.stack([p[key] for p in points]) for key in points[0]}
+        results |= _named(model, stacked, "decision_point_")
     return results
+
+
+def _named(
+    model: Model, outputs: Mapping[str, NDArray[Any]], prefix: str
+) -> dict[str, NDArray[Any]]:
+    """Outputs as a golden file names them; the prefix tells its two kinds of vectors
+    apart."""
+    ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
+    tasks = model.info.tasks
+    named = {f"{t}_{prefix}{end}": outputs[f"{t}_{end}"] for t in tasks for end in ends}
+    # What follows from a vector that is not finite may differ.
+    answered = np.min([outputs[f"{task}_label"] for task in tasks], axis=0) >= 0
+    for end in OF_ALL_TASKS:
+        if end in outputs:
+            named[f"{prefix}{end}"] = np.where(answered, outputs[end], 0.0)
+    return named
 
 
 def _outputs(

@@ -147,7 +147,12 @@ class WatchfulTracker(ContactTracker):
             self._early = []
             return self._advance(frame, active)
         valid = ~aside if frame.valid is None else frame.valid & ~aside
-        beside = self._active(frame, valid)
+        return self._beside(frame, active, self._active(frame, valid), age_s)
+
+    def _beside(
+        self, frame: Frame, active: ActiveTaxels, beside: ActiveTaxels, age_s: float
+    ) -> list[Contact]:
+        """Follow the active taxels `beside` those that are set aside."""
         if self._early and age_s <= EARLY_S and _grown(active, beside):
             return self._touched(frame, active, age_s)
         if age_s == 0.0 or (self._early and age_s <= self._longest_s):
