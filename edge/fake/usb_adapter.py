@@ -132,11 +132,17 @@ class UsbAdapter:
         if standard or not FUNCTIONS <= request < TRANSFER + 4:
             raise bus_error(errno.EOPNOTSUPP, self.bus.name)
         if request < TRANSFER:
-            return {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}[
-                request
-            ]
-        message = read(index, length) if value & I2C_M_RD else write(index, data)
-        begins, ends = request - TRANSFER & BEGIN, request - TRANSFER & END
+            own = {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}
+            return own[request]
+        return self._transfer(request, value, index, length, data)
+
+    def _transfer(
+        self, request: int, value: int, address: int, length: int, data: bytes
+    ) -> bytes:
+        """Carry a message to the bus, once its last part is there."""
+        message = read(address, length) if value & I2C_M_RD else write(address, data)
+        begins = request - TRANSFER & BEGIN
+        ends = request - TRANSFER & END
         self._messages = [message] if begins else [*self._messages, message]
         self._status = ACKNOWLEDGED
         if message.read and not ends:

@@ -6,7 +6,8 @@ scaled and cut off at the training data's reach. Its squared distance to a trial
 feature f brings the touch to the trial than its mean would.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -180,55 +181,127 @@ def explain(
         widths: columns of each.
         truth: index of the label that is right, if it is known: the rival then has it.
     """
-    feature_of = np.repeat(features, widths)[space.columns]
-    members = {name: feature_of == name for name in features if name in feature_of}
-    differences = space.differences(vector)
-    shifts = np.array([differences[c] @ space.weights[c] for c in members.values()])
-    z = space.coordinates(differences)
-    squares = ((space.rows - z) ** 2).sum(axis=1)
-
-    def pulls(towards: NDArray[np.float64]) -> dict[str, float]:
-        by_feature = zip(members, (2.0 * shifts @ towards).tolist(), strict=True)
-        return dict(sorted(by_feature, key=lambda pull: -abs(pull[1])))
-
-    def near(row: int) -> Near:
-        distance = float(np.sqrt(squares[row]))
-        return Near(row, int(space.labels[row]), distance, pulls(space.rows[row]))
-
-    nearest, answered = tuple(map(near, voters)), space.labels == label
+    touch = _Touch.of(space, vector, features, widths)
+    nearest = tuple(map(touch.near, voters))
+    answered = space.labels == label
     others = space.labels == truth
     if truth == label or not others.any():
         others = ~answered & (space.labels >= 0)
     if not others.any():
         return Explanation(nearest)
-    ally, rival = (
-        int(np.where(rows, squares, np.inf).argmin()) for rows in (answered, others)
-    )
-    pulled = pulls(space.rows[ally] - space.rows[rival])
-    if space.vote(z, len(voters)) != label:
-        return Explanation(nearest, near(rival), pulled)
+    ally = touch.nearest(answered)
+    rival = touch.nearest(others)
+    pulls = touch.pulls(space.rows[ally] - space.rows[rival])
+    if space.vote(touch.z, len(voters)) != label:
+        return Explanation(nearest, touch.near(rival), pulls)
     # A vote changes where a trial of another label comes as near as the last one for
     # the answer.
-    votes = np.isin(np.arange(len(squares)), voters)
-    leaves = np.where(votes & answered, squares, -np.inf).argmax()
-    joins = np.where(others & ~votes, squares, np.inf).argmin()
+    votes = np.isin(np.arange(len(touch.squares)), voters)
+    leaves = np.where(votes & answered, touch.squares, -np.inf).argmax()
+    joins = touch.nearest(others & ~votes)
     direction = space.rows[leaves] - space.rows[joins]
-    changes = []
-    for name, columns in members.items():
-        slope = 2.0 * space.weights[columns] @ direction
+    gap = min(touch.squares[leaves] - touch.squares[joins], 0.0)
+    changes = [
+        change
+        for name in touch.members
+        if (change := touch.change(name, direction, gap, len(voters), label))
+    ]
+    changes.sort(key=lambda change: change.spread)
+    ordered = tuple(change.least for change in changes)
+    return Explanation(nearest, touch.near(rival), pulls, ordered)
+
+
+class _Sized(NamedTuple):
+    """A change, and its mean square in deviations of the training trials."""
+
+    spread: float
+    least: Change
+
+
+@dataclass(frozen=True)
+class _Touch:
+    """A touch in a task's space.
+
+    Attributes:
+        space: of the task.
+        members: {feature: (columns,) whether each column of the space is of it}.
+        differences: (p,) from the mean, scaled.
+        shifts: (features, c) how far each feature moves the touch from the mean.
+        z: (c,) its coordinates.
+        squares: (n,) squared distances of the training trials.
+    """
+
+    space: Space
+    members: Mapping[str, NDArray[np.bool_]]
+    differences: NDArray[np.float64]
+    shifts: NDArray[np.float64]
+    z: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls,
+        space: Space,
+        vector: NDArray[np.float64],
+        features: Sequence[str],
+        widths: Sequence[int],
+    ) -> Self:
+        """The touch of a feature vector (width,), with the features' names and
+        widths."""
+        feature_of = np.repeat(features, widths)[space.columns]
+        members = {name: feature_of == name for name in features if name in feature_of}
+        differences = space.differences(vector)
+        shifts = [differences[c] @ space.weights[c] for c in members.values()]
+        z = space.coordinates(differences)
+        squares = ((space.rows - z) ** 2).sum(axis=1)
+        return cls(space, members, differences, np.array(shifts), z, squares)
+
+    def pulls(self, towards: NDArray[np.float64]) -> dict[str, float]:
+        """{feature: how much it pulls in a direction (c,)}, the strongest first."""
+        strengths = (2.0 * self.shifts @ towards).tolist()
+        by_feature = zip(self.members, strengths, strict=True)
+        return dict(sorted(by_feature, key=lambda pull: -abs(pull[1])))
+
+    def near(self, row: int) -> Near:
+        """A training trial beside the touch."""
+        distance = float(np.sqrt(self.squares[row]))
+        label = int(self.space.labels[row])
+        return Near(row, label, distance, self.pulls(self.space.rows[row]))
+
+    def nearest(self, among: NDArray[np.bool_]) -> int:
+        """The nearest training trial of some (n,)."""
+        return int(np.where(among, self.squares, np.inf).argmin())
+
+    def change(
+        self,
+        feature: str,
+        direction: NDArray[np.float64],
+        gap: float,
+        k: int,
+        label: int,
+    ) -> _Sized | None:
+        """The least change of a feature that gives k voters another label, if any.
+
+        Args:
+            feature: its name.
+            direction: (c,) from the trial that is to join the voters to the one that is
+                to leave them.
+            gap: of their squared distances, at most 0.
+            k: how many vote.
+            label: of the answer.
+        """
+        columns = self.members[feature]
+        slope = 2.0 * self.space.weights[columns] @ direction
         if not slope.any():
-            continue
-        step = slope * (min(squares[leaves] - squares[joins], 0.0) / (slope @ slope))
+            return None
+        step = slope * (gap / (slope @ slope))
         for times in STEPS:
-            changed = differences.copy()
+            changed = self.differences.copy()
             changed[columns] += times * step
-            answer = space.vote(space.coordinates(changed), len(voters))
+            answer = self.space.vote(self.space.coordinates(changed), k)
             if answer != label:
-                x = times * step / space.gain[columns]
-                change = Change(
-                    name, answer, float(np.sqrt((x**2).mean())), float(x.mean())
-                )
-                changes.append((times**2 * (step**2).mean(), change))
-                break
-    ordered = tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))
-    return Explanation(nearest, near(rival), pulled, ordered)
+                x = times * step / self.space.gain[columns]
+                size = float(np.sqrt((x**2).mean()))
+                least = Change(feature, answer, size, float(x.mean()))
+                return _Sized(times**2 * (step**2).mean(), least)
+        return None

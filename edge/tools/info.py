@@ -72,21 +72,29 @@ def change_text(key: str, a: Any, b: Any) -> str:
     """A difference for a person: of names, which only one of the models has."""
     if key in COARSE:
         return f"{key}: differs"
+    if key == "trials":
+        return _list_change(key, _file_names(a or []), _file_names(b or []))
     if isinstance(a, list) or isinstance(b, list):
-        a = a or []
-        b = b or []
-        if key == "trials":
-            a = _file_names(a)
-            b = _file_names(b)
-        gone, new = [x for x in a if x not in b], [x for x in b if x not in a]
-        texts = [
-            f"{sign} {_some(side)}" for sign, side in (("-", gone), ("+", new)) if side
-        ]
-        return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
+        return _list_change(key, a or [], b or [])
+    return f"{key}: {_value_text(key, a)} -> {_value_text(key, b)}"
+
+
+def _list_change(key: str, a: list[Any], b: list[Any]) -> str:
+    """What only one of two lists holds."""
+    only_a = [value for value in a if value not in b]
+    only_b = [value for value in b if value not in a]
+    texts = []
+    if only_a:
+        texts.append(f"- {_some(only_a)}")
+    if only_b:
+        texts.append(f"+ {_some(only_b)}")
+    return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
+
+
+def _value_text(key: str, value: Any) -> str:
     if key.endswith(".accuracy"):
-        a, b = f"{a:.1%}", f"{b:.1%}"
-    a, b = ("a table" if isinstance(value, dict) else value for value in (a, b))
-    return f"{key}: {a} -> {b}"
+        return f"{value:.1%}"
+    return "a table" if isinstance(value, dict) else str(value)
 
 
 def _file_names(trials: list[str]) -> list[str]:
@@ -103,7 +111,6 @@ def _some(values: list[Any]) -> str:
 
 def description(info: ModelInfo, about: dict[str, Any]) -> str:
     """The description for a person."""
-    skin, chain = info.layout, info.chain
     named = f"{info.name} " if info.name else ""
     size = f"{about['bytes'] / 1024:.0f} kB, format {about['format']}"
     lines = [f"{about['file']}: {named}{about['version']}, {size}", ""]
@@ -123,22 +130,33 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
     if info.decision_points_s and not info.taught:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
-    wraps = ", closed around" if skin.wraps else ""
-    versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
-    for sentence in (
-        f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above "
-        f"{skin.threshold_counts} "
-        f"counts, onset above {skin.onset}; force in {skin.force_unit}s.",
-        "Arm: none; contact motion is measured on the skin."
-        if chain is None
-        else f"Arm: {chain.base} to {chain.tip}, joints {', '.join(chain.names)}.",
-        f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with "
-        f"{versions}.",
-        f"Taught {info.taught} of them on a board: accuracies are those from before, "
-        "and no error "
-        "rate is certified."
-        if info.taught
-        else "",
-    ):
+    for sentence in _origin(info):
         lines += wrapped(sentence)
     return "\n".join(lines)
+
+
+def _origin(info: ModelInfo) -> list[str]:
+    """Sentences on the skin, the arm and the trials of a model."""
+    skin = info.layout
+    wraps = ", closed around" if skin.wraps else ""
+    sentences = [
+        f"Skin: {skin.rows} x {skin.cols} taxels{wraps}; contact above "
+        f"{skin.threshold_counts} counts, onset above {skin.onset}; force in "
+        f"{skin.force_unit}s."
+    ]
+    if info.chain is None:
+        sentences.append("Arm: none; contact motion is measured on the skin.")
+    else:
+        names = ", ".join(info.chain.names)
+        sentences.append(f"Arm: {info.chain.base} to {info.chain.tip}, joints {names}.")
+    versions = ", ".join(f"{name} {version}" for name, version in info.versions.items())
+    sentences.append(
+        f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with "
+        f"{versions}."
+    )
+    if info.taught:
+        sentences.append(
+            f"Taught {info.taught} of them on a board: accuracies are those from "
+            "before, and no error rate is certified."
+        )
+    return sentences

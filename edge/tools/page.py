@@ -224,24 +224,33 @@ class Page:
             self.recording = bool(action.get("on"))
         elif kind == "undo":
             self._take_back(self._folder)
-        elif kind not in ("relabel", "accept", "delete"):
-            raise InputError(f"{kind!r} is no action")
-        elif (name := action.get("file")) not in list(self._trials):
-            raise InputError(f"{name!r} is none of the trials that this page shows")
+        elif kind in ("relabel", "accept", "delete"):
+            self._change(self._folder, action)
         else:
-            path = self._folder / str(name)
-            before = read_bytes(path, LARGEST_BYTES)
-            if kind == "delete":
-                with refusing(f"{path}: cannot be deleted"):
-                    path.unlink(missing_ok=True)
-                del self._trials[path.name]
-                self._version += 1
-            elif kind == "accept":
-                self._relabel(path, self._accepted(path))
-            else:
-                self._relabel(path, _labels(action))
-            self._undo = path.name, before
+            raise InputError(f"{kind!r} is no action")
         return None
+
+    def _change(self, folder: Path, action: dict[str, Any]) -> None:
+        """Label or delete a trial, so that it can be taken back.
+
+        Raises:
+            InputError: the page shows no such trial, or it cannot be read or written.
+        """
+        name = action.get("file")
+        if name not in list(self._trials):
+            raise InputError(f"{name!r} is none of the trials that this page shows")
+        path = folder / str(name)
+        before = read_bytes(path, LARGEST_BYTES)
+        if action["do"] == "delete":
+            with refusing(f"{path}: cannot be deleted"):
+                path.unlink(missing_ok=True)
+            del self._trials[path.name]
+            self._version += 1
+        elif action["do"] == "accept":
+            self._relabel(path, self._accepted(path))
+        else:
+            self._relabel(path, _labels(action))
+        self._undo = path.name, before
 
     def _accepted(self, path: Path) -> dict[str, str]:
         """The labels that accept a kept touch's decisions.

@@ -12,7 +12,7 @@ import argparse
 import math
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
 from edge.commands.output import LOG
-from edge.commands.source import Opened, reading
+from edge.commands.source import Opened, Reading, reading
 from edge.errors import InputError
 from edge.files import NameTaken, check_writable, refusing
 from edge.output.event_writer import Lines
@@ -218,25 +218,46 @@ def run(arguments: argparse.Namespace) -> int:
         names = _joint_names(arguments, live.opened, arm)
         meta = _metadata(live.opened, arm)
         recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
-        choices = arguments.label if by_key else []
         LOG.info("waiting for a contact" + (KEYS if by_key else ""))
+        choices = arguments.label if by_key else []
         for digit, (task, label) in zip(DIGITS, choices, strict=False):
             LOG.info(f"  {digit}  {task}={label}")
-        most = arguments.trials if folder else 1
-        trials = Trials(live.skin, arguments.length)
-        for frame, faults in live.frames():
-            lines.write(faults)
-            pressed = typed()
-            for key in pressed if by_key else "":
+
+        def press() -> None:
+            keys = typed()
+            for key in keys if by_key else "":
                 recorder.press(key, choices)
-            live.show(frame, faults)
-            recorder.follow(trials)
-            recorder.save(trials.push(frame), complete=True)
-            if recorder.count == most:
-                break
-        if recorder.count != most:
-            recorder.save(trials.rest(), complete=False)
+
+        most = arguments.trials if folder else 1
+        _record(live, recorder, Trials(live.skin, arguments.length), press, most)
     return _status(arguments, recorder, live.skin)
+
+
+def _record(
+    live: Reading,
+    recorder: Recorder,
+    trials: Trials,
+    press: Callable[[], None],
+    most: int | None,
+) -> None:
+    """Save trials until there are enough, or the skin's reading ends.
+
+    Args:
+        live: the reading of the skin.
+        recorder: saves the trials.
+        trials: cuts the frames into trials.
+        press: takes in the keys that were pressed.
+        most: how many trials are enough; None for any number.
+    """
+    for frame, faults in live.frames():
+        recorder.lines.write(faults)
+        press()
+        live.show(frame, faults)
+        recorder.follow(trials)
+        recorder.save(trials.push(frame), complete=True)
+        if recorder.count == most:
+            return
+    recorder.save(trials.rest(), complete=False)
 
 
 def _labels(
@@ -385,13 +406,18 @@ class Recorder:
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
         """Save the frames of a trial, if there is one and it is to be saved."""
-        if frames is None or not self.recording:
-            if frames is not None and self.page is not None and self.page.recording:
-                LOG.warning(
-                    "recording was switched on during the touch, whose onset is missing: "
-                    "it is not saved"
-                )
+        if frames is None:
             return
+        if self.recording:
+            self._save(frames, complete)
+        elif self.page is not None and self.page.recording:
+            LOG.warning(
+                "recording was switched on during the touch, whose onset is missing: "
+                "it is not saved"
+            )
+
+    def _save(self, frames: list[Frame], complete: bool) -> None:
+        """Save the frames of a trial under the next free name."""
         unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
         if self.names is not None and unposed < len(frames):

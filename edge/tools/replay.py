@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -235,11 +235,15 @@ def _matrix(pairs: Counter[tuple[str, str]]) -> str:
     heads = [str(i + 1) for i in range(len(decided))] if numbered else decided
     names = [f"{decided.index(t) + 1:>3}  {t}" if numbered else t for t in truths]
     width = max(map(len, names))
-    rows = [[str(pairs[truth, label] or ".") for label in decided] for truth in truths]
-    return "\n".join(
-        f"{name:<{width}}"
-        + "".join(
-            f"  {cell:>{max(len(h), 3)}}" for cell, h in zip(cells, heads, strict=True)
-        )
-        for name, cells in zip(["", *names], [heads, *rows], strict=True)
-    )
+    widths = [max(len(head), 3) for head in heads]
+    lines = [" " * width + _cells(heads, widths)]
+    for name, truth in zip(names, truths, strict=True):
+        counts = [str(pairs[truth, label] or ".") for label in decided]
+        lines.append(f"{name:<{width}}{_cells(counts, widths)}")
+    return "\n".join(lines)
+
+
+def _cells(texts: Sequence[str], widths: Sequence[int]) -> str:
+    """Texts in columns of some widths."""
+    columns = zip(texts, widths, strict=True)
+    return "".join(f"  {text:>{width}}" for text, width in columns)

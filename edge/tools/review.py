@@ -74,12 +74,16 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     if not labels or any(task not in labels for task in decided):
         found.add("unlabelled")
     for task, answer in decided.items():
-        confidence = answer["confidence"]
-        if confidence is None or confidence < UNSURE or UNKNOWN in answer["flags"]:
+        if _is_unsure(answer):
             found.add("unsure")
         if task in labels and labels[task] != answer["label"]:
             found.add("wrong")
     return [kind for kind in KINDS if kind in found]
+
+
+def _is_unsure(answer: Mapping[str, Any]) -> bool:
+    confidence = answer["confidence"]
+    return confidence is None or confidence < UNSURE or UNKNOWN in answer["flags"]
 
 
 def accepted(meta: Mapping[str, Any]) -> dict[str, str]:

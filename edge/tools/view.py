@@ -10,13 +10,14 @@ import argparse
 import shutil
 import sys
 import textwrap
+from collections.abc import Iterable
 from contextlib import nullcontext
 
 from edge.classifier import Classifier
 from edge.commands.options import add_reading
 from edge.commands.source import reading
 from edge.errors import printable
-from edge.events import Decided, Onset
+from edge.events import Decided, Event, Onset
 from edge.model.model import Model
 from edge.tools import arrows, terminal
 from edge.touch.frame import Frame
@@ -86,14 +87,19 @@ def run(arguments: argparse.Namespace) -> int:
             typed()  # q ends the loop
             events = [] if classifier is None else classifier.push(frame)
             live.show(frame, faults, events)
-            for event in events:
-                if isinstance(event, Onset):
-                    decisions = dict.fromkeys(tasks, "in contact")
-                elif isinstance(event, Decided):
-                    decisions[event.task] = decision_text(event)
+            _follow(events, decisions)
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
                 print(
                     terminal.screen(draw(frame, layout, decisions)), end="", flush=True
                 )
     return 0
+
+
+def _follow(events: Iterable[Event], decisions: dict[str, str]) -> None:
+    """Show events in {task: the text of its decision}."""
+    for event in events:
+        if isinstance(event, Onset):
+            decisions.update(dict.fromkeys(decisions, "in contact"))
+        elif isinstance(event, Decided):
+            decisions[event.task] = decision_text(event)

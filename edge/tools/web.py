@@ -231,24 +231,29 @@ class WebServer:
             return
         browser.taken += piece
         request, found, rest = browser.taken.partition(b"\r\n")
-        if not found:
-            if len(browser.taken) > LARGEST_HEAD:
-                self._answer(browser, HTTPStatus.REQUEST_URI_TOO_LONG)
-            return
+        if found:
+            self._take_request(browser, request, rest)
+        elif len(browser.taken) > LARGEST_HEAD:
+            self._answer(browser, HTTPStatus.REQUEST_URI_TOO_LONG)
+
+    def _take_request(self, browser: Browser, request: bytes, rest: bytes) -> None:
+        """Take in a request's first line and what has come after it.
+
+        The token is looked at before anything else is read.
+        """
         method, path, query = _parts(request)
         if path not in OPEN and not self._has_token(query):
             kind = "text/plain; charset=utf-8"
             self._answer(browser, HTTPStatus.UNAUTHORIZED, WRONG_TOKEN, kind)
             return
-        head, found, body = rest.partition(b"\r\n\r\n")
-        if rest.startswith(b"\r\n"):
-            head, found, body = b"", b"\r\n", rest[2:]
+        # A head without fields ends with the first line.
+        head, found, body = (b"\r\n" + rest).partition(b"\r\n\r\n")
         if not found:
             if len(browser.taken) > LARGEST_HEAD:
                 status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
                 self._answer(browser, status)
             return
-        fields = _fields(head)
+        fields = _fields(head.removeprefix(b"\r\n"))
         if not self._is_for_us(fields, browser):
             self._answer(browser, HTTPStatus.FORBIDDEN, b"another host or origin")
         elif method == "POST":
