@@ -156,6 +156,18 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
+def _check_target(target: Path) -> None:
+    """Refuse a name that no file can have, and that of what is no regular file."""
+    if "\0" in target.name:
+        raise InputError(
+            f"{target}: a file's name cannot hold a null character; choose another"
+        )
+    # Renamed by root, a file would take the place of /dev/null.
+    with suppress(OSError):  # the writing says why
+        if target.exists() and not target.is_file():
+            raise InputError(f"{target}: cannot be written: it is not a regular file")
+
+
 @contextmanager
 def write_whole(
     path: str | os.PathLike[str], *, overwrite: bool = True, lasting: bool = True
@@ -178,17 +190,11 @@ def write_whole(
     """
     target = Path(path)
     folder = target.parent
-    if "\0" in target.name:
-        raise InputError(
-            f"{target}: a file's name cannot hold a null character; choose another"
-        )
+    _check_target(target)
     # The target's own name may already have the greatest length that the file system
     # allows.
     temporary = folder / f"{PREFIX}{os.urandom(8).hex()}"
     try:
-        # Renamed by root, a file would take the place of /dev/null.
-        if target.exists() and not target.is_file():
-            raise InputError(f"{target}: cannot be written: it is not a regular file")
         folder.mkdir(parents=True, exist_ok=True)
         with open(temporary, "xb") as file:
             with suppress(OSError):  # not every file system has locks

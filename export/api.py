@@ -87,25 +87,10 @@ def describe(
     """
     folder, trials = names(dataset)
 
-    def no_contact(task: str) -> str | None:
-        labels = {*classifier.classes_[task], *dataset.untouched_labels(task)}
-        return NO_CONTACT if NO_CONTACT in labels else None
-
     return ModelInfo(
         tasks={
-            task: Task(
-                labels=tuple(map(str, classifier.classes_[task])),
-                k=choice.k,
-                components=classifier.components_[task],
-                scaling=choice.scaling,
-                accuracy=chosen[task].accuracy.accuracy if task in chosen else 0.0,
-                projection=choice.projection,
-                features=choice.features,
-                left_out=chosen[task].left_out if task in chosen else TRIAL,
-                no_contact=no_contact(task),
-                factors=classifier.products_.get(task, {}),
-            )
-            for task, choice in classifier.choices.items()
+            task: _task(dataset, classifier, task, chosen.get(task))
+            for task in classifier.choices
         },
         layout=dataset.layout,
         debounce=DEBOUNCE,
@@ -136,6 +121,26 @@ def describe(
         usual={} if sequential is None else usual_ranges(dataset, window_s, samples),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
+    )
+
+
+def _task(
+    dataset: DataSet, classifier: ContactClassifier, task: str, chosen: Chosen | None
+) -> Task:
+    """What the metadata say of a task, whose settings need not have been chosen."""
+    choice = classifier.choices[task]
+    labels = {*classifier.classes_[task], *dataset.untouched_labels(task)}
+    return Task(
+        labels=tuple(map(str, classifier.classes_[task])),
+        k=choice.k,
+        components=classifier.components_[task],
+        scaling=choice.scaling,
+        accuracy=0.0 if chosen is None else chosen.accuracy.accuracy,
+        projection=choice.projection,
+        features=choice.features,
+        left_out=TRIAL if chosen is None else chosen.left_out,
+        no_contact=NO_CONTACT if NO_CONTACT in labels else None,
+        factors=classifier.products_.get(task, {}),
     )
 
 

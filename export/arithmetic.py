@@ -70,21 +70,22 @@ def in_float32(model: onnx.ModelProto) -> onnx.ModelProto:
     for value in (*graph.input, *graph.output, *graph.value_info):
         if value.type.tensor_type.elem_type == TensorProto.DOUBLE:
             value.type.tensor_type.elem_type = TensorProto.FLOAT
-    stored = {tensor.name for tensor in graph.initializer}
     for node in graph.node:
-        for attribute in node.attribute:
-            if node.op_type == "Cast" and attribute.i == TensorProto.DOUBLE:
-                attribute.i = TensorProto.FLOAT
-            elif attribute.HasField("t"):
-                _round_to_float32(attribute.t)
+        _compute_in_float32(node)
     # Matrices are stored in float32 already; nothing is left to convert.
-    casts = [
-        node
-        for node in graph.node
-        if node.op_type == "Cast" and node.input[0] in stored
-    ]
-    _without(graph, casts)
+    stored = {tensor.name for tensor in graph.initializer}
+    casts = [node for node in graph.node if node.op_type == "Cast"]
+    _without(graph, [node for node in casts if node.input[0] in stored])
     return copy
+
+
+def _compute_in_float32(node: onnx.NodeProto) -> None:
+    """Give a node's attributes float32 for float64."""
+    for attribute in node.attribute:
+        if node.op_type == "Cast" and attribute.i == TensorProto.DOUBLE:
+            attribute.i = TensorProto.FLOAT
+        elif attribute.HasField("t"):
+            _round_to_float32(attribute.t)
 
 
 def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:

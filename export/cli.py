@@ -24,7 +24,7 @@ from export.api import measure, save
 from train.choose import LEAVE_OUT, TRIAL
 from train.dataset import read
 from train.feature_sets import SETS
-from train.fitting import MOST_TRIALS, fit
+from train.fitting import MOST_TRIALS, Fitted, fit
 from train.projection import KINDS
 from train.report.summary import summary
 from train.scaling import SCALINGS
@@ -150,26 +150,7 @@ def run(arguments: argparse.Namespace) -> int:
             "tell which is better"
         )
     check_writable(arguments.out)  # before the work, which may take an hour
-    window_s, quick = arguments.window, arguments.quick
-    if arguments.front is not None:
-        front, point = _of_front(arguments)
-        window_s = point.window_s
-        quick = front.quick
-    points = arguments.decision_points
-    if window_s is None and points not in (None, "none"):
-        window_s = WINDOW_S
-    early = (
-        None if points is None else parse_decision_points(points, window_s or WINDOW_S)
-    )
-    fitted = fit(
-        arguments.data,
-        **{name: getattr(arguments, name) for name in FORWARDED},
-        window_s=window_s,
-        decision_points_s=early,
-        arm=open_arm(arguments),
-        quick=quick,
-        progress=True,
-    )
+    fitted = _fit(arguments)
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
     prices = measure(fitted)
@@ -184,6 +165,31 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0
+
+
+def _fit(arguments: argparse.Namespace) -> Fitted:
+    """Fit as the options say."""
+    window_s = arguments.window
+    quick = arguments.quick
+    if arguments.front is not None:
+        front, point = _of_front(arguments)
+        window_s = point.window_s
+        quick = front.quick
+    points = arguments.decision_points
+    if window_s is None and points not in (None, "none"):
+        window_s = WINDOW_S
+    early = None
+    if points is not None:
+        early = parse_decision_points(points, window_s or WINDOW_S)
+    return fit(
+        arguments.data,
+        **{name: getattr(arguments, name) for name in FORWARDED},
+        window_s=window_s,
+        decision_points_s=early,
+        arm=open_arm(arguments),
+        quick=quick,
+        progress=True,
+    )
 
 
 def tested(path: Path, former: str | None, recordings: Sequence[str]) -> str:
@@ -235,25 +241,30 @@ def parse_decision_points(text: str, window_s: float) -> tuple[float, ...]:
     """
     if text == "none":
         return ()
-    wrong = InputError(
-        f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds "
-        "above 0) "
-        f"or none, not {text!r}"
-    )
     try:
-        if ":" in text:
-            first, last, step = map(float, text.split(":"))
-            if not (0.0 < first <= last <= LONGEST_S and step >= 0.01):
-                raise wrong
-            count = int((last - first) / step + 1e-9) + 1
-            decision_points = {round(first + i * step, 9) for i in range(count)}
-        else:
-            decision_points = {float(part) for part in text.split(",")}
+        points = _rising(text) if ":" in text else [*map(float, text.split(","))]
+        if not all(0.0 < point <= LONGEST_S for point in points):
+            raise ValueError
     except ValueError:
-        raise wrong from None
-    if not all(0.0 < point <= LONGEST_S for point in decision_points):
-        raise wrong
-    return (*sorted(point for point in decision_points if point < window_s), window_s)
+        raise InputError(
+            f"--decision-points must be like {DECISION_POINTS} or 0.3,0.6,1.2 (seconds "
+            f"above 0) or none, not {text!r}"
+        ) from None
+    early = {point for point in points if point < window_s}
+    return (*sorted(early), window_s)
+
+
+def _rising(text: str) -> list[float]:
+    """The points of `a:b:step`.
+
+    Raises:
+        ValueError: the text has another form, or the points would not rise to b.
+    """
+    first, last, step = map(float, text.split(":"))
+    if not (0.0 < first <= last <= LONGEST_S and step >= 0.01):
+        raise ValueError
+    count = int((last - first) / step + 1e-9) + 1
+    return [round(first + i * step, 9) for i in range(count)]
 
 
 def main(argv: Sequence[str] | None = None) -> int:

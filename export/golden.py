@@ -1,6 +1,7 @@
 """golden.npz: see `edge.model.verify` for the format."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from edge.model.model import Model
 from edge.model.verify import answers, first_series
 from edge.recording import Recording
 from edge.saving import save_arrays
+from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet
 
 TRIALS = 24
@@ -57,55 +59,93 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     Vectors are the trials' own, training vectors (distance exactly 0), others between
     and beyond them, and two that are not finite (label -1).
     """
-    info = model.info
-    recordings: list[Recording] = []
-    contacts: list[tuple[float, Any]] = []
-    for i in trials_of(dataset, TRIALS):
-        trial = dataset.trials[i]
-        recording = trimmed(trial.recording, trial.onset_s, model)
-        contact = first_series(recording, model)
-        if contact is not None:
-            recordings.append(recording)
-            contacts.append(contact)
-    rng = np.random.default_rng(20120101)
-    own = np.stack([info.vector(s) for _, s in contacts])
-    rows = X[rng.permutation(len(X))[: VECTORS // 2]]
-    pairs = rng.integers(0, len(X), (VECTORS // 2, 2))
-    weight = rng.uniform(-0.5, 1.5, (len(pairs), 1))
-    mixed = X[pairs[:, 0]] + weight * (X[pairs[:, 1]] - X[pairs[:, 0]])
-    wrong = np.repeat(own[:1], 2, axis=0)
-    wrong[0, 5], wrong[1, -1] = np.nan, np.inf
-    vectors = np.concatenate([own, rows, mixed, wrong])
-    arrays: dict[str, NDArray[Any]] = {
-        "start": np.cumsum([0, *(len(r.t) for r in recordings)]),
-        "t": np.concatenate([r.t for r in recordings]),
-        "frames": np.concatenate([r.frames for r in recordings]),
-        "valid": np.concatenate([r.valid for r in recordings if r.valid is not None]),
-        "onset_s": np.array([onset for onset, _ in contacts]),
-        "series_start": np.cumsum([0, *(len(s.t) for _, s in contacts)]),
-        "series_t": np.concatenate([s.t for _, s in contacts]),
-        "series_counts": np.concatenate([s.integers for _, s in contacts]),
-        "vectors": vectors,
+    contacts = _contacts(model, dataset)
+    recordings = [contact.recording for contact in contacts]
+    series = [contact.series for contact in contacts]
+    arrays = {
+        **_frames(model, recordings),
+        "onset_s": np.array([contact.onset_s for contact in contacts]),
+        "series_start": _starts([len(course.t) for course in series]),
+        "series_t": np.concatenate([course.t for course in series]),
+        "series_counts": np.concatenate([course.integers for course in series]),
+        "vectors": _vectors(model, series, X),
     }
-    if info.dof is not None:
-        arrays["joints"] = np.concatenate(
-            [r.joints for r in recordings if r.joints is not None]
-        )
-    if info.layout.axes:
-        arrays["shear"] = np.concatenate(
-            [r.shear for r in recordings if r.shear is not None]
-        )
-    if info.decision_points_s:
-        windows = info.decision_points_s
-        early = np.array(
-            [[info.vector(s, window) for _, s in contacts] for window in windows]
-        )
-        # Besides the trials, which were trained with, points between them.
-        between = 0.5 * (early + np.roll(early, 1, axis=1))
-        arrays["decision_point_vectors"] = np.concatenate([early, between], axis=1)
+    if model.info.decision_points_s:
+        arrays["decision_point_vectors"] = _early_vectors(model, series)
     meta = {
         "skin": recordings[0].meta.get("skin", {}),
         "bounds": BOUNDS,
-        "model": info.data_digest,
+        "model": model.info.data_digest,
     }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)
+
+
+@dataclass(frozen=True)
+class _Contact:
+    """The first contact of a trial that a golden file holds."""
+
+    recording: Recording
+    onset_s: float
+    series: FeatureSeries
+
+
+def _contacts(model: Model, dataset: DataSet) -> list[_Contact]:
+    contacts = []
+    for i in trials_of(dataset, TRIALS):
+        trial = dataset.trials[i]
+        recording = trimmed(trial.recording, trial.onset_s, model)
+        first = first_series(recording, model)
+        if first is not None:
+            contacts.append(_Contact(recording, *first))
+    return contacts
+
+
+def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
+    """Where parts of some lengths start and end that are laid end to end."""
+    return np.cumsum([0, *lengths])
+
+
+def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, NDArray[Any]]:
+    """The frames of recordings, end to end, with the angles and the shear that the
+    model needs."""
+    keys = ["t", "frames", "valid"]
+    if model.info.dof is not None:
+        keys.append("joints")
+    if model.info.layout.axes:
+        keys.append("shear")
+    arrays = {"start": _starts([len(recording.t) for recording in recordings])}
+    for key in keys:
+        arrays[key] = np.concatenate([vars(recording)[key] for recording in recordings])
+    return arrays
+
+
+def _vectors(
+    model: Model, series: Sequence[FeatureSeries], X: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The vectors of `write`."""
+    rng = np.random.default_rng(20120101)
+    of_trials = np.stack([model.info.vector(course) for course in series])
+    rows = X[rng.permutation(len(X))[: VECTORS // 2]]
+    first, second = rng.integers(0, len(X), (VECTORS // 2, 2)).T
+    weight = rng.uniform(-0.5, 1.5, (len(first), 1))
+    mixed = X[first] + weight * (X[second] - X[first])
+    wrong = np.repeat(of_trials[:1], 2, axis=0)
+    wrong[0, 5] = np.nan
+    wrong[1, -1] = np.inf
+    return np.concatenate([of_trials, rows, mixed, wrong])
+
+
+def _early_vectors(
+    model: Model, series: Sequence[FeatureSeries]
+) -> NDArray[np.float64]:
+    """(decision points, m, width): the trials, which were trained with, and points
+    between them."""
+    info = model.info
+    early = np.array(
+        [
+            [info.vector(course, window_s) for course in series]
+            for window_s in info.decision_points_s
+        ]
+    )
+    between = 0.5 * (early + np.roll(early, 1, axis=1))
+    return np.concatenate([early, between], axis=1)

@@ -9,7 +9,7 @@ finite with label -1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -126,11 +126,10 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     model: ContactClassifier | SequentialClassifier = operator.raw_operator
     points = _decision_points(model)
     last = points[-1]
-    early = isinstance(model, SequentialClassifier)
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
-    if early:
+    if isinstance(model, SequentialClassifier):
         build.decision_point = build.node("Squeeze", [operator.inputs[1].full_name])
     projected = {
         space: project(
@@ -144,48 +143,58 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     _out_of_range(build, off, names["out_of_range"])
     if isinstance(model, SequentialClassifier):
         _novelty(build, x, model.space_, names["novelty"])
-    for task, choice in model.choices.items():
-        space = last.spaces_[task]
-        grids = [point.projections_[space].grid_ for point in points]
-        units = [grid.unit for grid in grids]
-        members = last.members_[space]
-        rows = []
-        for point, unit in zip(points, units, strict=True):
-            of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
-            of_all[members] = point.rows_[space] / unit
-            rows.append(of_all)
-        labels = np.full(last.n_trials_, -1)
-        labels[members] = last.labels_[task]
-        output = names[f"{task}_label"].removesuffix("_label")
-        # Trials span fewer components at some decision points: there, the rest are
-        # always 0.
-        components = max(point.components_[task] for point in points)
-        squares, length = _squares(
-            build, output, projected[space][0], widened(rows), components, labels < 0
+    for task in model.choices:
+        _task(build, points, task, projected[last.spaces_[task]], names)
+
+
+def _task(
+    build: Builder,
+    points: Sequence[ContactClassifier],
+    task: str,
+    projected: tuple[str, str],
+    names: Mapping[str, str],
+) -> None:
+    """Nodes from coordinates to a task's outputs.
+
+    Args:
+        build: takes the nodes.
+        points: the classifier of each decision point.
+        task: its name.
+        projected: names of the coordinates, and of the excess over the limits.
+        names: {output: its name in the graph}.
+    """
+    last = points[-1]
+    space = last.spaces_[task]
+    k = last.choices[task].k
+    classes = len(last.classes_[task])
+    units = [point.projections_[space].grid_.unit for point in points]
+    members = last.members_[space]
+    rows = []
+    for point, unit in zip(points, units, strict=True):
+        of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
+        of_all[members] = point.rows_[space] / unit
+        rows.append(of_all)
+    labels = np.full(last.n_trials_, -1)
+    labels[members] = last.labels_[task]
+    output = names[f"{task}_label"].removesuffix("_label")
+    # Trials span fewer components at some decision points: there, the rest are always
+    # 0.
+    components = max(point.components_[task] for point in points)
+    z, off = projected
+    squares, length = _squares(build, output, z, widened(rows), components, labels < 0)
+    voters = build.constant([k], np.int64, f"k of {output}")
+    near = ["", names[f"{task}_neighbours"]]
+    values, places = build.nodes("TopK", [squares, voters], near, largest=0, sorted=1)
+    nearest = values, places, length
+    _decide(build, output, labels, classes, k, nearest, units, off)
+    if f"{task}_label_distances" in names:
+        all_squares = build.node("Add", [squares, length])
+        slopes = [point.slopes_[task] for point in points]
+        scales = build.by_decision_point(
+            [u * s for u, s in zip(units, slopes, strict=True)]
         )
-        k = build.constant([choice.k], np.int64, f"k of {output}")
-        near = ["", names[f"{task}_neighbours"]]
-        values, places = build.nodes("TopK", [squares, k], near, largest=0, sorted=1)
-        classes = len(last.classes_[task])
-        nearest = values, places, length
-        _decide(
-            build,
-            output,
-            labels,
-            classes,
-            choice.k,
-            nearest,
-            units,
-            projected[space][1],
-        )
-        if early or last.products_:
-            all_squares = build.node("Add", [squares, length])
-            slopes = [point.slopes_[task] for point in points]
-            scales = build.by_decision_point(
-                [u * s for u, s in zip(units, slopes, strict=True)]
-            )
-            roots = _label_distances(build, output, all_squares, labels, classes)
-            build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
+        roots = _label_distances(build, output, all_squares, labels, classes)
+        build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
 
 
 def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:

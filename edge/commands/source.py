@@ -260,14 +260,23 @@ def reading(
             angles = _joints(arguments.joints, arm, dof, opened)
             joints: JointSource | None = stack.enter_context(angles)
         else:
-            joints = opened.playback if opened.dof else None
-            if model is not None and needs_joints:
-                model.require_joints(opened.dof, opened.source)
+            joints = _own_joints(opened, model if needs_joints else None)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
             live = stack.enter_context(_page(arguments.web, opened, page))
         yield Reading(opened, loop, stop, live, Output.of(arguments))
+
+
+def _own_joints(opened: Opened, model: Model | None) -> JointSource | None:
+    """The joint angles of a skin that no other program's are given for.
+
+    Raises:
+        InputError: the model needs others.
+    """
+    if model is not None:
+        model.require_joints(opened.dof, opened.source)
+    return opened.playback if opened.dof else None
 
 
 @contextmanager

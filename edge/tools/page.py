@@ -210,18 +210,11 @@ class Page:
         if self._folder is None:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
-            if not self._fixed["records"]:
-                self.look()
-            trials = list(self._trials.items())
-            return [{"file": name, **trial} for name, trial in trials]
+            return self._list()
         if kind == "labels":
             self.labels = _labels(action)
         elif kind == "record":
-            if action.get("on") and not self.labels:
-                raise InputError(
-                    "give a label first; a trial without one teaches nothing"
-                )
-            self.recording = bool(action.get("on"))
+            self._switch(bool(action.get("on")))
         elif kind == "undo":
             self._take_back(self._folder)
         elif kind in ("relabel", "accept", "delete"):
@@ -229,6 +222,23 @@ class Page:
         else:
             raise InputError(f"{kind!r} is no action")
         return None
+
+    def _list(self) -> list[dict[str, Any]]:
+        """The trials, as the page shows them."""
+        if not self._fixed["records"]:
+            self.look()
+        trials = list(self._trials.items())
+        return [{"file": name, **trial} for name, trial in trials]
+
+    def _switch(self, on: bool) -> None:
+        """Begin or stop saving trials.
+
+        Raises:
+            InputError: they would have no label.
+        """
+        if on and not self.labels:
+            raise InputError("give a label first; a trial without one teaches nothing")
+        self.recording = on
 
     def _change(self, folder: Path, action: dict[str, Any]) -> None:
         """Label or delete a trial, so that it can be taken back.

@@ -196,11 +196,7 @@ def run(arguments: argparse.Namespace) -> int:
     labels = _labels(arguments, folder, by_key)
     check_writable(trial_path(arguments.out, labels).parent)
     arm = open_arm(arguments)
-    dof = arguments.dof if arm is None else arm.dof
-    if arguments.joints is not None and dof is None:
-        raise InputError(
-            "--joints needs --arm, or --dof, the number of angles in each line"
-        )
+    dof = _dof(arguments, arm)
     with (
         # Angles go by the real clock.
         reading(
@@ -231,6 +227,20 @@ def run(arguments: argparse.Namespace) -> int:
         most = arguments.trials if folder else 1
         _record(live, recorder, Trials(live.skin, arguments.length), press, most)
     return _status(arguments, recorder, live.skin)
+
+
+def _dof(arguments: argparse.Namespace, arm: Chain | None) -> int | None:
+    """How many joint angles are wanted; None where it does not matter.
+
+    Raises:
+        InputError: --joints gives angles, and nothing says how many.
+    """
+    dof: int | None = arguments.dof if arm is None else arm.dof
+    if arguments.joints is not None and dof is None:
+        raise InputError(
+            "--joints needs --arm, or --dof, the number of angles in each line"
+        )
+    return dof
 
 
 def _record(

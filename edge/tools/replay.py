@@ -28,6 +28,8 @@ from edge.touch.contact import FeatureSeries
 
 UNDECIDED = "(none)"
 """The column of trials without a decision."""
+WIDEST = 100
+"""Characters of a matrix whose columns carry their labels."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -229,21 +231,23 @@ class Summary:
 
 def _matrix(pairs: Counter[tuple[str, str]]) -> str:
     truths = sorted({truth for truth, _ in pairs})
-    decided = sorted({label for _, label in pairs} | set(truths))
+    decided = sorted({*truths, *(label for _, label in pairs)})
+    heads = decided
+    names = truths
     # The columns of a wide matrix are numbered, so that 36 objects fit on a screen.
-    numbered = sum(len(label) + 2 for label in decided) > 100
-    heads = [str(i + 1) for i in range(len(decided))] if numbered else decided
-    names = [f"{decided.index(t) + 1:>3}  {t}" if numbered else t for t in truths]
+    if sum(len(label) + 2 for label in decided) > WIDEST:
+        heads = [str(i + 1) for i in range(len(decided))]
+        names = [f"{decided.index(truth) + 1:>3}  {truth}" for truth in truths]
     width = max(map(len, names))
     widths = [max(len(head), 3) for head in heads]
     lines = [" " * width + _cells(heads, widths)]
     for name, truth in zip(names, truths, strict=True):
-        counts = [str(pairs[truth, label] or ".") for label in decided]
+        counts = [pairs[truth, label] for label in decided]
         lines.append(f"{name:<{width}}{_cells(counts, widths)}")
     return "\n".join(lines)
 
 
-def _cells(texts: Sequence[str], widths: Sequence[int]) -> str:
-    """Texts in columns of some widths."""
-    columns = zip(texts, widths, strict=True)
-    return "".join(f"  {text:>{width}}" for text, width in columns)
+def _cells(values: Sequence[str | int], widths: Sequence[int]) -> str:
+    """Texts or counts in columns of some widths; a dot for 0."""
+    columns = zip(values, widths, strict=True)
+    return "".join(f"  {value or '.':>{width}}" for value, width in columns)

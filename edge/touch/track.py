@@ -137,13 +137,17 @@ class ContactTracker:
             self._follow(contact, frame, active, region)
         contacts = list(self._contacts)
         taken = set(shares.values())
-        free = [region for n, region in enumerate(regions) if n not in taken]
-        for region in free:
-            if self._may_begin(region, contacts):
-                contact = self._begin(frame, region)
-                contacts.append(contact)
-                self._follow(contact, frame, active, region)
+        for number, region in enumerate(regions):
+            if number in taken or not self._may_begin(region, contacts):
+                continue
+            contact = self._begin(frame, region)
+            contacts.append(contact)
+            self._follow(contact, frame, active, region)
         self._contacts = [contact for contact in contacts if not contact.ended]
+        return self._lasting(contacts)
+
+    def _lasting(self, contacts: Sequence[Contact]) -> list[Contact]:
+        """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _regions(self, active: ActiveTaxels) -> list[Region]:
