@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from train.agreement import products
-from train.evaluate import Labels
 from train.feature_sets import expand
 from train.pipeline import Choice
 from train.projection import KINDS
 from train.search import NEIGHBOURS, SHRINKAGES, SearchGrid
+from train.vectors import Labels
 
 PLAIN = (
     ("paper",),

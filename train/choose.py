@@ -16,7 +16,6 @@ from train.evaluate import (
     FOLDS,
     VARIANCE,
     AnswerTable,
-    Labels,
     Promise,
     Result,
     choose,
@@ -30,6 +29,7 @@ from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
 from train.stopping import held_out
+from train.vectors import Labels, Vectors
 
 FEWEST_GROUPS = 3
 """Objects that a class needs before entire objects can be left out."""
@@ -163,6 +163,11 @@ class Choosing:
         """(n, p) of every candidate."""
         return self._dataset.with_kernels(window_s).features(window_s, self._samples)
 
+    def _vectors(self, X: NDArray[np.float64]) -> Vectors:
+        """The trials, with the features (n, p) of every candidate."""
+        widths = tuple(self._widths.values())
+        return Vectors(X, self._y, self._dataset.names, widths)
+
     def _tables(
         self, X: NDArray[np.float64], nested: bool, what: str
     ) -> tuple[AnswerTable, AnswerTable]:
@@ -172,20 +177,14 @@ class Choosing:
         Without groups, both are the answers to left-out trials.
         """
         grids = [grid for candidate in self.tried for grid in candidate.grids]
-        answers = partial(
-            evaluate,
-            X,
-            features=self._dataset.names,
-            widths=tuple(self._widths.values()),
-            jobs=self._jobs,
-            nested=nested,
-        )
+        answers = partial(evaluate, jobs=self._jobs, nested=nested)
+        vectors = self._vectors(X)
         total = fits(self._folds, nested)
         if self._grouped:
             total += fits(self._group_folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
         progress = bar(total=total, desc=what, unit=" fits", disable=not self._progress)
-        trials = answers(self._y, self._folds, grids, progress=progress.update)
+        trials = answers(vectors, self._folds, grids, progress=progress.update)
         if not self._grouped:
             progress.close()
             return trials, trials
@@ -203,10 +202,12 @@ class Choosing:
                 *(f for f in families(y) if self._grouped & {*f})
             )
             y = {task: y[task] for task in y if task in needed}
+        vectors = replace(vectors, y=y)
         with progress:
-            return trials, answers(
-                y, self._group_folds, unseen, progress=progress.update
+            groups = answers(
+                vectors, self._group_folds, unseen, progress=progress.update
             )
+        return trials, groups
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: answers of the candidate that is best in plain cross-validation}."""
@@ -320,20 +321,14 @@ class Choosing:
             self._leave_out: (groups.folds, without_groups),
             TRIAL: (trials.folds, without),
         }
-        form = self._dataset.names, tuple(self._widths.values())
-        return decided_together(
-            chosen, X, self._y, plans, *form, jobs=self._jobs
-        ), *plans[TRIAL]
+        together = decided_together(chosen, self._vectors(X), plans, self._jobs)
+        return together, trials.folds, without
 
 
 def decided_together(
     chosen: Mapping[str, Chosen],
-    X: NDArray[np.float64],
-    y: Labels,
+    vectors: Vectors,
     plans: Mapping[str, tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]],
-    features: Sequence[str],
-    widths: Sequence[int],
-    own: NDArray[np.bool_] | None = None,
     jobs: int = 1,
 ) -> dict[str, Chosen]:
     """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a
@@ -343,20 +338,22 @@ def decided_together(
 
     Args:
         chosen: {task: its settings}, with the accuracies of the task by itself.
-        X, y, features, widths: of the trials.
+        vectors: (n, p) of the trials.
         plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its
             trials}}.
-        own: (n,) whether a trial is the owner's, see `ContactClassifier.fit`.
         jobs: processes.
     """
+    y = vectors.y
+    at_end = replace(vectors, X=vectors.X[None])
     family_of = {task: family for family in families(y) for task in family}
     right: dict[tuple[str, str], NDArray[np.bool_]] = {}
     for family in dict.fromkeys(family_of.values()):
         for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
             folds, choices = plans[left_out]
             some = [{task: by_task[task] for task in family} for by_task in choices]
-            right |= {(left_out, task): np.zeros(len(X), dtype=bool) for task in family}
-            by_fold = held_out(X[None], y, folds, some, features, widths, own, jobs)
+            nothing = np.zeros(len(folds), dtype=bool)
+            right |= {(left_out, task): nothing.copy() for task in family}
+            by_fold = held_out(at_end, folds, some, jobs)
             for fold, answers in enumerate(by_fold):
                 for task, (labels, *_) in answers.items():
                     asked = folds == fold

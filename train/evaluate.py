@@ -12,7 +12,7 @@ fits, not 110.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.statistics import wilson
-from edge.touch.features import FEATURES
 from train.crossval import votes_right
 from train.pipeline import Choice, columns_of, types_of
-from train.scaling import centred_and_scaled, finite, widths_of
+from train.scaling import centred_and_scaled, finite
 from train.search import Decomposition, SearchGrid
 from train.threads import single_thread
+from train.vectors import Labels, Vectors
 
 FOLDS = 10
 SEED = 2012
@@ -37,9 +37,6 @@ VARIANCE = 2.5
 in binomial variances. It is above 1 because the folds' models differ from the exported
 one, and because reports show the best of several windows. `make risk` counts how often
 the interval holds."""
-
-Labels = Mapping[str, NDArray[np.str_]]
-"""{task: (n,) labels}."""
 
 
 @dataclass(frozen=True)
@@ -116,63 +113,84 @@ def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
     return np.asarray((order % count)[members], dtype=np.int64)
 
 
-def _answers(
-    X: NDArray[np.float64],
-    classes: Mapping[str, NDArray[np.int64]],
-    train: NDArray[np.int64],
-    test: NDArray[np.int64],
-    grids: Sequence[SearchGrid],
-    features: Sequence[str],
-    widths: Sequence[int],
-    own: NDArray[np.bool_] | None,
-) -> dict[str, NDArray[np.bool_]]:
-    """{task: (candidates, test)} whether each candidate, fitted on `train`, is
-    right."""
-    answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in classes}
-    fitted_for = None
+@dataclass(frozen=True)
+class _Fit:
+    """Trials that candidates are fitted on, and those that they answer.
+
+    Attributes:
+        vectors: of all trials.
+        classes: {task: (n,) class indices, -1 for a trial without a label}.
+        train, test: the trials.
+    """
+
+    vectors: Vectors
+    classes: Mapping[str, NDArray[np.int64]]
+    train: NDArray[np.int64]
+    test: NDArray[np.int64]
+
+    def counted(self, grid: SearchGrid) -> list[tuple[list[str], NDArray[np.int64]]]:
+        """A grid's tasks, by how often each of the `train` trials counts for them."""
+        by_counts: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
+        for task, labels in self.classes.items():
+            if not grid.tasks or task in grid.tasks:
+                names = np.where(labels < 0, "", "labelled")
+                counts = grid.choices(1)[0].counts(names, self.vectors.own)[self.train]
+                by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
+        return list(by_counts.values())
+
+    def decomposition(
+        self, grid: SearchGrid, counts: NDArray[np.int64]
+    ) -> Decomposition:
+        """The scaled vectors of a grid's features, where each trial counts so often."""
+        vectors = self.vectors
+        rows = np.repeat(self.train, counts)
+        columns = columns_of(grid.features, vectors.features, vectors.columns)
+        types = types_of(grid.features, vectors.features, vectors.columns)
+        X = vectors.X
+        mean, gain, known = centred_and_scaled(
+            X[np.ix_(rows, columns)], grid.scaling, *types
+        )
+        labels_of = {task: labels[rows] for task, labels in self.classes.items()}
+        first = (np.cumsum(counts) - counts)[counts > 0]
+        new = (X[np.ix_(self.test, columns)] - mean) * gain
+        return Decomposition(known, new, labels_of, first)
+
+    def right(
+        self,
+        task: str,
+        grid: SearchGrid,
+        near: NDArray[np.int64],
+        members: NDArray[np.int64],
+    ) -> NDArray[np.bool_]:
+        """(candidates, test) whether a grid's candidates are right, by the neighbours
+        among some of the trials."""
+        labels = self.classes[task]
+        right = votes_right(near, labels[members], labels[self.test])
+        places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
+        # One row for each candidate: for each projection, each k.
+        rows = right[..., places].transpose(0, 2, 1)
+        return np.asarray(rows.reshape(-1, len(self.test)))
+
+
+def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, NDArray[np.bool_]]:
+    """{task: (candidates, test) whether each candidate is right}."""
+    answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in fit.classes}
+    decomposed = None
     with single_thread():
         for grid in grids:
-            for tasks, counts in _counted(grid, classes, own, train):
-                if fitted_for != (grid.scaling, grid.features, counts.tobytes()):
-                    fitted_for = grid.scaling, grid.features, counts.tobytes()
-                    rows, members = np.repeat(train, counts), train[counts > 0]
-                    columns = columns_of(grid.features, features, widths)
-                    types = types_of(grid.features, features, widths)
-                    mean, gain, known = centred_and_scaled(
-                        X[np.ix_(rows, columns)], grid.scaling, *types
-                    )
-                    labels_of = {task: labels[rows] for task, labels in classes.items()}
-                    first = (np.cumsum(counts) - counts)[counts > 0]
-                    new = (X[np.ix_(test, columns)] - mean) * gain
-                    decomposition = Decomposition(known, new, labels_of, first)
+            for tasks, counts in fit.counted(grid):
+                members = fit.train[counts > 0]
+                # Neighbouring grids often differ in the projection alone.
+                scaled = grid.scaling, grid.features, counts.tobytes()
+                if decomposed != scaled:
+                    decomposed = scaled
+                    decomposition = fit.decomposition(grid, counts)
                 near = None
                 for task in tasks:
                     if near is None or (grid.projection == "lda" and not grid.targets):
                         near = decomposition.neighbours(grid, task)
-                    labels = classes[task]
-                    right = votes_right(near, labels[members], labels[test])
-                    places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
-                    # One row for each candidate: for each projection, each k.
-                    answers[task].append(
-                        right[..., places].transpose(0, 2, 1).reshape(-1, len(test))
-                    )
+                    answers[task].append(fit.right(task, grid, near, members))
     return {task: np.concatenate(right) for task, right in answers.items()}
-
-
-def _counted(
-    grid: SearchGrid,
-    classes: Mapping[str, NDArray[np.int64]],
-    own: NDArray[np.bool_] | None,
-    train: NDArray[np.int64],
-) -> list[tuple[list[str], NDArray[np.int64]]]:
-    """A grid's tasks, by how often each of the `train` trials counts for them."""
-    by_counts: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
-    for task, labels in classes.items():
-        if not grid.tasks or task in grid.tasks:
-            names = np.where(labels < 0, "", "labelled")
-            counts = grid.choices(1)[0].counts(names, own)[train]
-            by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
-    return list(by_counts.values())
 
 
 def _directions(
@@ -277,88 +295,74 @@ def fits(folds: NDArray[np.int64], nested: bool) -> int:
 
 
 def evaluate(
-    X: NDArray[np.float64],
-    y: Labels,
+    vectors: Vectors,
     folds: NDArray[np.int64],
     grids: Sequence[SearchGrid],
     *,
-    features: Sequence[str] = FEATURES,
-    widths: Sequence[int] | None = None,
     jobs: int = 1,
     progress: Callable[[], object] | None = None,
     nested: bool = True,
-    own: NDArray[np.bool_] | None = None,
 ) -> AnswerTable:
     """Fit every candidate without each fold, and without each two folds.
 
     Args:
-        X: (n, p).
-        y: {task: (n,) labels}; empty where a trial has none, which then does not count.
+        vectors: (n, p) of the trials.
         folds: (n,) from 0; -1 for trials that are never left out, nor tested.
         grids: the candidates.
-        features: names of the types, in the order of X.
-        widths: columns of each; equal where None.
         jobs: processes.
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the
             table, `AnswerTable.held_out` alone is then valid.
-        own: (n,) whether a trial is the owner's, where simulated ones are among them.
 
     Raises:
-        InputError: there are fewer than three folds, or X is not finite.
+        InputError: there are fewer than three folds, or the vectors are not finite.
     """
     count = int(folds.max()) + 1
     if count < 3:
         raise InputError(
             f"nested accuracy needs at least 3 folds, not {count}; record more"
         )
-    X = finite(X)
-    classes = {
-        task: np.where(
-            labels == "", -1, np.unique(labels[labels != ""]).searchsorted(labels)
-        )
-        for task, labels in y.items()
-    }
-    tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
+    vectors = replace(vectors, X=finite(vectors.X))
+    classes = {task: _classes(labels) for task, labels in vectors.y.items()}
     pairs = [(i, j) for i in range(count) for j in range(i, count if nested else i + 1)]
     tests = [np.flatnonzero((folds == i) | (folds == j)) for i, j in pairs]
-    everything = np.arange(len(X))
-    wide = widths_of(X.shape[1], features, widths)
-    work = (
-        delayed(_answers)(
-            X,
-            classes,
-            np.delete(everything, test),
-            test,
-            grids,
-            tuple(features),
-            wide,
-            own,
-        )
-        for test in tests
+    everything = np.arange(len(folds))
+    fits_of = (
+        _Fit(vectors, classes, np.delete(everything, test), test) for test in tests
     )
+    work = (delayed(_answers)(fit, grids) for fit in fits_of)
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
-    choices = {
-        task: [
-            choice
-            for grid in grids
-            if not grid.tasks or task in grid.tasks
-            for choice in grid.choices(_directions(grid.targets or (task,), classes))
-        ]
-        for task in classes
-    }
+    choices = {task: _choices(task, grids, classes) for task in classes}
     right = {
-        task: np.zeros((count, len(choices[task]), len(X)), dtype=bool)
+        task: np.zeros((count, len(choices[task]), len(folds)), dtype=bool)
         for task in classes
     }
-    for (i, j), test, result in zip(pairs, tests, results, strict=True):
+    for pair, test, result in zip(pairs, tests, results, strict=True):
         if progress is not None:
             progress()
         for task, answers in result.items():
             # For fold i these are answers to fold j, and the other way round.
-            for without, asked in {(i, j), (j, i)}:
+            for without, asked in {pair, pair[::-1]}:
                 places = folds[test] == asked
                 right[task][without][:, test[places]] = answers[:, places]
-    for task, each in right.items():
-        each[:, :, ~tested[task]] = True
+    tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
+    for task, of_task in right.items():
+        of_task[:, :, ~tested[task]] = True
     return AnswerTable(folds, choices, right, tested)
+
+
+def _classes(labels: NDArray[np.str_]) -> NDArray[np.int64]:
+    """(n,) class indices of labels; -1 where one is missing."""
+    names = np.unique(labels[labels != ""])
+    return np.where(labels == "", -1, names.searchsorted(labels))
+
+
+def _choices(
+    task: str, grids: Sequence[SearchGrid], classes: Mapping[str, NDArray[np.int64]]
+) -> list[Choice]:
+    """The candidates of a task."""
+    choices: list[Choice] = []
+    for grid in grids:
+        if not grid.tasks or task in grid.tasks:
+            choices += grid.choices(_directions(grid.targets or (task,), classes))
+    return choices

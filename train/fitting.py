@@ -18,12 +18,12 @@ from train import thresholds
 from train.candidates import Candidate, candidates
 from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
 from train.dataset import DataSet, Recordings, Untouched, load_trials, read
-from train.evaluate import Labels
 from train.feature_sets import expand
 from train.mix import mix
 from train.novelty import MOST_COMPONENTS
 from train.pipeline import Choice, ContactClassifier
 from train.stopping import FEWEST, SequentialClassifier
+from train.vectors import Labels
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
 """Steps between decision points. The first one that keeps the weights below

@@ -26,17 +26,11 @@ from train.choose import (
     promised,
 )
 from train.dataset import DataSet
-from train.evaluate import (
-    AnswerTable,
-    Labels,
-    evaluate,
-    finest,
-    group_folds,
-    stratified_folds,
-)
+from train.evaluate import AnswerTable, evaluate, finest, group_folds, stratified_folds
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid
+from train.vectors import Labels, Vectors
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""
@@ -131,22 +125,19 @@ class Mixing:
                 grids.append(_grid(task, choice, weights, self.labelled(task)))
         return grids
 
+    @property
+    def vectors(self) -> Vectors:
+        """All trials."""
+        widths = self.dataset.widths(self.samples)
+        return Vectors(self.features, self.y, self.dataset.names, widths, self.own)
+
     def answers(
         self, grids: Sequence[SearchGrid], folds: NDArray[np.int64]
     ) -> AnswerTable:
         """The answers to the owner's trials, each without its fold (owner's trials,)."""
         everyone = np.full(len(self.own), -1)
         everyone[self.own] = folds
-        return evaluate(
-            self.features,
-            self.y,
-            everyone,
-            grids,
-            features=self.dataset.names,
-            widths=self.dataset.widths(self.samples),
-            jobs=self.jobs,
-            own=self.own,
-        )
+        return evaluate(self.vectors, everyone, grids, jobs=self.jobs)
 
     def scores(self, grids: Sequence[SearchGrid]) -> Scores:
         """The answers with single trials, and with entire groups, left out."""
@@ -273,10 +264,7 @@ def mix(
     for task in settled:
         chosen[task] = scores.weigh(task, settled[task], mixing, plans)
         notes += _sentences(task, chosen[task].choice, scores, mixing)
-    widths = dataset.widths(samples)
-    together = decided_together(
-        chosen, features, fitted, plans, dataset.names, widths, own, jobs
-    )
+    together = decided_together(chosen, mixing.vectors, plans, jobs)
     folds_of_trials, without = plans[TRIAL]
     return MixResult(together, folds_of_trials, without, notes)
 

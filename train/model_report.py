@@ -15,7 +15,7 @@ from sklearn.metrics import precision_recall_fscore_support
 from edge.model.model import Model
 from edge.tools.explanation import Explanation, Space, explain
 from train.draw.explanation import MOST_NEAR, Case, draw_case
-from train.evaluate import Labels, Result, stratified_folds
+from train.evaluate import Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, ContactClassifier, fittable
@@ -26,6 +26,7 @@ from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
 from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
+from train.vectors import Labels
 
 QUARTERS = 4
 """The learning curve has a point for each of these parts of the training trials."""

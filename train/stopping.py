@@ -27,7 +27,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,6 +45,7 @@ from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.scaling import widths_of
 from train.threads import single_thread
+from train.vectors import Vectors
 
 FEWEST = 20
 """Trials that calibration needs."""
@@ -92,48 +92,37 @@ def _answers(
 
 
 def held_out(
-    X: NDArray[np.float64],
-    y: Mapping[str, NDArray[np.str_]],
+    vectors: Vectors,
     folds: NDArray[np.int64],
     fold_choices: Sequence[Mapping[str, Choice]],
-    features: Sequence[str],
-    widths: Sequence[int] | None,
-    own: NDArray[np.bool_] | None = None,
     jobs: int = 1,
 ) -> list[Answers]:
     """[fold] decisions of models without the fold's trials on these, in their order.
 
     Args:
-        X: (decision points, n, p).
-        y: {task: (n,) labels}; empty where a trial has none.
+        vectors: (decision points, n, p).
         folds: (n,) from 0, or -1 for trials that are never left out.
         fold_choices: [fold]{task: Choice}.
-        features, widths: of the vectors; see `SequentialClassifier`.
-        own: see `ContactClassifier.fit`.
         jobs: processes.
     """
     work = (
-        delayed(_fold)(X, y, folds == fold, choices, features, widths, own)
+        delayed(_fold)(vectors, folds == fold, choices)
         for fold, choices in enumerate(fold_choices)
     )
     return list(Parallel(n_jobs=jobs)(work))
 
 
 def _fold(
-    X: NDArray[np.float64],
-    y: Mapping[str, NDArray[np.str_]],
-    left_out: NDArray[np.bool_],
-    choices: Mapping[str, Choice],
-    features: Sequence[str],
-    widths: Sequence[int] | None,
-    own: NDArray[np.bool_] | None,
+    vectors: Vectors, left_out: NDArray[np.bool_], choices: Mapping[str, Choice]
 ) -> Answers:
-    others = {task: y[task][~left_out] for task in y}
-    owned = None if own is None else own[~left_out]
-    model = partial(ContactClassifier, choices, features, widths)
+    others = vectors.part(~left_out)
+    form = others.features, others.widths
     with single_thread():
-        models = [model().fit(x, others, owned) for x in X[:, ~left_out]]
-        return answers(models, X[:, left_out])
+        models = [
+            ContactClassifier(choices, *form).fit(x, others.y, others.own)
+            for x in others.X
+        ]
+        return answers(models, vectors.X[:, left_out])
 
 
 @dataclass(frozen=True)
@@ -342,8 +331,8 @@ class SequentialClassifier:
         own: NDArray[np.bool_] | None,
     ) -> HeldOut:
         """Answers to each trial by models with some settings, without its fold."""
-        form = self.features, self.widths
-        by_fold = held_out(X, y, folds, fold_choices, *form, own, self.jobs)
+        vectors = Vectors(X, y, self.features, self.widths, own)
+        by_fold = held_out(vectors, folds, fold_choices, self.jobs)
         right = {}
         margins = {}
         for task in self.choices:

@@ -19,6 +19,7 @@ from train.choose import (
 )
 from train.evaluate import AnswerTable, Promise
 from train.pipeline import Choice, ContactClassifier, vote
+from train.vectors import Vectors
 
 TWO = ("max_force", "contact_area")
 
@@ -115,7 +116,7 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together():
         for task, choice in choices.items()
     }
     plans = {"trial": (folds, [choices] * 5)}
-    decided = decided_together(chosen, X, y, plans, TWO, (3, 3))
+    decided = decided_together(chosen, Vectors(X, y, TWO, (3, 3)), plans)
     alone, together = (
         np.zeros(60, dtype=bool),
         {task: np.zeros(60, dtype=bool) for task in y},

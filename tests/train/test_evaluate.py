@@ -18,6 +18,7 @@ from train.evaluate import (
 )
 from train.pipeline import ContactClassifier
 from train.search import SearchGrid
+from train.vectors import Vectors
 
 TWO = ("max_force", "contact_area")
 GRIDS = (
@@ -47,7 +48,7 @@ def told_right(choice, X, y, train, test, own=None):
 def test_every_answer_is_that_of_the_exported_estimators():
     X, y = trials()
     folds = stratified_folds(y, 4)
-    table = evaluate(X, {"t": y}, folds, GRIDS, features=TWO)
+    table = evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS)
     assert len(table.choices["t"]) == 4 + 6 + 1
     for i in range(4):
         for j in range(4):
@@ -67,7 +68,7 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
     grids = [replace(grid, neighbours=(1, 2)) for grid in GRIDS]
     for seed in range(8):
         X = np.repeat(trials(6, seed)[0], 2, axis=0) * 10.0 ** (seed - 4)
-        table = evaluate(X, {"t": y}, folds, grids, features=TWO)
+        table = evaluate(Vectors(X, {"t": y}, TWO), folds, grids)
         for fold in range(3):
             train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
             for choice, right in zip(
@@ -82,7 +83,7 @@ def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_o
     own = np.arange(len(y)) % 2 == 0
     folds = np.where(own, np.arange(len(y)) // 2 % 3, -1)
     grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
-    table = evaluate(X, {"t": y}, folds, grids, features=TWO, own=own)
+    table = evaluate(Vectors(X, {"t": y}, TWO, own=own), folds, grids)
     tested = own & (y != "")
     assert (table.tested["t"] == tested).all()
     for fold in range(3):
@@ -97,7 +98,7 @@ def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_o
 def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
     X, y = trials()
     folds = stratified_folds(y, 4)
-    table = evaluate(X, {"t": y}, folds, GRIDS, features=TWO)
+    table = evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS)
     right = 0
     for i in range(4):
         inner = [
@@ -130,7 +131,7 @@ def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_
     best, honest = [], []
     for _ in range(6):
         X, y = rng.normal(size=(40, 12)), rng.choice(["a", "b"], 40)
-        table = evaluate(X, {"t": y}, stratified_folds(y, 5), GRIDS[1:2], features=TWO)
+        table = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 5), GRIDS[1:2])
         best.append(table.held_out("t").mean(axis=1).max())
         honest.append(table.nested("t").accuracy)
     assert np.mean(best) > 0.55
@@ -144,8 +145,8 @@ def test_twins_of_a_group_do_not_tell_each_other():
     X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
     y = np.repeat(np.tile(["a", "b"], 6), 4)
     grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
-    by_object = evaluate(X, {"t": y}, group_folds(objects), grids, features=TWO)
-    by_trial = evaluate(X, {"t": y}, stratified_folds(y), grids, features=TWO)
+    by_object = evaluate(Vectors(X, {"t": y}, TWO), group_folds(objects), grids)
+    by_trial = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y), grids)
     assert by_trial.nested("t").accuracy == 1.0
     assert by_object.nested("t").accuracy < 0.8
     few = group_folds(objects, count=5)
@@ -166,7 +167,7 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
         targets=("t", "u"),
         most_directions=most,
     )
-    table = evaluate(X, labels, stratified_folds(y, 4), [grid], features=TWO)
+    table = evaluate(Vectors(X, labels, TWO), stratified_folds(y, 4), [grid])
     train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
     (choice,) = table.choices["t"]
     assert choice.components == (
@@ -209,10 +210,10 @@ def test_folds_spread_each_class_evenly():
 def test_what_cannot_be_parted_or_measured_is_one_sentence():
     X, y = trials()
     with pytest.raises(InputError, match="at least 3 folds, not 2"):
-        evaluate(X, {"t": y}, stratified_folds(y, 2), GRIDS, features=TWO)
+        evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 2), GRIDS)
     X[5, 3] = np.nan
     with pytest.raises(InputError, match="trial 5 are not finite"):
-        evaluate(X, {"t": y}, stratified_folds(y, 3), GRIDS, features=TWO)
+        evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 3), GRIDS)
 
 
 def test_progress_is_told_after_each_of_the_fits_that_are_announced():
@@ -223,7 +224,6 @@ def test_progress_is_told_after_each_of_the_fits_that_are_announced():
         options = {
             "progress": lambda: seen.append(1),
             "nested": nested,
-            "features": TWO,
         }
-        evaluate(X, {"t": y}, folds, GRIDS[:1], **options)
+        evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS[:1], **options)
         assert len(seen) == fits(folds, nested) == count

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.evaluate import Labels, Result, evaluate
+from train.evaluate import Result, evaluate
 from train.pipeline import vote
 from train.search import SearchGrid
+from train.vectors import Labels, Vectors
 
 
 def percent(share: float) -> float:
@@ -64,7 +65,7 @@ def nested(
         features: names of the feature types in X.
         widths: columns of each; equal where None.
     """
-    table = evaluate(X, y, folds, [grid], features=features, widths=widths)
+    table = evaluate(Vectors(X, y, features, widths), folds, [grid])
     return {task: table.nested(task) for task in y}
 
 

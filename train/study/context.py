@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
-from train.evaluate import Labels
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
+from train.vectors import Labels
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.crossval import MAX_COMPONENTS, MAX_K
-from train.evaluate import Labels, Result, finest, group_folds, stratified_folds
+from train.evaluate import Result, finest, group_folds, stratified_folds
 from train.feature_sets import SETS
 from train.report import figures
 from train.report.score import grid_search, interval, majority, nested, percent, score
@@ -20,6 +20,7 @@ from train.report.section import Row, Section, Table
 from train.search import SearchGrid
 from train.study.context import Context
 from train.study.sweeps import by_task
+from train.vectors import Labels
 
 PAPER, SEARCHED = "the paper's method", "the paper's method, best of its grid"
 GUESS = "always the most frequent label"

@@ -8,7 +8,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
-from train.evaluate import Labels, Result
+from train.evaluate import Result
 from train.report import figures
 from train.report.score import grid_search, score
 from train.report.section import Row, Section, Table
@@ -16,6 +16,7 @@ from train.report.skins import coarser, follow, vectors
 from train.scaling import SCALINGS
 from train.study.context import Context
 from train.study.paper import papers
+from train.vectors import Labels
 
 WINDOWS_S = (
     0.1,

@@ -1,0 +1,48 @@
+"""Feature vectors of trials, with their labels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.features import FEATURES
+from train.scaling import widths_of
+
+Labels = Mapping[str, NDArray[np.str_]]
+"""{task: (n,) labels}; empty where a trial has none, which then does not count."""
+
+
+@dataclass(frozen=True)
+class Vectors:
+    """Feature vectors of n trials, and what they are.
+
+    Attributes:
+        X: (n, p), or (decision points, n, p).
+        y: {task: (n,) labels}.
+        features: names of the feature types, in the order of X.
+        widths: columns of each; equal where None.
+        own: (n,) whether a trial is the owner's, where simulated ones are among them;
+            see `train.pipeline.Choice.counts`.
+    """
+
+    X: NDArray[np.float64] = field(repr=False)
+    y: Labels = field(repr=False)
+    features: Sequence[str] = FEATURES
+    widths: Sequence[int] | None = None
+    own: NDArray[np.bool_] | None = field(default=None, repr=False)
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Columns of each feature type."""
+        return widths_of(self.X.shape[-1], self.features, self.widths)
+
+    def part(self, trials: NDArray[np.bool_]) -> Self:
+        """Some of the trials (n,)."""
+        return replace(
+            self,
+            X=self.X[..., trials, :],
+            y={task: labels[trials] for task, labels in self.y.items()},
+            own=None if self.own is None else self.own[trials],
+        )
