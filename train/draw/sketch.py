@@ -2,7 +2,9 @@
 moves."""
 
 import math
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 
@@ -144,52 +146,105 @@ def _object(
         now: (3,) position of the last contact, `since` seconds ago.
         style: colour and hatching, by their names in matplotlib.
     """
-    effects, size = drawn["effects"], drawn["values"].get
-    start = first[0][[0, 2]]
+    body = _Body.of(drawn, first)
     ahead = math.copysign(1.0, first[1][0] or 1.0)
-    height = size("height_m") or STANDS_M
-    width = size("width_m") or 0.1
-    top = max(min(0.5 * width, first[2]), ABOVE_M)
-    floor = -max(height, 0.5 * min(width, 0.6))
-    depth = size("base_m") or DEPTH_M
-    z = np.linspace(floor, top, 33)
-    face = np.minimum(z * z / (2.0 * (size("radius_m") or math.inf)), depth / 2.0)
-    outline = np.vstack([np.column_stack([face, z]), [[depth, top], [depth, floor]]])
-    table = start[0] + ahead * np.array([-0.1, depth + 0.25])
-    axis.plot(table, 2 * [start[1] + floor], color="sienna")
+    start = first[0][[0, 2]]
+    table = start[0] + ahead * np.array([-0.1, body.depth + 0.25])
+    axis.plot(table, 2 * [start[1] + body.floor], color="sienna")
     moved = max(ahead * float(now[0] - first[0][0]), 0.0)
-    slid = moved if "sliding" in effects else 0.0
-    if "stems" in effects:
-        count = min(int(size("stem_count") or 12), STEMS)
-        for behind in np.linspace(0.0, size("stem_spread_m") or 0.06, count):
-            # A pot that slides takes its stems along; otherwise they bend as far as
-            # pressed.
-            bent = max(moved - slid - behind, 0.0) * (top - floor) / -floor
-            ends = slid + behind + np.array([0.0, bent])
-            heights, lines = (
-                start[1] + [floor, top],
-                {"color": style["color"], "alpha": 0.5},
-            )
-            axis.plot(start[0] + ahead * ends, heights, **lines, lw=1)
+    slid = moved if "sliding" in body.effects else 0.0
+    if "stems" in body.effects:
+        for ends in body.stems(moved, slid):
+            heights = start[1] + [body.floor, body.top]
+            line = start[0] + ahead * ends
+            axis.plot(line, heights, color=style["color"], alpha=0.5, lw=1)
         return ""
-    motion = ""
-    aside, foot = size("aside_m"), size("foot_m")
-    friction = size("friction_static") or 0.0
-    if slid and "tipping" in effects and friction > depth / (2.0 * height):
-        fallen = since > LOST_S
-        lean = 0.5 * math.pi if fallen else min(slid / height, 0.5 * math.pi)
-        edge = np.array([depth, floor])
-        c, s = math.cos(lean), math.sin(lean)
-        outline = (outline - edge) @ np.array([[c, -s], [s, c]]) + edge
-        motion = (
-            ", has fallen over"
-            if fallen
-            else f", leans by {math.degrees(lean):.0f} degrees"
-        )
+    if slid and body.tips:
+        outline, motion = body.leaning(slid, fallen=since > LOST_S)
     else:
-        outline[:, 0] += slid
-        if "turning" in effects and aside is not None and foot is not None:
-            angle = slid * aside / max((foot / 3.0) ** 2 + aside**2, 1e-12)
-            motion = f", turns by {math.degrees(angle):.0f} degrees" if slid else ""
+        outline = body.outline() + np.array([slid, 0.0])
+        motion = body.turning(slid)
     axis.fill(*(start + outline * [ahead, 1.0]).T, alpha=0.25, **style)
     return motion
+
+
+@dataclass(frozen=True)
+class _Body:
+    """An object seen from the side, in metres from the contact at onset.
+
+    Attributes:
+        effects: that move it.
+        values: that were drawn for it.
+        floor, top: the heights at which it stands, and at which its drawing ends.
+        depth: along the push.
+    """
+
+    effects: Sequence[str]
+    values: Mapping[str, float]
+    floor: float
+    top: float
+    depth: float
+
+    @classmethod
+    def of(cls, drawn: Mapping[str, Any], first: Place) -> Self:
+        """The object of a simulated recording, touched at a place."""
+        values = drawn["values"]
+        height = values.get("height_m") or STANDS_M
+        width = values.get("width_m") or 0.1
+        return cls(
+            effects=drawn["effects"],
+            values=values,
+            floor=-max(height, 0.5 * min(width, 0.6)),
+            top=max(min(0.5 * width, first[2]), ABOVE_M),
+            depth=values.get("base_m") or DEPTH_M,
+        )
+
+    @property
+    def height(self) -> float:
+        """Of the contact above the floor."""
+        return self.values.get("height_m") or STANDS_M
+
+    @property
+    def tips(self) -> bool:
+        """Whether it tips over before it slides."""
+        friction = self.values.get("friction_static") or 0.0
+        return "tipping" in self.effects and friction > self.depth / (2.0 * self.height)
+
+    def outline(self) -> np.ndarray:
+        """(points, 2) its outline where it stood at onset."""
+        z = np.linspace(self.floor, self.top, 33)
+        radius = self.values.get("radius_m") or math.inf
+        face = np.minimum(z * z / (2.0 * radius), self.depth / 2.0)
+        back = [[self.depth, self.top], [self.depth, self.floor]]
+        return np.vstack([np.column_stack([face, z]), back])
+
+    def stems(self, moved: float, slid: float) -> Iterator[np.ndarray]:
+        """The foot and the end of each stem, along the push."""
+        count = min(int(self.values.get("stem_count") or 12), STEMS)
+        spread = self.values.get("stem_spread_m") or 0.06
+        for behind in np.linspace(0.0, spread, count):
+            # A pot that slides takes its stems along; otherwise they bend as far as
+            # pressed.
+            pressed = max(moved - slid - behind, 0.0)
+            bent = pressed * (self.top - self.floor) / -self.floor
+            yield slid + behind + np.array([0.0, bent])
+
+    def leaning(self, slid: float, *, fallen: bool) -> tuple[np.ndarray, str]:
+        """Its outline as it leans over its far edge, and its motion in words."""
+        lean = 0.5 * math.pi if fallen else min(slid / self.height, 0.5 * math.pi)
+        edge = np.array([self.depth, self.floor])
+        c = math.cos(lean)
+        s = math.sin(lean)
+        outline = (self.outline() - edge) @ np.array([[c, -s], [s, c]]) + edge
+        if fallen:
+            return outline, ", has fallen over"
+        return outline, f", leans by {math.degrees(lean):.0f} degrees"
+
+    def turning(self, slid: float) -> str:
+        """How far it has turned, in words; "" where it does not."""
+        aside = self.values.get("aside_m")
+        foot = self.values.get("foot_m")
+        if "turning" not in self.effects or aside is None or foot is None or not slid:
+            return ""
+        angle = slid * aside / max((foot / 3.0) ** 2 + aside**2, 1e-12)
+        return f", turns by {math.degrees(angle):.0f} degrees"

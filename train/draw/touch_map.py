@@ -1,9 +1,12 @@
 """A map of touch as a picture: the places of the contacts and their labels."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import write_whole
@@ -11,7 +14,7 @@ from edge.model.info import ModelInfo
 from train.draw.recording import UNITS
 from train.draw.sketch import link_positions
 from train.report.section import counted
-from train.touch_map import TouchMap
+from train.touch_map import Touch, TouchMap
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"
@@ -37,6 +40,33 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
     ]
 
 
+def _style(number: int, label: str, sure: NDArray[np.float64]) -> dict[str, Any]:
+    """How the contacts of a label are drawn, from their confidences."""
+    return {
+        "s": 90,
+        "edgecolors": "black",
+        "linewidths": 0.6,
+        "color": "0.6" if label == UNKNOWN else f"C{number % 10}",
+        "marker": MARKERS[number % len(MARKERS)],
+        "alpha": 0.35 + 0.65 * sure,
+    }
+
+
+def _task(contacts: TouchMap, touches: Sequence[Touch], wish: str | None) -> str:
+    """The task to draw: as wished, or category where the map has it.
+
+    Raises:
+        InputError: the map has no such task.
+    """
+    tasks = sorted({task for touch in touches for task in touch.labels})
+    chosen = wish or ("category" if "category" in tasks else tasks[0])
+    if chosen not in tasks:
+        raise InputError(
+            f"{contacts.path}: has no task {chosen!r}; it has {', '.join(tasks)}"
+        )
+    return chosen
+
+
 def draw(
     contacts: TouchMap,
     out: Path,
@@ -54,33 +84,24 @@ def draw(
     touches = list(contacts)
     if not touches:
         raise InputError(f"{contacts.path}: no contact is on this map yet")
-    tasks = sorted({task for touch in touches for task in touch.labels})
-    chosen = task or ("category" if "category" in tasks else tasks[0])
-    if chosen not in tasks:
-        raise InputError(
-            f"{contacts.path}: has no task {chosen!r}; it has {', '.join(tasks)}"
-        )
+    chosen = _task(contacts, touches, task)
     labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
     sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
     positions = np.array([touch.position for touch in touches])
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     axes = figure.subplots(1, 2)
     name, lines = ("", []) if info is None else outline(info)
+    unit = UNITS.get(contacts.head.unit, contacts.head.unit)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
         for i, line in enumerate(lines):
             behind = {"color": "0.6", "lw": 2.0, "zorder": 0}
             axis.plot(line[:, across], line[:, up], label=None if i else name, **behind)
         for i, label in enumerate(sorted(set(labels))):
-            labelled = np.array([seen == label for seen in labels])
-            style = {"s": 90, "edgecolors": "black", "linewidths": 0.6}
-            style["color"] = "0.6" if label == UNKNOWN else f"C{i % 10}"
-            style |= {
-                "marker": MARKERS[i % len(MARKERS)],
-                "alpha": 0.35 + 0.65 * sure[labelled],
-            }
+            labelled = np.array(labels) == label
+            places = positions[labelled][:, [across, up]]
+            style = _style(i, label, sure[labelled])
             text = f"{label} ({int(labelled.sum())})"
-            axis.scatter(*positions[labelled][:, [across, up]].T, **style, label=text)
-        unit = UNITS.get(contacts.head.unit, contacts.head.unit)
+            axis.scatter(*places.T, **style, label=text)
         axis.set(
             xlabel=f"{'xyz'[across]} ({unit})",
             ylabel=f"{'xyz'[up]} ({unit})",

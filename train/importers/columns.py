@@ -2,8 +2,9 @@
 out."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -127,8 +128,8 @@ def _term(table: Table, names: Sequence[str], term: str) -> list[str]:
     if parts:
         return parts
     ends = term.split("-")
-    if len(ends) == 2 and ends[0] in names and ends[1] in names:
-        low, high = (names.index(end) for end in ends)
+    if len(ends) == 2 and set(ends) <= set(names):
+        low, high = map(names.index, ends)
         return list(names[low : high + 1])
     numbers = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", term)
     if numbers is not None:
@@ -153,18 +154,9 @@ def meaning(table: Table, names: Sequence[str], wishes: Wishes) -> Meaning:
         InputError: something would have to be guessed; the sentence names the option
             that tells it.
     """
-    present = set(table.names)
     joints = columns(table, names, wishes.joints) if wishes.joints else []
     time, unit = _time_column(table, names, wishes, joints)
-    if time is not None and wishes.rate is not None:
-        raise InputError(
-            f"{table.path}: has a column of times, {quoted(time)}, beside --rate; "
-            "leave --rate out, or name another time by --time"
-        )
-    if time is None and wishes.rate is None:
-        raise InputError(
-            f"{table.path}: no column is a time; give --rate HZ or --time COL"
-        )
+    _check_time(table, time, wishes)
     used = {time, *joints}
     shape: tuple[int, ...] = ()
     rest = [name for name in table.names if name not in used]
@@ -174,20 +166,42 @@ def meaning(table: Table, names: Sequence[str], wishes: Wishes) -> Meaning:
         taxels, shape = _running(table, rest)
     else:
         taxels = rest
-    both = next((name for name in taxels if name in used), None)
-    if both is not None:
-        raise InputError(
-            f"{table.path}: column {both} is named both as a taxel and as time or joint"
-        )
-    missing = next((n for n in [*taxels, *joints] if n not in present), None)
-    if missing is not None:
-        raise InputError(f"{table.path}: column {missing} holds no values of a frame")
-    left_out = tuple(n for n in table.names if n not in used and n not in taxels)
+    _check_taxels(table, taxels, joints, used)
+    left_out = tuple(name for name in rest if name not in taxels)
     result = Meaning(time, "s", "", tuple(taxels), tuple(joints), left_out, shape)
     if time is None:
         return result
     unit, source = _unit(table, time, wishes.unit or unit)
     return replace(result, unit=unit, unit_from=source)
+
+
+def _check_time(table: Table, time: str | None, wishes: Wishes) -> None:
+    """Check that either a column or --rate gives the times."""
+    if time is not None and wishes.rate is not None:
+        raise InputError(
+            f"{table.path}: has a column of times, {quoted(time)}, beside --rate; "
+            "leave --rate out, or name another time by --time"
+        )
+    if time is None and wishes.rate is None:
+        raise InputError(
+            f"{table.path}: no column is a time; give --rate HZ or --time COL"
+        )
+
+
+def _check_taxels(
+    table: Table, taxels: Sequence[str], joints: Sequence[str], used: Set[str | None]
+) -> None:
+    """Check that no taxel is used for something else, and that all columns have
+    values."""
+    for name in taxels:
+        if name in used:
+            raise InputError(
+                f"{table.path}: column {name} is named both as a taxel and as time or "
+                "joint"
+            )
+    for name in (*taxels, *joints):
+        if name not in table.names:
+            raise InputError(f"{table.path}: column {name} holds no values of a frame")
 
 
 def _time_column(
@@ -225,26 +239,18 @@ def _is_date(table: Table, name: str) -> bool:
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
-    stems: dict[str, list[tuple[int, int | None, str]]] = {}
-    for name in rest:
-        parts = RUNNING.fullmatch(name)
-        if parts is not None:
-            second = parts["second"]
-            number = int(parts["first"]), None if second is None else int(second), name
-            stems.setdefault(parts["stem"], []).append(number)
-    stems = {stem: sorted(found, key=_order) for stem, found in stems.items()}
-    counted = {stem: found for stem, found in stems.items() if _counts_up(found)}
-    several = {stem: found for stem, found in counted.items() if len(found) > 1}
-    counted = several or counted
+    counted = [group for group in _stems(rest) if _counts_up(group)]
+    counted = [group for group in counted if len(group) > 1] or counted
     if len(counted) == 1:
-        (found,) = counted.values()
+        (group,) = counted
         shape: tuple[int, ...] = ()
-        if found[0][1] is not None:
-            rows = {first for first, _, _ in found}
-            shape = len(rows), len(found) // len(rows)
-        return [name for *_, name in found], shape
+        if group[0].second is not None:
+            rows = {number.first for number in group}
+            shape = len(rows), len(group) // len(rows)
+        return [number.name for number in group], shape
     if counted:
-        groups = " or ".join(spanned([n for *_, n in g]) for g in counted.values())
+        names = [[number.name for number in group] for group in counted]
+        groups = " or ".join(map(spanned, names))
         raise InputError(
             f"{table.path}: are the taxels {groups}? Name them by --taxels, and joint "
             "angles by --joints"
@@ -256,21 +262,41 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     )
 
 
-def _order(number: tuple[int, int | None, str]) -> tuple[int, int]:
-    first, second, _ = number
-    return first, -1 if second is None else second
+class _Number(NamedTuple):
+    """The numbers in a column's name, of which there are one or two."""
+
+    first: int
+    second: int | None
+    name: str
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """By which columns are sorted; a missing number comes first."""
+        return self.first, -1 if self.second is None else self.second
 
 
-def _counts_up(found: Sequence[tuple[int, int | None, str]]) -> bool:
+def _stems(names: Sequence[str]) -> list[list[_Number]]:
+    """Numbered names by their stem, in the order of their numbers."""
+    stems: dict[str, list[_Number]] = {}
+    for name in names:
+        parts = RUNNING.fullmatch(name)
+        if parts is not None:
+            second = None if parts["second"] is None else int(parts["second"])
+            number = _Number(int(parts["first"]), second, name)
+            stems.setdefault(parts["stem"], []).append(number)
+    return [sorted(group, key=lambda number: number.place) for group in stems.values()]
+
+
+def _counts_up(group: Sequence[_Number]) -> bool:
     """Whether numbers count up without a gap from 0 or 1, in one or two dimensions."""
-    firsts = sorted({first for first, _, _ in found})
+    firsts = sorted({number.first for number in group})
     if firsts[0] > 1 or firsts != list(range(firsts[0], firsts[0] + len(firsts))):
         return False
-    seconds = sorted({-1 if second is None else second for _, second, _ in found})
+    seconds = sorted({number.place[1] for number in group})
     if seconds == [-1]:
-        return len(found) == len(firsts)
+        return len(group) == len(firsts)
     whole = list(range(seconds[0], seconds[0] + len(seconds)))
-    return seconds == whole and len(found) == len(firsts) * len(seconds)
+    return seconds == whole and len(group) == len(firsts) * len(seconds)
 
 
 def _unit(table: Table, time: str, unit: str | None) -> tuple[str, str]:
@@ -287,17 +313,20 @@ def _unit(table: Table, time: str, unit: str | None) -> tuple[str, str]:
         return since_1970[-1], "since 1970"
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    if step <= SECONDS_AT_MOST:
-        return "s", "from its steps"
-    if step < DOUBTFUL_BELOW:
+    if SECONDS_AT_MOST < step < DOUBTFUL_BELOW:
         raise InputError(
             f"{table.path}: {quoted(time)} has steps of {step:g}, which may be seconds "
             "or milliseconds; give --time-unit s or ms"
         )
-    for name, longest in LONGEST_STEPS.items():
-        if step <= longest:
-            return name, "from its steps"
-    return "ns", "from its steps"
+    return _unit_of(step), "from its steps"
+
+
+def _unit_of(step: float) -> str:
+    """The unit in which the times of frames have such steps."""
+    if step <= SECONDS_AT_MOST:
+        return "s"
+    units = (unit for unit, longest in LONGEST_STEPS.items() if step <= longest)
+    return next(units, "ns")
 
 
 def times_of(table: Table, taken: Meaning) -> NDArray[np.float64]:

@@ -6,8 +6,8 @@ those that call for its effect. `base` has the hooks of all trials, which run fi
 their stage.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
@@ -133,49 +133,61 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     calls: dict[str, Mask] = {}
     for name in (*SHARED, *EFFECTS):
         wanted = {name, *SHARED.get(name, ())}
-        mask = np.array([not wanted.isdisjoint(own) for own in effects])
+        mask = np.array([not wanted.isdisjoint(called) for called in effects])
         if mask.any():
             calls[name] = mask
     everyone = np.ones(len(effects), dtype=bool)
-    modules = [("base", module_of("base"), everyone)]
-    modules += [(name, module_of(name), mask) for name, mask in calls.items()]
-    stages: dict[str, list[Call]] = {stage: [] for stage in STAGES}
-    for stage, hooks in stages.items():
-        for owner, module, mask in modules:
-            function = getattr(module, stage, None)
-            if function is None:
-                continue
-            if stage in INSTEAD:
-                hooks[:] = [Call(c.owner, c.function, c.which & ~mask) for c in hooks]
-            hooks.append(Call(owner, function, mask))
-        hooks[:] = [call for call in hooks if call.which.any()]
+    owners = [("base", module_of("base"), everyone)]
+    owners += [(name, module_of(name), mask) for name, mask in calls.items()]
+    stages = {stage: _hooks(stage, owners) for stage in STAGES}
     return Plan(effects, calls, stages)
+
+
+def _hooks(stage: str, owners: Sequence[tuple[str, Any, Mask]]) -> list[Call]:
+    """The hooks of a stage, given the name, module and trials of each owner."""
+    hooks: list[Call] = []
+    for owner, module, mask in owners:
+        function = getattr(module, stage, None)
+        if function is None:
+            continue
+        if stage in INSTEAD:
+            hooks = [replace(call, which=call.which & ~mask) for call in hooks]
+        hooks.append(Call(owner, function, mask))
+    return [call for call in hooks if call.which.any()]
 
 
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
     """{effect: the reason for it} of an object in a condition, in the order of
     `EFFECTS`."""
     required = dict.fromkeys(FAMILIES[item.family].effects, f"family {item.family}")
-    for name, info in EFFECTS.items():
-        if info.condition == condition:
-            required[name] = condition
-        elif info.axes:
-            if info.axes == scene.skin.axes:
-                required[name] = f"skin.axes = {info.axes}"
-        elif info.keys and item.given.issuperset(info.keys):
-            required[name] = " and ".join(info.keys)
-        elif (
-            name in scene.add
-            and name not in required
-            and _supports(item, condition, name)
-        ):
-            required[name] = "effects.add"
+    for name in EFFECTS:
+        reason = _reason(scene, item, condition, name)
+        if reason and not (reason == ADDED and name in required):
+            required[name] = reason
     for name in scene.leave_out:
         required.pop(name, None)
     while gone := [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]:
         for name in gone:
             del required[name]
     return {name: required[name] for name in EFFECTS if name in required}
+
+
+ADDED = "effects.add"
+"""The reason for an effect that the scene adds."""
+
+
+def _reason(scene: Scene, item: SceneObject, condition: str, name: str) -> str:
+    """Why an object in a condition calls for an effect, besides its family; "" if it
+    does not."""
+    info = EFFECTS[name]
+    if info.condition == condition:
+        return condition
+    if info.axes:
+        return f"skin.axes = {info.axes}" if info.axes == scene.skin.axes else ""
+    if info.keys and item.given.issuperset(info.keys):
+        return " and ".join(info.keys)
+    added = name in scene.add and _supports(item, condition, name)
+    return ADDED if added else ""
 
 
 def _supports(item: SceneObject, condition: str, name: str) -> bool:
@@ -194,46 +206,51 @@ def check_supported(scene: Scene, where: str) -> None:
     Raises:
         InputError: an effect suits none; the sentence names the object that it needs.
     """
+    _check_left_out(scene, where)
+    check_heeded(scene, where)
+    required: set[str] = set()
+    for item in scene.objects:
+        for condition in item.conditions:
+            required.update(required_effects(scene, item, condition))
+    if not scene.inertia and "inertia" in required:
+        raise InputError(
+            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one "
+            "number a joint"
+        )
+    for name in scene.add:
+        if name not in required:
+            raise InputError(
+                f"{where}: effects.add names {name}, which this scene cannot support: "
+                f"it needs {', '.join(_needs(name))}"
+            )
+
+
+def _check_left_out(scene: Scene, where: str) -> None:
+    """Refuse to leave out an effect that makes an object what its label says."""
     for name in scene.leave_out:
         for item in scene.objects:
             yields = name in FAMILIES[item.family].effects[:1]
             if yields or EFFECTS[name].condition in item.conditions:
                 raise InputError(
                     f"{where}: effects.leave_out leaves out {name}, without which "
-                    "object "
-                    f"{item.name!r} would not be {'soft' if yields else 'movable'}, as "
-                    "its label "
-                    "says"
+                    f"object {item.name!r} would not be "
+                    f"{'soft' if yields else 'movable'}, as its label says"
                 )
-    check_heeded(scene, where)
-    required_by_object = [
-        required_effects(scene, o, c) for o in scene.objects for c in o.conditions
-    ]
-    if not scene.inertia and any(
-        "inertia" in required for required in required_by_object
-    ):
-        raise InputError(
-            f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one "
-            "number a joint"
-        )
-    for name in scene.add:
-        if any(name in required for required in required_by_object):
-            continue
-        info = EFFECTS[name]
-        needs = []
-        if info.axes:
-            needs.append(f"skin.axes = {info.axes}")
-        if info.families:
-            needs.append(f"an object of family {' or '.join(info.families)}")
-        if info.keys:
-            needs.append(f"an object with {' and '.join(info.keys)}")
-        if info.condition:
-            needs.append(f"a {info.condition} object")
-        needs += [f"the effect {need}" for need in info.needs]
-        raise InputError(
-            f"{where}: effects.add names {name}, which this scene cannot support: "
-            f"it needs {', '.join(needs)}"
-        )
+
+
+def _needs(name: str) -> list[str]:
+    """What a scene needs to support an effect."""
+    info = EFFECTS[name]
+    needs = []
+    if info.axes:
+        needs.append(f"skin.axes = {info.axes}")
+    if info.families:
+        needs.append(f"an object of family {' or '.join(info.families)}")
+    if info.keys:
+        needs.append(f"an object with {' and '.join(info.keys)}")
+    if info.condition:
+        needs.append(f"a {info.condition} object")
+    return [*needs, *(f"the effect {need}" for need in info.needs)]
 
 
 def check_heeded(scene: Scene, where: str) -> None:

@@ -3,7 +3,7 @@ effects."""
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -178,6 +178,24 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     return out
 
 
+def _check_start(table: SceneTable, chain: Chain, start: Sequence[float]) -> None:
+    """Refuse angles in degrees that lie outside the joints' limits."""
+    for joint, limits, angle in zip(chain.names, chain.limits, start, strict=True):
+        if limits is not None:
+            low, high = (math.degrees(limit) for limit in limits)
+            if not low - 1e-7 <= angle <= high + 1e-7:
+                raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
+
+
+def _stops_s(chain: Chain, start: Sequence[float], rate: Sequence[float]) -> float:
+    """When the last moving joint's equilibrium point stops at its limit."""
+    return max(
+        (limits[speed > 0.0] - angle) / speed if limits is not None else math.inf
+        for limits, angle, speed in zip(chain.limits, start, rate, strict=True)
+        if speed
+    )
+
+
 def _motion(
     table: SceneTable, chain: Chain, skin: Cylinder, lead: Value
 ) -> dict[str, Any]:
@@ -196,11 +214,7 @@ def _motion(
         raise table.fail(
             "rate_deg_s", "not all 0, so that the arm reaches an object", rate
         )
-    for joint, limits, angle in zip(chain.names, chain.limits, start, strict=True):
-        if limits is not None:
-            low, high = (math.degrees(limit) for limit in limits)
-            if not low - 1e-7 <= angle <= high + 1e-7:
-                raise table.fail(f"start_deg of {joint}", f"{low:g} to {high:g}", angle)
+    _check_start(table, chain, start)
     travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
     last_m = _last_row_m(skin)
     covered = last_m <= PLACE_M <= skin.row0_z_m
@@ -208,13 +222,7 @@ def _motion(
     place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
     table.done()
     start, rate = (tuple(map(math.radians, degrees)) for degrees in (start, rate))
-    # The stroke ends once the last moving joint's equilibrium point stops at its limit.
-    stops_s = [
-        (limits[speed > 0.0] - angle) / speed if limits is not None else math.inf
-        for limits, angle, speed in zip(chain.limits, start, rate, strict=True)
-        if speed
-    ]
-    stroke_s = min(travel_s, max(stops_s))
+    stroke_s = min(travel_s, _stops_s(chain, start, rate))
     if lead.high >= stroke_s:
         raise InputError(
             f"{table.where}: the arm's stroke ends after {stroke_s:g} s "
@@ -288,33 +296,45 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     conditions = table.names("conditions", schema.CONDITIONS)
     if not conditions:
         raise table.fail("conditions", "fixed, movable or both")
-    values: dict[str, Value] = {}
+    movable = "movable" in conditions
     # A spread around 0 also applies to an object that gives no value for it.
     differs = {
         key
         for key, needed in schema.SPREAD_OF_MOVABLE.items()
-        if spread[key] > 0.0 and "movable" in conditions and table.has(needed)
+        if spread[key] > 0.0 and movable and table.has(needed)
     }
+    values: dict[str, Value] = {}
     for key, default in schema.keys_of(family).items():
         default = 0.0 if key in differs else default
         if table.has(key) or default is not None:
             if OBJECT[key].integer:  # a family has drawn from its range by now
                 table.field(key, OBJECT[key])
             values[key] = table.value(key, OBJECT[key], default)
+    _check_needs(table, movable)
+    _check_friction(table, values)
+    table.done()
+    keys = differs.union(filter(table.has, OBJECT))
+    return SceneObject(name, family, conditions, values, frozenset(keys))
+
+
+def _check_needs(table: SceneTable, movable: bool) -> None:
+    """Refuse an object without the keys that its other keys and conditions need."""
     needed: list[str] = []
-    if "movable" in conditions:
+    if movable:
         needed += ["mass_kg", "friction_static", "friction_kinetic"]
     if table.has("base_m") or table.has("height_m"):
         needed += ["base_m", "height_m"]
     for key in needed:
         table.get(key)
-    static, kinetic = values.get("friction_static"), values.get("friction_kinetic")
+
+
+def _check_friction(table: SceneTable, values: Mapping[str, Value]) -> None:
+    """Refuse friction that is larger in motion than at rest."""
+    static = values.get("friction_static")
+    kinetic = values.get("friction_kinetic")
     if static is not None and kinetic is not None and kinetic.high > static.low:
-        wanted = f"at most friction_static ({static.low:g})"
-        raise table.fail("friction_kinetic", wanted, kinetic.high)
-    table.done()
-    given = differs.union(filter(table.has, OBJECT))
-    return SceneObject(name, family, conditions, values, frozenset(given))
+        most = f"at most friction_static ({static.low:g})"
+        raise table.fail("friction_kinetic", most, kinetic.high)
 
 
 def _effects(table: SceneTable) -> dict[str, Any]:
@@ -371,26 +391,41 @@ def draw_family(
     generator = stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
-            drawn = {key: _draw(generator, value) for key, value in ranges.items()}
-            if "friction_static" in drawn:
-                drawn["friction_kinetic"] = drawn["friction_static"] * _draw(
-                    generator, part
-                )
-            floor = drawn.get("friction_static", 0.0)
-            hold = floor * drawn.get("mass_kg", 0.0) * GRAVITY
-            # Through skin friction the push may also press the object down.
-            level = 1.0 - floor * drawn.get("skin_friction", 0.0)
-            if not movable or hold <= level * min(
-                push_n, passed_on({**usual, **drawn}, skin)
-            ):
+            drawn = _draw_object(generator, ranges, part)
+            if not movable or _moves({**usual, **drawn}, push_n, skin):
                 break
         else:
-            wanted = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
-            raise table.fail("mass_kg", wanted)
-        counts = {
-            key: round(value) for key, value in drawn.items() if OBJECT[key].integer
-        }
-        yield {**shared, "name": f"{name} {number + 1:02d}", **drawn, **counts}
+            enough = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
+            raise table.fail("mass_kg", enough)
+        yield {**shared, "name": f"{name} {number + 1:02d}", **_counted(drawn)}
+
+
+def _counted(drawn: Mapping[str, float]) -> dict[str, Any]:
+    """The values of an object, those that count something rounded."""
+    return {
+        key: round(value) if OBJECT[key].integer else value
+        for key, value in drawn.items()
+    }
+
+
+def _draw_object(
+    generator: np.random.Generator, ranges: Mapping[str, Value], part: Value
+) -> dict[str, float]:
+    """The values of an object, with its kinetic friction as a part of the static."""
+    drawn = {key: _draw(generator, value) for key, value in ranges.items()}
+    if "friction_static" in drawn:
+        kinetic = drawn["friction_static"] * _draw(generator, part)
+        drawn["friction_kinetic"] = kinetic
+    return drawn
+
+
+def _moves(values: Mapping[str, float], push_n: float, skin: Cylinder) -> bool:
+    """Whether a push moves an object, or what it passes on to its foot."""
+    floor = values.get("friction_static", 0.0)
+    hold = floor * values.get("mass_kg", 0.0) * GRAVITY
+    # Through skin friction the push may also press the object down.
+    level = 1.0 - floor * values.get("skin_friction", 0.0)
+    return hold <= level * min(push_n, passed_on(values, skin))
 
 
 def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
