@@ -60,18 +60,12 @@ def proposed(recordings: Sequence[Recording]) -> Proposal:
     untouched = [r for r in recordings if not begins_in_contact(r)]
     begun = len(recordings) - len(untouched)
     if untouched:
-        levels = [noise(recording.t, recording.frames) for recording in untouched]
-        level = float(np.quantile(levels, 0.9))
         source = "the noise before contact"
         if begun:
             source += f" ({begun} of {len(recordings)} begin in contact and give none)"
-        pairs = [above(level, margin) for margin in MARGINS]
-        if not labelled:
-            return Proposal(*pairs[0], source)
-        high, low = (count_felt(labelled, onset) for _, onset in pairs)
-        if low >= FELT_SHARE * len(labelled):
-            best = pairs[high < (1.0 - MISSED_SHARE) * low]
-            return Proposal(*best, source)
+        pair = _above_noise(untouched, labelled)
+        if pair is not None:
+            return Proposal(*pair, source)
     level = float(np.median([_quietest(recording) for recording in recordings]))
     pair = above(level, 1.0)
     felt = count_felt(labelled or recordings, pair[1])
@@ -80,6 +74,23 @@ def proposed(recordings: Sequence[Recording]) -> Proposal:
         return Proposal(*pair, source)
     source = "nothing to go by: no recording has a part without contact"
     return Proposal(0, 0, source)
+
+
+def _above_noise(
+    untouched: Sequence[Recording], labelled: Sequence[Recording]
+) -> tuple[int, int] | None:
+    """Threshold and onset above the noise of recordings that begin untouched; None
+    where even the lower ones miss most of the recordings labelled with a touch."""
+    levels = [noise(recording.t, recording.frames) for recording in untouched]
+    level = float(np.quantile(levels, 0.9))
+    usual, lower = (above(level, margin) for margin in MARGINS)
+    if not labelled:
+        return usual
+    high = count_felt(labelled, usual[1])
+    low = count_felt(labelled, lower[1])
+    if low < FELT_SHARE * len(labelled):
+        return None
+    return lower if high < (1.0 - MISSED_SHARE) * low else usual
 
 
 def count_felt(recordings: Sequence[Recording], onset: int) -> int:

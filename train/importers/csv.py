@@ -17,7 +17,7 @@ out. Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays:
 
 import argparse
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -153,10 +153,7 @@ def trials(
     folder = path if path.is_dir() else path.parent
     measured = list(_understood(_collected(path, folder, options), options))
     if not measured:
-        if options.skipped:
-            raise InputError(options.skipped[0] + _more(options.skipped))
-        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
-        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
+        raise _nothing(path, options)
     beside = _labels(folder / LABELS, [m.source.name for m in measured], options)
     file = folder / "skin.json"
     skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
@@ -169,34 +166,47 @@ def trials(
     missing = 0
     imported = 0
     for trial in measured:
+        name = trial.source.name
+        meta: dict[str, Any] = {"skin": skin.raw, "trial": name}
+        place = trial.source.table.path
         try:
             recording = rest.recording(
-                trial.source.table.path,
-                trial.t,
-                trial.values,
-                shape,
-                {"skin": skin.raw, "trial": trial.source.name},
-                trial.joints,
+                place, trial.t, trial.values, shape, meta, trial.joints
             )
         except InputError as error:
             _skip(options, error)
             continue
         imported += 1
         missing += int(trial.values.missing.sum())
-        labels = trial.source.labels
-        if beside is not None:
-            labels = {
-                **_others(labels, options.task),
-                **beside.get(trial.source.name, {}),
-            }
+        labels = _labelled(trial, beside, options)
         meta = {**recording.meta, "labels": labels, "source": path.name}
         if trial.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
-        yield trial.source.name, _with_meta(recording, meta)
+        yield name, _with_meta(recording, meta)
     if not imported:
-        raise InputError(options.skipped[0] + _more(options.skipped))
+        raise _nothing(path, options)
     if missing:
         say(f"{missing} values are missing; these taxels are not valid in their frames")
+
+
+def _nothing(path: Path, options: argparse.Namespace) -> InputError:
+    """The error where nothing can be imported."""
+    if options.skipped:
+        return InputError(options.skipped[0] + _more(options.skipped))
+    kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
+    return InputError(f"{path}: holds no {kind}; give a folder of trials")
+
+
+def _labelled(
+    trial: Measured,
+    beside: Mapping[str, Mapping[str, str]] | None,
+    options: argparse.Namespace,
+) -> Mapping[str, str]:
+    """A trial's labels: those of a labels.csv instead of its own where there is one."""
+    labels = trial.source.labels
+    if beside is None:
+        return labels
+    return {**_others(labels, options.task), **beside.get(trial.source.name, {})}
 
 
 def _others(labels: dict[str, str], task: str) -> dict[str, str]:
@@ -322,14 +332,12 @@ def _labels(
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    for row in rows:
-        if row not in trials:
-            options.skipped.append(f"{path}: {row} names no file")
-    for trial in trials:
-        if trial not in rows:
-            options.skipped.append(
-                f"{path}: has no row for {trial}, which has no label"
-            )
+    strange = [row for row in rows if row not in trials]
+    without = [trial for trial in trials if trial not in rows]
+    options.skipped += [f"{path}: {row} names no file" for row in strange]
+    options.skipped += [
+        f"{path}: has no row for {trial}, which has no label" for trial in without
+    ]
     tasks = [name for name in table.names if name != "trial"]
     labels = {}
     for trial, row in zip(rows, data[tasks].to_dict("records"), strict=True):
@@ -378,20 +386,27 @@ def _trials_in(table: Table) -> Iterator[Source]:
     label = f"columns {', '.join(labels)}" if labels else "none"
     kept = [n for n in table.names if n != "trial" and n not in labels]
     for trial, rows in table.data.groupby("trial", sort=False):
-        of_trial = {}
-        for name in labels:
-            found = rows[name].unique()
-            if len(found) > 1:
-                raise InputError(
-                    f"{table.path}: {name} changes within trial {trial}, from "
-                    f"{shown(str(found[0]))} to {shown(str(found[1]))}"
-                )
-            of_trial[name] = str(found[0])
+        of_trial = {name: _constant(table, name, str(trial), rows) for name in labels}
         data = rows[kept].reset_index(drop=True)
         part = Table(table.path, data, table.named, table.shape, table.form)
         if "taxel" in table.names:
             part = _pivoted(part, str(trial))
         yield Source(str(trial), of_trial, label, part, table.names)
+
+
+def _constant(table: Table, name: str, trial: str, rows: pd.DataFrame) -> str:
+    """The one label in a column of a trial's rows.
+
+    Raises:
+        InputError: there are several.
+    """
+    values = [str(value) for value in rows[name].unique()]
+    if len(values) > 1:
+        raise InputError(
+            f"{table.path}: {name} changes within trial {trial}, from "
+            f"{shown(values[0])} to {shown(values[1])}"
+        )
+    return values[0]
 
 
 def _is_time(table: Table, name: str) -> bool:
@@ -512,22 +527,28 @@ def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Me
     if taken.joints:
         angles = [numbers_of(table, name) for name in taken.joints]
         joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
+    head = replace(table, data=table.data.iloc[:0])
+    source = replace(source, table=head)
     if taken.time is None:
         assert options.rate is not None
         t = np.arange(len(values)) / options.rate
-    else:
-        t = times_of(table, taken)
-        order = clock.order(t, table.path, "row")
-        if order.text:
-            say(f"{table.path}: {order.text}")
-        kept = order.kept
-        t = t[kept]
-        values = values[kept]
-        shear = None if shear is None else shear[kept]
-        joints = None if joints is None else joints[kept]
-    head = replace(table, data=table.data.iloc[:0])
-    source = replace(source, table=head)
-    return Measured(source, t, Values(values, shear), joints, taken)
+        return Measured(source, t, Values(values, shear), joints, taken)
+    t = times_of(table, taken)
+    return _in_order(Measured(source, t, Values(values, shear), joints, taken))
+
+
+def _in_order(trial: Measured) -> Measured:
+    """The rows of a trial in the order of their times; says what that leaves out."""
+    path = trial.source.table.path
+    order = clock.order(trial.t, path, "row")
+    if order.text:
+        say(f"{path}: {order.text}")
+    kept = order.kept
+    shear = trial.values.shear
+    joints = trial.joints
+    values = Values(trial.values.normal[kept], None if shear is None else shear[kept])
+    joints = None if joints is None else joints[kept]
+    return replace(trial, t=trial.t[kept], values=values, joints=joints)
 
 
 def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:

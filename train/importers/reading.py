@@ -1,5 +1,7 @@
 """Tables in files: text of any separator, encoding and compression, and Parquet."""
 
+from __future__ import annotations
+
 import bz2
 import gzip
 import io
@@ -74,30 +76,52 @@ def read_text(path: Path) -> Table:
     with parsing(str(path), "a table", "; save it as text"):
         data, form = _decoded(path, _unpacked(path))
         head = _head(path, data)
-        if head.mark in ("\t", ";") and "," in head.second:
+        decimal_commas = head.mark in ("\t", ";") and "," in head.second
+        if decimal_commas:
             form.append("decimal commas")
         if head.mark in ("\t", ";"):
             form.append(f"separated by {MARKS[head.mark]}")
-        cells = head.cells
-        heading = _cells(head.comment.lstrip("# "), head.mark)
-        named = not all(map(_is_number, cells))
-        lines = head.lines + named
-        names = cells if named else [str(n + 1) for n in range(len(cells))]
-        if not named and len(heading) == len(cells) and not _is_number(heading[0]):
-            names = heading
-            named = True
-        elif not named and _counts_columns(cells, head.second):
-            form.append("the first row, which counts the columns, is a header")
-            names = cells
-            named = True
-            lines += 1
+        header = _header(head)
+        form += header.form
+        names = header.names
         _check_names(path, names)
         first = names.index("") if "" in names else len(names)
         for place in range(first + 1, len(names)):
             # Further columns without a name are told apart by their places.
             names[place] = names[place] or f"column {place + 1}"
-        table = _parsed(path, data, head, lines, names, "decimal commas" in form)
-    return Table(path, table, named, form=tuple(form))
+        table = _parsed(path, data, head, header.lines, names, decimal_commas)
+    return Table(path, table, header.named, form=tuple(form))
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The names of a text's columns.
+
+    Attributes:
+        names: numbers from 1 where there are none.
+        named: whether the text has them.
+        lines: before the first row of numbers.
+        form: what a user should know of them.
+    """
+
+    names: list[str]
+    named: bool
+    lines: int
+    form: tuple[str, ...] = ()
+
+
+def _header(head: Head) -> _Header:
+    """The names in a text's first row, or in the comment above it."""
+    cells = head.cells
+    if not all(map(_is_number, cells)):
+        return _Header(cells, True, head.lines + 1)
+    heading = _cells(head.comment.lstrip("# "), head.mark)
+    if len(heading) == len(cells) and not _is_number(heading[0]):
+        return _Header(heading, True, head.lines)
+    if _counts_columns(cells, head.second):
+        form = "the first row, which counts the columns, is a header"
+        return _Header(cells, True, head.lines + 1, (form,))
+    return _Header([str(n + 1) for n in range(len(cells))], False, head.lines)
 
 
 def read_frame(path: Path) -> NDArray[np.float64]:
@@ -132,9 +156,7 @@ class Head:
 
 
 def _head(path: Path, data: bytes) -> Head:
-    comment = ""
-    lines = 0
-    comments = 0
+    above = []
     rows: list[str] = []
     for line in io.BytesIO(data):
         if len(line) > LONGEST_LINE:
@@ -142,19 +164,20 @@ def _head(path: Path, data: bytes) -> Head:
                 f"{path}: has a line of {len(line) >> 20} MB, too long for a frame"
             )
         text = line.decode()
-        if not rows and (not text.strip() or text.startswith("#")):
-            comment = text if text.strip() else comment
-            comments += bool(text.strip())
-            lines += 1
-        elif text.strip() and not text.startswith("#"):
+        if text.strip() and not text.startswith("#"):
             rows.append(text.strip("\r\n"))
+        elif not rows:
+            above.append(text.strip())
         if len(rows) == 2:
             break
     if not rows:
         raise InputError(f"{path}: {EMPTY}")
+    comments = [*filter(None, above)]
+    comment = comments[-1] if comments else ""
     mark = next((mark for mark in "\t;," if mark in rows[0]), "")
     second = rows[1] if len(rows) > 1 else ""
-    return Head(mark, _cells(rows[0], mark), second, comment, lines, comments)
+    cells = _cells(rows[0], mark)
+    return Head(mark, cells, second, comment, len(above), len(comments))
 
 
 def _parsed(
@@ -191,12 +214,18 @@ def _parsed(
         raise InputError(f"{path}: {EMPTY}")
     table = table[columns]
     table.columns = names
-    unnamed = [
-        place for place, name in enumerate(names) if name in ("", f"column {place + 1}")
+    return _without_empty(table)
+
+
+def _without_empty(table: pd.DataFrame) -> pd.DataFrame:
+    """The table without columns that have neither a name nor a value."""
+    filled = [
+        place
+        for place, name in enumerate(table.columns)
+        if name not in ("", f"column {place + 1}")
+        or not table.iloc[:, place].isna().all()
     ]
-    empty = [p for p in unnamed if table.iloc[:, p].isna().all()]
-    kept_places = [p for p in columns if p not in empty]
-    return table.iloc[:, kept_places] if empty else table
+    return table if len(filled) == len(table.columns) else table.iloc[:, filled]
 
 
 def _parts(data: bytes) -> Iterator[bytes]:
