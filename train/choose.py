@@ -1,5 +1,7 @@
 """The choice among the candidates, by nested cross-validation."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,6 +30,7 @@ from train.evaluate import (
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
+from train.search import SearchGrid
 from train.stopping import held_out
 from train.vectors import Labels, Vectors
 
@@ -139,8 +142,13 @@ class Choosing:
         jobs: int = 1,
         progress: bool = False,
     ) -> None:
-        self._dataset, self._y, self.tried, self._samples = dataset, y, tried, samples
-        self._jobs, self._progress, self._leave_out = jobs, progress, leave_out
+        self._dataset = dataset
+        self._y = y
+        self.tried = tried
+        self._samples = samples
+        self._jobs = jobs
+        self._progress = progress
+        self._leave_out = leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         labels = y[finest(y)]
         self._folds = stratified_folds(labels, fold_count(len(labels), quick))
@@ -183,31 +191,37 @@ class Choosing:
         if self._grouped:
             total += fits(self._group_folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
-        progress = bar(total=total, desc=what, unit=" fits", disable=not self._progress)
-        trials = answers(vectors, self._folds, grids, progress=progress.update)
-        if not self._grouped:
-            progress.close()
-            return trials, trials
-        unseen = [
-            replace(
-                g, shrinkages=tuple(s for s in g.shrinkages if s >= UNSEEN_SHRINKAGE)
-            )
-            for g in grids
-            if self._leave_out
-            not in g.targets  # discriminants of the groups that are left out
-        ]
-        y = self._y
-        if not any(grid.targets for grid in grids):
-            needed = self._grouped.union(
-                *(f for f in families(y) if self._grouped & {*f})
-            )
-            y = {task: y[task] for task in y if task in needed}
-        vectors = replace(vectors, y=y)
-        with progress:
+        with bar(
+            total=total, desc=what, unit=" fits", disable=not self._progress
+        ) as progress:
+            trials = answers(vectors, self._folds, grids, progress=progress.update)
+            if not self._grouped:
+                return trials, trials
+            vectors = replace(vectors, y=self._of_groups(grids))
+            unseen = self._unseen(grids)
             groups = answers(
                 vectors, self._group_folds, unseen, progress=progress.update
             )
         return trials, groups
+
+    def _unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
+        """The candidates for groups that are left out: with more shrinkage, and without
+        discriminants of these groups."""
+        unseen = []
+        for grid in grids:
+            if self._leave_out not in grid.targets:
+                enough = [s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE]
+                unseen.append(replace(grid, shrinkages=tuple(enough)))
+        return unseen
+
+    def _of_groups(self, grids: Sequence[SearchGrid]) -> Labels:
+        """The labels that answers to left-out groups need: of all tasks where a grid
+        has targets, else of those with groups and of the tasks that agree with them."""
+        if any(grid.targets for grid in grids):
+            return self._y
+        together = [family for family in families(self._y) if self._grouped & {*family}]
+        needed = self._grouped.union(*together)
+        return {task: self._y[task] for task in self._y if task in needed}
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: answers of the candidate that is best in plain cross-validation}."""
@@ -276,53 +290,84 @@ class Choosing:
         """
         X = self._features(window_s)
         trials, groups = self._tables(X, True, "choosing")
-        without: list[dict[str, Choice]] = [
-            {} for _ in range(int(trials.folds.max()) + 1)
-        ]
-        without_groups: list[dict[str, Choice]] = [
-            {} for _ in range(int(groups.folds.max()) + 1)
-        ]
-        chosen: dict[str, Chosen] = {}
-        for task in self._y:
-            grouped = task in self._grouped
-            table, margin = (groups, UNSEEN_MARGIN) if grouped else (trials, 0.0)
-            choices, prices = (
-                table.choices[task],
-                costs(table.choices[task], self._widths),
-            )
-            own = [places_of(candidate, choices) for candidate in self.tried]
-            chosen_without = without_folds(task, trials, table, prices, margin)
-            for by_task, choice in zip(without, chosen_without, strict=True):
-                by_task[task] = choice
-            picked = [trials.choices[task].index(choice) for choice in chosen_without]
-            if task in groups.right:
-                unseen = groups.choices[task]
-                places = groups.by_fold(
-                    task, costs(unseen, self._widths), margin=margin
-                )
-                for by_task, place in zip(without_groups, places, strict=True):
-                    by_task[task] = unseen[place]
-            nested = table.by_fold(task, prices, margin=margin)
-            untouched = self._dataset.untouched_labels(task)
-            count = (
-                len(set(self._groups[self._y[task] != ""].tolist())) if grouped else 0
-            )
-            by_candidate = (table.nested(task, prices, places) for places in own)
-            chosen[task] = Chosen(
-                choices[table.chosen(task, prices, margin=margin)],
-                promised(table.answered(task, nested), untouched, count),
-                promised(trials.answered(task, picked), untouched),
-                self._leave_out if grouped else TRIAL,
-                tuple(promised(result, untouched, count) for result in by_candidate),
-                tuple(choices[table.chosen(task, prices, places)] for places in own),
-                table.folds,
-            )
+        settled = {task: self._settle(task, trials, groups) for task in self._y}
+        chosen = {task: settings.chosen for task, settings in settled.items()}
+        without = _by_fold(
+            trials, {task: settings.without for task, settings in settled.items()}
+        )
+        without_groups = _by_fold(
+            groups,
+            {
+                task: settings.without_groups
+                for task, settings in settled.items()
+                if settings.without_groups
+            },
+        )
         plans = {
             self._leave_out: (groups.folds, without_groups),
             TRIAL: (trials.folds, without),
         }
         together = decided_together(chosen, self._vectors(X), plans, self._jobs)
         return together, trials.folds, without
+
+    def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
+        """A task's settings, by the answers to left-out trials and to left-out
+        groups."""
+        grouped = task in self._grouped
+        table = groups if grouped else trials
+        margin = UNSEEN_MARGIN if grouped else 0.0
+        choices = table.choices[task]
+        prices = costs(choices, self._widths)
+        places = [places_of(candidate, choices) for candidate in self.tried]
+        without = without_folds(task, trials, table, prices, margin)
+        without_groups = []
+        if task in groups.right:
+            unseen = groups.choices[task]
+            unseen_prices = costs(unseen, self._widths)
+            by_fold = groups.by_fold(task, unseen_prices, margin=margin)
+            without_groups = [unseen[place] for place in by_fold]
+        picked = [trials.choices[task].index(choice) for choice in without]
+        nested = table.by_fold(task, prices, margin=margin)
+        untouched = self._dataset.untouched_labels(task)
+        count = 0
+        if grouped:
+            count = len(set(self._groups[self._y[task] != ""].tolist()))
+        by_candidate = [table.nested(task, prices, allowed) for allowed in places]
+        picks = [table.chosen(task, prices, allowed) for allowed in places]
+        chosen = Chosen(
+            choice=choices[table.chosen(task, prices, margin=margin)],
+            accuracy=promised(table.answered(task, nested), untouched, count),
+            by_trial=promised(trials.answered(task, picked), untouched),
+            left_out=self._leave_out if grouped else TRIAL,
+            candidates=tuple(promised(r, untouched, count) for r in by_candidate),
+            picks=tuple(choices[place] for place in picks),
+            folds=table.folds,
+        )
+        return _Settled(chosen, without, without_groups)
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """A task's settings, and those chosen without each fold.
+
+    Attributes:
+        chosen: the settings.
+        without: [fold] the choice made without a fold's trials.
+        without_groups: the same of the folds of groups; empty where the task has no
+            answers to left-out groups.
+    """
+
+    chosen: Chosen
+    without: list[Choice]
+    without_groups: list[Choice]
+
+
+def _by_fold(
+    table: AnswerTable, choices: Mapping[str, Sequence[Choice]]
+) -> list[dict[str, Choice]]:
+    """[fold]{task: its choice} from {task: [fold] its choice}."""
+    folds = range(int(table.folds.max()) + 1)
+    return [{task: choices[task][fold] for task in choices} for fold in folds]
 
 
 def decided_together(

@@ -51,16 +51,23 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     tasks = set().union(*trials)
     out = [dict(labels) for labels in trials]
     for triple in permutations(sorted(tasks | set(JOINED)), 3):
-        product, *factors = triple
-        known = [own for own in trials if own.keys() >= set(triple)]
-        holds = all(
-            own[product] == "-".join(own[factor] for factor in factors) for own in known
-        )
-        if holds and (known or triple == JOINED):
-            out = [joined(own, triple) for own in out]
+        if _holds(triple, trials):
+            out = [joined(labels, triple) for labels in out]
     return [
-        {task: label for task, label in own.items() if task in tasks} for own in out
+        {task: label for task, label in labels.items() if task in tasks}
+        for labels in out
     ]
+
+
+def _holds(triple: tuple[str, ...], trials: Sequence[Mapping[str, str]]) -> bool:
+    """Whether the first task's labels are those of the two others in every trial that
+    has all three; where none has, whether the triple is `JOINED`."""
+    product, *factors = triple
+    whole = [labels for labels in trials if labels.keys() >= set(triple)]
+    names = ["-".join(labels[factor] for factor in factors) for labels in whole]
+    if names != [labels[product] for labels in whole]:
+        return False
+    return bool(whole) or triple == JOINED
 
 
 def shared_tasks(

@@ -10,7 +10,7 @@ import hashlib
 import logging
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -117,16 +117,7 @@ def write(
             raise InputError(
                 f"{arguments.file}: holds no joint angles; leave --arm out"
             )
-        path = arguments.out / f"{name}.npz"
-        if not name or path.parent != arguments.out:
-            raise InputError(
-                f"{arguments.file}: the trial {name!r} needs a name that a file can "
-                "have"
-            )
-        if path in paths:
-            raise InputError(
-                f"{arguments.file}: two trials are named {name}; rename one of them"
-            )
+        path = _path(arguments, name, paths)
         paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
         digest = hashlib.sha256(recording.frames.tobytes()).hexdigest()
@@ -147,6 +138,24 @@ def write(
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)
     return 1 if skipped else 0
+
+
+def _path(arguments: argparse.Namespace, name: str, paths: Set[Path]) -> Path:
+    """The file of a trial, which is none of those before it.
+
+    Raises:
+        InputError: the name is impossible, or taken.
+    """
+    path: Path = arguments.out / f"{name}.npz"
+    if not name or path.parent != arguments.out:
+        raise InputError(
+            f"{arguments.file}: the trial {name!r} needs a name that a file can have"
+        )
+    if path in paths:
+        raise InputError(
+            f"{arguments.file}: two trials are named {name}; rename one of them"
+        )
+    return path
 
 
 def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:

@@ -58,18 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
-    several, recorded = len(arguments.recording) > 1, Path(first).suffix == ".npz"
-    details = arguments.scene or arguments.threshold is not None
-    for wrong, sentence in (
-        (arguments.dark and not several, "--dark is for several recordings"),
-        (several and details, "--scene and --threshold are for a single recording"),
-        (
-            arguments.model is not None and recorded and details,
-            "--model draws other curves than --scene and --threshold; give one of them",
-        ),
-    ):
-        if wrong:
-            raise InputError(sentence)
+    several = len(arguments.recording) > 1
+    recorded = Path(first).suffix == ".npz"
+    _check(arguments, several, recorded)
     model = None if arguments.model is None else Model(arguments.model)
     if several:
         from train.draw import comparison
@@ -100,3 +91,16 @@ def run(arguments: argparse.Namespace) -> int:
         )
     print(out)
     return 0
+
+
+def _check(arguments: argparse.Namespace, several: bool, recorded: bool) -> None:
+    """Refuse options that do not go together."""
+    details = arguments.scene or arguments.threshold is not None
+    if arguments.dark and not several:
+        raise InputError("--dark is for several recordings")
+    if several and details:
+        raise InputError("--scene and --threshold are for a single recording")
+    if arguments.model is not None and recorded and details:
+        raise InputError(
+            "--model draws other curves than --scene and --threshold; give one of them"
+        )

@@ -77,7 +77,7 @@ def cost(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Work and write."""
-    from train.tradeoff.run import require_enough, tradeoff
+    from train.tradeoff.run import Options, require_enough, tradeoff
 
     check_writable(arguments.out)  # before the work
     if arguments.check:
@@ -85,17 +85,14 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.board is None:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
-    report = tradeoff(
-        arguments.data,
-        arguments.out,
-        arguments.board,
-        scene_path=arguments.scene,
-        jobs=arguments.jobs,
-        main=arguments.task,
+    options = Options(
+        scene=arguments.scene,
+        formats=arguments.formats,
+        task=arguments.task,
         wrong=arguments.cost[0],
         second=arguments.cost[1],
-        formats_path=arguments.formats,
         quick=arguments.quick,
+        jobs=arguments.jobs,
     )
-    print(report)
+    print(tradeoff(arguments.data, arguments.out, arguments.board, options))
     return 0

@@ -104,6 +104,12 @@ def _check_size(path: Path, values: int) -> None:
         )
 
 
+def _is_used(name: str, used: set[str]) -> bool:
+    """Whether an array is among the named ones, or has the times or trials."""
+    named = not used or name in used or name == "trial"
+    return named or TIME.fullmatch(name) is not None
+
+
 def table_of(
     path: Path, arrays: Mapping[str, NDArray[Any]], axis: int | None, used: set[str]
 ) -> Table:
@@ -119,11 +125,11 @@ def table_of(
     Raises:
         InputError: no axis, or more than one, can be the time's.
     """
-    numbers = {}
-    for name, array in arrays.items():
-        wanted = not used or name in {*used, "trial"} or TIME.fullmatch(name)
-        if wanted and _is_numeric(array):
-            numbers[name] = _without_ones(np.atleast_1d(array))
+    numbers = {
+        name: _without_ones(np.atleast_1d(array))
+        for name, array in arrays.items()
+        if _is_numeric(array) and _is_used(name, used)
+    }
     if not numbers:
         raise InputError(f"{path}: {EMPTY}")
     frames = _frames(path, numbers, axis)

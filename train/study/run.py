@@ -9,7 +9,7 @@ from pathlib import Path
 
 from edge.errors import InputError
 from train.cluster import on_cluster
-from train.dataset import load_trials
+from train.dataset import DataSet, load_trials
 from train.feature_sets import expand
 from train.progress import bar
 from train.report.page import write
@@ -41,6 +41,22 @@ FEWEST = 20
 """Smallest number of trials, because the grid has 20 components."""
 
 
+def _studied(data: Sequence[str]) -> DataSet:
+    """The recordings, with the features of every analysis.
+
+    Raises:
+        InputError: they are too few.
+    """
+    names = expand([name for name, _ in methods.OURS])
+    dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
+    if len(dataset.trials) < FEWEST:
+        raise InputError(
+            f"{counted(len(dataset.trials), 'trial')} are too few to study; give "
+            f"{FEWEST} or more"
+        )
+    return dataset
+
+
 def study(
     data: Sequence[str],
     out: Path,
@@ -69,22 +85,14 @@ def study(
         if value < 1:
             raise InputError(f"{option} must be at least 1, not {value}")
     source = None if scene is None else scenes.load(scene)
-    names = expand([name for name, _ in methods.OURS])
-    dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
-    if len(dataset.trials) < FEWEST:
-        raise InputError(
-            f"{counted(len(dataset.trials), 'trial')} are too few to study; give "
-            f"{FEWEST} or more"
-        )
-    context = Context(
-        dataset, source, Workers(jobs, None if address is None else "dask")
-    )
+    dataset = _studied(data)
+    workers = Workers(jobs, None if address is None else "dask")
+    context = Context(dataset, source, workers)
     constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
         raise InputError(
             f"every trial has the same {' and the same '.join(constant)}: there is "
-            "nothing to "
-            "distinguish; give recordings of two classes or more"
+            "nothing to distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
         # The last comes first, because it notices when the recordings are of another

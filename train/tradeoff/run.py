@@ -3,6 +3,7 @@ board."""
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.files import write_whole
-from train.dataset import read
+from train.dataset import DataSet, read
 from train.report.page import write
 from train.report.section import Row, Section, counted
 from train.report.work import Workers
@@ -55,34 +56,39 @@ def rows_by_change(rows: Sequence[Row]) -> dict[str, Row]:
     return {str(row["change"]): row for row in rows}
 
 
-def tradeoff(
-    data: Sequence[str],
-    out: Path,
-    board_path: str,
-    *,
-    scene_path: str | None = None,
-    jobs: int = 1,
-    main: str | None = None,
-    wrong: float = 10.0,
-    second: float = 1.0,
-    formats_path: str | None = None,
-    quick: bool = False,
-) -> Path:
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What a trade-off is measured with.
+
+    Attributes:
+        scene: the file of the scene that the recordings were simulated from, for the
+            physical limit.
+        formats: the file that `python -m export.arithmetic` wrote about the board's
+            model.
+        task: of front.json; by default `category`, or else the first.
+        wrong, second: an owner's price of a wrong decision, and of waiting for a
+            second.
+        quick: make quick choices.
+        jobs: processes.
+    """
+
+    scene: str | None = None
+    formats: str | None = None
+    task: str | None = None
+    wrong: float = 10.0
+    second: float = 1.0
+    quick: bool = False
+    jobs: int = 1
+
+
+def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) -> Path:
     """Measure the choice at each window and with each change, and write the report.
 
     Args:
         data: recordings and folders of them.
         out: folder of the report.
         board_path: board.json of a model that was fitted on these recordings.
-        scene_path: the scene that the recordings were simulated from, for the physical
-            limit.
-        jobs: processes.
-        main: the task of front.json; by default `category`, or else the first.
-        wrong, second: an owner's price of a wrong decision, and of waiting for a
-            second.
-        formats_path: the file that `python -m export.arithmetic` wrote about that
-            model.
-        quick: make quick choices.
+        options: see there.
 
     Returns:
         The path of report.html.
@@ -92,26 +98,24 @@ def tradeoff(
             recordings.
     """
     board = boards.read(board_path)
-    formats = [] if formats_path is None else boards.read_formats(formats_path)
-    scene = None if scene_path is None else scenes.load(scene_path)
+    formats = [] if options.formats is None else boards.read_formats(options.formats)
+    scene = None if options.scene is None else scenes.load(options.scene)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
-    ready = prepared(raw, quick=quick, jobs=jobs)
+    quick = options.quick
+    ready = prepared(raw, quick=quick, jobs=options.jobs)
     dataset = ready.dataset
     require_enough(len(dataset.trials))
-    main = main or ("category" if "category" in dataset.tasks else dataset.tasks[0])
-    if main not in dataset.tasks:
-        raise InputError(
-            f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}"
-        )
+    main = _main_task(dataset, options.task)
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
-    y = {task: dataset.labels(task) for task in order}
-    workers = Workers(jobs)
+    workers = Workers(options.jobs)
     choose = partial(chosen, quick=quick)
     made = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
     points = dict(zip(ready.windows, made, strict=True))
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
-    comparisons = early.compare_stopping(dataset, WINDOWS_S, quick=quick, jobs=jobs)
+    comparisons = early.compare_stopping(
+        dataset, WINDOWS_S, quick=quick, jobs=options.jobs
+    )
     sheared = None
     if dataset.layout.axes:
         measured_with = shear.Answers(points, comparisons)
@@ -125,33 +129,50 @@ def tradeoff(
             f"{main} {gain} points."
         )
     measured = Measured(
-        y=y,
+        y={task: dataset.labels(task) for task in order},
         board=board,
         wire_s=wire_time_s(raw.recordings, dataset.layout, rate),
         breakaways={} if scene is None else breakaway_times(scene),
         points=points,
         comparisons=comparisons,
         costs=rows,
-        wrong=wrong,
-        second=second,
+        wrong=options.wrong,
+        second=options.second,
         formats=formats,
         shear=sheared,
-        commands=Commands(tuple(map(str, data)), out, scene_path, quick),
+        commands=Commands(tuple(map(str, data)), out, options.scene, quick),
         notes=notes,
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
-    lead = [
-        "How long must a robot wait before it knows what its arm has touched? This "
-        "report measures "
-        "the accuracy after each time, and the cost of each way to save. It is based "
-        "on "
-        f"{counted(len(dataset.trials), 'contact')}{simulated}."
-    ]
-    sections = [make(measured) for make in SECTIONS]
-    if sheared is not None:
-        sections.insert(1, shear.section(sheared))
-    report = write(out, "Accuracy against time", lead, sections)
+    report = _write(measured, out, counted(len(dataset.trials), "contact") + simulated)
     best = ParetoFront.of(points, main, measured.after_s, quick=quick)
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
     return report
+
+
+def _main_task(dataset: DataSet, task: str | None) -> str:
+    """The task of front.json.
+
+    Raises:
+        InputError: the recordings have no labels for it.
+    """
+    main = task or ("category" if "category" in dataset.tasks else dataset.tasks[0])
+    if main not in dataset.tasks:
+        raise InputError(
+            f"--task must be one of {', '.join(dataset.tasks)}, not {main!r}"
+        )
+    return main
+
+
+def _write(measured: Measured, out: Path, contacts: str) -> Path:
+    """Write the report on so many contacts."""
+    lead = [
+        "How long must a robot wait before it knows what its arm has touched? This "
+        "report measures the accuracy after each time, and the cost of each way to "
+        f"save. It is based on {contacts}."
+    ]
+    sections = [make(measured) for make in SECTIONS]
+    if measured.shear is not None:
+        sections.insert(1, shear.section(measured.shear))
+    return write(out, "Accuracy against time", lead, sections)

@@ -31,7 +31,7 @@ from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, unseen
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.run import tradeoff
+from train.tradeoff.run import Options, tradeoff
 from train.tradeoff.wires import spread, wire, wire_time_s, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
@@ -385,7 +385,7 @@ def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
     digest = read([data]).digest
     path = board_file(tmp_path / "board.json", digest)
     out = tmp_path / "out"
-    report = tradeoff([data], out, str(path), scene_path=str(SCENE), quick=True)
+    report = tradeoff([data], out, str(path), Options(scene=str(SCENE), quick=True))
     text = report.read_text()
     assert "http" not in text
     assert (
