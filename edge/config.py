@@ -143,7 +143,9 @@ class ConfigTable:
             name = prefix.rstrip(".: ") or ("" if ": " in where else "the file")
             thing = f"{where}: {name}" if name else where
             raise InputError(f"{thing} must be a table, not {shown(raw)}")
-        self.raw, self.where, self.prefix = raw, where, prefix
+        self.raw = raw
+        self.where = where
+        self.prefix = prefix
         self._taken: list[str] = []
 
     def called(self, key: str) -> str:

@@ -22,7 +22,8 @@ LARGEST_BYTES = 1 << 27
 """Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111
 MB, two minutes of 64 x 62 taxels at 100 Hz take 95."""
 MAX_COUNTS = 65535
-SLOWEST_HZ, FASTEST_HZ = 2.0, 5000.0
+SLOWEST_HZ = 2.0
+FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
 LOG = logging.getLogger(__name__)
 KEYS = ("t", "frames", "joints", "valid", "shear", "meta")
@@ -280,7 +281,8 @@ def _counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
             "the taxels "
             "in `valid`"
         )
-    low, high = frames.min(initial=0), frames.max(initial=0)
+    low = frames.min(initial=0)
+    high = frames.max(initial=0)
     if low < 0:
         raise InputError(
             f"frames go down to {low:g}, but counts are above baseline: "

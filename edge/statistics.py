@@ -15,5 +15,6 @@ def wilson(
     """
     zz = z * z
     spread = z * math.sqrt(zz + 4 * right * (1 - right / total))
-    low, high = right + (zz - spread) / 2, right + (zz + spread) / 2
+    low = right + (zz - spread) / 2
+    high = right + (zz + spread) / 2
     return low / (total + zz), high / (total + zz)

@@ -179,10 +179,8 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
         *(target for choice in choices.values() for target in choice.targets),
     }
     y = {task: dataset.labels(task) for task in tasks}
-    X, widths = (
-        dataset.features(fitted.window_s, fitted.samples),
-        dataset.widths(fitted.samples),
-    )
+    X = dataset.features(fitted.window_s, fitted.samples)
+    widths = dataset.widths(fitted.samples)
     classifier = ContactClassifier(choices, dataset.names, widths).fit(X, y)
     data = to_onnx(
         classifier, describe(dataset, classifier, {}, fitted.window_s, fitted.samples)
@@ -191,7 +189,8 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
         path = Path(folder) / "model.onnx"
         path.write_bytes(data)
         model = Model(path)
-    series, seconds = fitted.measured.trials[0].series, []
+    series = fitted.measured.trials[0].series
+    seconds = []
     for _ in range(CALLS):
         began = time.perf_counter()
         model.decide(model.info.vector(series))

@@ -30,7 +30,8 @@ from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import load_arrays
 
-ROUNDS, CALLS = 7, 200
+ROUNDS = 7
+CALLS = 200
 
 
 def _round_to_float32(tensor: onnx.TensorProto) -> None:
@@ -95,7 +96,8 @@ def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
     logging.getLogger().setLevel(
         logging.ERROR
     )  # it advises steps that change nothing here
-    before, after = folder / "float32.onnx", folder / "int8.onnx"
+    before = folder / "float32.onnx"
+    after = folder / "int8.onnx"
     onnx.save(model, before)
     quantize_dynamic(before, after)
     return onnx.load(after)
@@ -150,7 +152,8 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
         InputError: a file is missing, or no such file.
     """
     info = Model(model).info
-    tasks, vectors = list(info.tasks), load_arrays(golden).get("vectors")
+    tasks = list(info.tasks)
+    vectors = load_arrays(golden).get("vectors")
     if vectors is None or vectors.ndim != 2 or vectors.shape[1] != info.width:
         raise InputError(
             f"{golden}: has no vectors of {info.width} features; give the golden file "

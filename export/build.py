@@ -22,7 +22,8 @@ class Builder:
     """
 
     def __init__(self, scope: Any, container: Any, decision_point: str = "") -> None:
-        self._scope, self._container = scope, container
+        self._scope = scope
+        self._container = container
         self.decision_point = decision_point
         self._constants: dict[tuple[str, str, tuple[int, ...], bytes], str] = {}
         self._made: dict[tuple[Any, ...], str] = {}

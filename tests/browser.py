@@ -41,7 +41,8 @@ def chromium(width: int, address: str) -> Iterator[Any]:
     webdriver = pytest.importorskip(
         "selenium.webdriver", reason="needs the group `browser`"
     )
-    program, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    program = shutil.which("chromium")
+    driver = shutil.which("chromedriver")
     if program is None or driver is None:
         pytest.skip("needs Chromium and chromedriver")
     options = webdriver.ChromeOptions()

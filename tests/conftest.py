@@ -61,7 +61,8 @@ def touch(
     n = round((lead_s + seconds) * rate)
     t = np.arange(n) / rate
     frames = np.zeros((n, layout.rows, layout.cols), dtype=np.uint16)
-    row, col = rng.integers(4, 10), rng.integers(0, layout.cols)
+    row = rng.integers(4, 10)
+    col = rng.integers(0, layout.cols)
     slope = rng.uniform(0.8, 1.2)
     for i in np.flatnonzero(t >= lead_s):
         age = (t[i] - lead_s) * slope

@@ -35,7 +35,9 @@ OVERHEADS_US = (0.0, 50.0, 100.0)
 """Microseconds a transaction."""
 BACK_S = 0.5
 """Time after a fault's end within which every taxel must be valid again."""
-BEGIN_S, END_S, LASTS_S = 0.5, 1.0, 2.2
+BEGIN_S = 0.5
+END_S = 1.0
+LASTS_S = 2.2
 """When a lasting fault begins and ends, and how long it is watched."""
 REPEATED = (3, 20, 37, 54)
 """Frames before which all chips lose their settings, where that repeats."""
@@ -137,7 +139,8 @@ class Watched:
     judged."""
 
     def __init__(self, file, *, faults=(), overhead_s=0.0, seed=0):
-        clock, self.feels = VirtualClock(), Pattern(file)
+        clock = VirtualClock()
+        self.feels = Pattern(file)
         self.buses = faulty_buses(
             file,
             self.feels,
@@ -280,7 +283,8 @@ def scripts():
     saw noise. A wrong channel is found by reading the mux back, which a skin file may
     switch off.
     """
-    cody, pad = SKINS["cody"], SKINS["mpr121"]
+    cody = SKINS["cody"]
+    pad = SKINS["mpr121"]
     first = cody.buses[0].device
     lasting = {"during": (BEGIN_S, END_S)}
     chip = {"bus": first, "mux": 0x70, "channel": 1, "address": 0x2D, **lasting}

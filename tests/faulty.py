@@ -91,8 +91,10 @@ class FaultyBus(FakeBus):
 
     def transfer(self, prepared: Transfer) -> None:
         """Carry the messages, with the fault that is due."""
-        first, into = prepared.messages[0], prepared.messages[-1]
-        route, number = self._route(first.address), self.transactions - self._first
+        first = prepared.messages[0]
+        into = prepared.messages[-1]
+        route = self._route(first.address)
+        number = self.transactions - self._first
         fault = self._due(route, number) if self.is_open else Fault("none")
         if fault.kind == "error":
             self.transactions += 1
@@ -168,7 +170,8 @@ def faulty_buses(file, scene, clock, *, faults=(), seed=0, **options):
 
 def faulty_skin(file, scene, faults=(), **options):
     """A started skin over fake buses; the faults begin after the start."""
-    clock, file = VirtualClock(), calibrated(file)
+    clock = VirtualClock()
+    file = calibrated(file)
     skin = Skin(file, faulty_buses(file, scene, clock, **options), clock=clock)
     skin.start()
     clock.sleep_until(clock.now())
@@ -180,7 +183,8 @@ def faulty_skin(file, scene, faults=(), **options):
 def one_bus(file):
     """The skin with the chips of all its buses on one, behind further channels of one
     mux."""
-    chips, channel = [], 0
+    chips = []
+    channel = 0
     for bus in file.buses:
         chips += [
             replace(chip, channel=channel + (chip.channel or 0)) for chip in bus.chips

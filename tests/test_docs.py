@@ -75,16 +75,15 @@ def test_the_two_evenings_mend_a_mistake(tmp_path):
     assert ran.returncode == 0, ran.stderr
     events = [json.loads(x) for x in ran.stdout.splitlines() if x.startswith("{")]
     objects = [e["label"] for e in events if e.get("task") == "object"]
-    before, after = objects[0], objects[-1]
+    before = objects[0]
+    after = objects[-1]
     assert before != "pillow"
     assert after == "pillow"
 
 
 def test_the_notebook_runs(tmp_path):
-    nbclient, nbformat = (
-        pytest.importorskip("nbclient"),
-        pytest.importorskip("nbformat"),
-    )
+    nbclient = pytest.importorskip("nbclient")
+    nbformat = pytest.importorskip("nbformat")
     notebook = nbformat.read(DOCS / "first-touch.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
     nbclient.NotebookClient(

@@ -91,7 +91,8 @@ class Ros:
     has ended."""
 
     def __init__(self, **parameters):
-        self.topics, self.heard = defaultdict(list), {}
+        self.topics = defaultdict(list)
+        self.heard = {}
         ros = self
 
         class Node:
@@ -123,7 +124,8 @@ class Ros:
                 super().__init__(header=types.SimpleNamespace(), **fields)
 
         class DiagnosticStatus(Message):
-            OK, WARN = "ok", "warn"
+            OK = "ok"
+            WARN = "warn"
 
         kinds = (
             *("String", "JointState", "Classification", "ObjectHypothesis"),
@@ -178,7 +180,8 @@ def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
 def test_the_ros_node_takes_joint_angles_by_name(monkeypatch):
     """The skin is played from a recording, and JointState gives the angles."""
     recording = edge.load(PILLOW)
-    model, chain = edge.Model(demo.MODEL), edge.Chain.cody()
+    model = edge.Model(demo.MODEL)
+    chain = edge.Chain.cody()
     model.info = replace(model.info, chain=chain)
     monkeypatch.setattr(edge, "Model", lambda path: model)
     skin, _ = play(skin_file(recording.layout), recording)

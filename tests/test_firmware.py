@@ -70,7 +70,8 @@ class Registers:
     """A chip on the fake bus that answers with the firmware's own bytes."""
 
     def __init__(self, registers):
-        self.registers, self.pointer = registers, None
+        self.registers = registers
+        self.pointer = None
 
     def write(self, data, t):
         self.pointer = data[0]

@@ -35,7 +35,8 @@ def specified(module):
         return True
     if {THROUGH.get(part.as_posix()) for part in (module, module.parent)} & set(TESTS):
         return True
-    package, name = ".".join(module.parent.parts), module.stem
+    package = ".".join(module.parent.parts)
+    name = module.stem
     imported = rf"(from|import) {package}\.{name}\b|from {package} import .*\b{name}\b"
     if module.parent.name in ("commands", "tools"):
         imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""

@@ -47,7 +47,8 @@ WITH_SHEAR = (
 )
 """Those that recordings of a skin of three axes have besides, with or without joint
 angles."""
-DRAWN, DRAWN_WITH_JOINTS = ("contact",), ("contact", "joints")
+DRAWN = ("contact",)
+DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
 (`kinds_of`). Joint angles at onset and single taxels say how the scene is built.
 Moments say how large and of what form a contact is, in which simulators of soft things
@@ -59,7 +60,8 @@ COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
 QUICK_SHRINKAGES = (0.3, 0.03)
 FEW_NEIGHBOURS = (1, 3, 5)
 PAPER_SCALINGS = ("none", "I", "IV", "V")
-DRAWN_SHRINKAGES, DRAWN_COMPONENTS = (1.0, 0.3), (1, 2, 3, 4, 6, 8, 10)
+DRAWN_SHRINKAGES = (1.0, 0.3)
+DRAWN_COMPONENTS = (1, 2, 3, 4, 6, 8, 10)
 """Those tried for touches of simulated things of several kinds, and the most
 discriminants. Another physics differs most in differences that are small beside the
 features' spread."""

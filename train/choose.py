@@ -41,7 +41,9 @@ KIND = "kind"
 """Left out in place of an object where `kinds_of` names the kinds."""
 TRIAL = "trial"
 QUICK_FOLDS = 5
-GROUP_FOLDS, FEW, MANY = 20, 300, 2000
+GROUP_FOLDS = 20
+FEW = 300
+MANY = 2000
 """Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
 and five with more than `MANY`: four fifths of so many trials teach nearly as much as
 all."""
@@ -161,7 +163,8 @@ class Choosing:
         for name, groups in ((KIND, kinds), (leave_out, dataset.groups(leave_out))):
             if groups is None or name == TRIAL or self._grouped:
                 continue
-            self._leave_out, self._groups = name, groups
+            self._leave_out = name
+            self._groups = groups
             self._grouped = {t for t in y if t != leave_out and groupable(y[t], groups)}
             few = len(groups) <= FEW and not quick
             count = GROUP_FOLDS if few else fold_count(len(groups), quick)
@@ -464,10 +467,8 @@ def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> 
             and recordings of no touch as right.
         groups: number of the groups left out; 0 for single trials.
     """
-    right, total = (
-        result.right + untouched.count(NO_CONTACT),
-        result.total + len(untouched),
-    )
+    right = result.right + untouched.count(NO_CONTACT)
+    total = result.total + len(untouched)
     variance = max(VARIANCE, total / groups if groups else 0.0)
     counted = {"right": right, "total": total, "variance": variance}
     return Promise(**{**vars(result), **counted})

@@ -83,7 +83,9 @@ def neighbours(
             others = np.delete(np.arange(n), i)
             mean, gain, known = centred_and_scaled(X[others], scaling, features)
             axes = Spectrum(known).leading(max_components)
-            weights, grid, used = on_grid(axes.T), Grid.of(known, len(axes)), len(axes)
+            weights = on_grid(axes.T)
+            grid = Grid.of(known, len(axes))
+            used = len(axes)
             differences = grid.project(known, weights) - grid.project(
                 (query - mean) * gain, weights
             )

@@ -34,7 +34,9 @@ from train.vectors import Labels, Vectors
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""
-ALONE, SIMULATED, ONCE = (0, 1), (1, 0), (1, 1)
+ALONE = (0, 1)
+SIMULATED = (1, 0)
+ONCE = (1, 1)
 """Weights of the simulated trials and of the owner's."""
 
 

@@ -97,7 +97,8 @@ def _left_out(
     counting = choices[task].counts(y[task], own) > 0
     counting[test] = False
     others = np.flatnonzero(counting)
-    quarter_of, answers = stratified_folds(y[task][others], QUARTERS), []
+    quarter_of = stratified_folds(y[task][others], QUARTERS)
+    answers = []
     for quarter in range(QUARTERS):
         train = others[quarter_of <= quarter]
         owned = None if own is None else own[train]
@@ -106,7 +107,8 @@ def _left_out(
         model = ContactClassifier(fewer, features, widths).fit(X[train], known, owned)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]
-    key, c = model.spaces_[task], model.components_[task]
+    key = model.spaces_[task]
+    c = model.components_[task]
     p = model.projections_[key]
     space = Space(
         model.columns_[key],
@@ -128,7 +130,8 @@ def _left_out(
         test.tolist(), rows.tolist(), answers[-1], strict=True
     ):
         if answer != y[task][trial] or trial % max(len(X) // EXPLAINED, 1) == 0:
-            label, truth = int(np.searchsorted(classes, answer)), int(index[trial])
+            label = int(np.searchsorted(classes, answer))
+            truth = int(index[trial])
             why = explain(space, X[trial], voters, label, features, widths, truth)
             voted = tuple(map(numbered, why.voters))
             explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
@@ -150,7 +153,8 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
         *(target for choice in choices for target in choice.targets),
     }
     y = {task: dataset.labels(task) for task in tasks}
-    answers, cases = {}, []
+    answers = {}
+    cases = []
     for task, chosen in fitted.chosen.items():
         tested = (chosen.folds >= 0) & (y[task] != "")
         truth = np.where(tested, y[task], "")
@@ -160,10 +164,8 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
                 cases.append((task, by_task, test))
-    X, widths = (
-        dataset.features(fitted.window_s, fitted.samples),
-        dataset.widths(fitted.samples),
-    )
+    X = dataset.features(fitted.window_s, fitted.samples)
+    widths = dataset.widths(fitted.samples)
     left_out = partial(_left_out, X, y, dataset.names, widths, dataset.own)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
     for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
@@ -202,7 +204,8 @@ def write(
 
 def _accuracy(exported: Exported, task: str) -> Section:
     """A task's accuracy, its confusion matrix, and the scores of each class."""
-    answer, chosen = exported.answers[task], exported.fitted.chosen[task]
+    answer = exported.answers[task]
+    chosen = exported.fitted.chosen[task]
     untouched = exported.fitted.dataset.untouched_labels(task)
     tested = answer.truth != ""
     truth = np.array([*answer.truth[tested], *untouched], dtype=str)
@@ -260,7 +263,8 @@ def _file(task: str) -> str:
 def _wrong(exported: Exported) -> Section:
     """The wrong answers, and a picture of the first."""
     figures: list[Figure] = []
-    fitted, rows = exported.fitted, []
+    fitted = exported.fitted
+    rows = []
     trials = names(fitted.measured)[1]
     for task, answer in exported.answers.items():
         for trial in answer.wrong:
@@ -299,12 +303,15 @@ def _picture(
 ) -> Figure:
     """The first wrong answer: the touch's curves over those of the trials that voted
     for it."""
-    trial, measured = answer.wrong[0], fitted.measured
-    why, wrong = answer.explained[trial], str(answer.answers[-1][trial])
+    trial = answer.wrong[0]
+    measured = fitted.measured
+    why = answer.explained[trial]
+    wrong = str(answer.answers[-1][trial])
     near = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
     entries = []
     for n in near:
-        label, series = answer.classes[n.label], measured.trials[n.row].series
+        label = answer.classes[n.label]
+        series = measured.trials[n.row].series
         entries.append(
             (f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong)
         )
@@ -321,7 +328,8 @@ def _picture(
 def _features(exported: Exported) -> Section:
     """Each feature's share in the answers to left-out trials."""
     fitted = exported.fitted
-    dataset, rows = fitted.dataset, []
+    dataset = fitted.dataset
+    rows = []
     widths = dict(zip(dataset.names, dataset.widths(fitted.samples), strict=True))
     for name, unit in dataset.units.items():
         row: Row = {"feature": name}

@@ -83,7 +83,8 @@ def slope(gaps: NDArray[np.float64]) -> float:
     size = float(np.abs(gaps).mean()) if gaps.any() else 0.0
     if size == 0.0:
         return 1.0
-    x, most = gaps / size, len(gaps) + 10.0
+    x = gaps / size
+    most = len(gaps) + 10.0
 
     def rise(change: float) -> float:
         return float((x * expit(-change * x)).sum() - 0.5 * np.tanh(0.5 * change))
@@ -251,7 +252,8 @@ class ContactClassifier:
         for task, choice in self.choices.items():
             each = choice.counts(y[task], own)
             space = (*choice.space(task), () if (each == 1).all() else each.tobytes())
-            self.spaces_[task], counts[space] = space, each
+            self.spaces_[task] = space
+            counts[space] = each
             n = int((each > 0).sum())
             if not 1 <= choice.k <= n:
                 raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
@@ -305,7 +307,8 @@ class ContactClassifier:
         measured = np.lexsort([y[task] for task in sorted(y)])[
             :: -(-len(X) // MOST_MEASURED)
         ]
-        X, y = X[measured], {task: labels[measured] for task, labels in y.items()}
+        X = X[measured]
+        y = {task: labels[measured] for task, labels in y.items()}
         own = None if own is None else own[measured]
         folds = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
@@ -364,7 +367,8 @@ class ContactClassifier:
     def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, members) squared distances of vectors (m, p) to the trials of the task's
         space."""
-        space, c = self.spaces_[task], self.components_[task]
+        space = self.spaces_[task]
+        c = self.components_[task]
         return squared_distances(
             self.project(space, X)[:, :c], self.rows_[space][:, :c]
         )

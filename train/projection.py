@@ -199,7 +199,8 @@ class Spectrum:
         root = 1.0 / np.sqrt(self.values + ridge)
         sizes = np.bincount(labels)
         if not sizes.all():
-            sizes, labels = sizes[sizes > 0], np.unique(labels, return_inverse=True)[1]
+            sizes = sizes[sizes > 0]
+            labels = np.unique(labels, return_inverse=True)[1]
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
         # The indicators of the members need no centring, as the rows are centred.
         means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
@@ -277,7 +278,8 @@ class Grid:
             projected: (n, c) their coordinates; None for principal components, along
                 which rows are at most as long as d, whatever the number of components.
         """
-        largest, bits = float(np.abs(d).max(initial=0.0)), coordinate_bits(components)
+        largest = float(np.abs(d).max(initial=0.0))
+        bits = coordinate_bits(components)
         rows = d if projected is None else projected
         longest = float(np.sqrt((rows**2).sum(axis=1)).max(initial=0.0))
         return cls(

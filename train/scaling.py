@@ -11,7 +11,8 @@ from edge.touch.measures import feature
 
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
-SMALLEST_SCALE, LARGEST_SCALE = 1e-30, 1e100
+SMALLEST_SCALE = 1e-30
+LARGEST_SCALE = 1e100
 """Sizes of scaled features whose grid steps and squares are ordinary float64
 numbers."""
 
@@ -86,7 +87,8 @@ def scale_of(
     Raises:
         InputError: the method is unknown, or the columns are not those of the features.
     """
-    types, sizes = len(features), np.array(widths_of(X.shape[1], features, widths))
+    types = len(features)
+    sizes = np.array(widths_of(X.shape[1], features, widths))
     if method in ("none", "III"):
         return np.ones(types)
     starts = np.cumsum(sizes) - sizes

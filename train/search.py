@@ -137,12 +137,10 @@ class Decomposition:
         labels: Mapping[str, NDArray[np.int64]],
         first: NDArray[np.int64],
     ) -> None:
-        self._spectrum, self._new, self._labels, self._first = (
-            Spectrum(rows),
-            new,
-            labels,
-            first,
-        )
+        self._spectrum = Spectrum(rows)
+        self._new = new
+        self._labels = labels
+        self._first = first
         self._new_scores: NDArray[np.float64] | None = None
         self._along: dict[
             tuple[str, float], tuple[NDArray[np.float64], NDArray[np.float64]]

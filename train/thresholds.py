@@ -21,7 +21,8 @@ MISSED_SHARE = 0.02
 """Of the touches, which a proposal may miss."""
 FELT_SHARE = 0.05
 """Of the recordings labelled with a touch; fewer contacts mean that the noise was none."""
-BEGUN_RATIO, BEGUN_SHARE = 3.0, 0.2
+BEGUN_RATIO = 3.0
+BEGUN_SHARE = 0.2
 """A recording begins in contact if a count of its first frames is above three times the
 median taxel, and above a fifth of its highest count."""
 QUIETEST = 0.2

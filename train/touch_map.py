@@ -47,13 +47,12 @@ def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
             str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"]))
         )
     x, y, z = map(float, entry["place"])
-    onset_s, confidence = float(entry["onset_s"]), float(entry["confidence"] or 0.0)
+    onset_s = float(entry["onset_s"])
+    confidence = float(entry["confidence"] or 0.0)
     if not all(map(math.isfinite, (x, y, z, onset_s, confidence))):
         raise ValueError("not finite")
-    task, label = (
-        str(entry["task"]),
-        None if entry["label"] is None else str(entry["label"]),
-    )
+    task = str(entry["task"])
+    label = None if entry["label"] is None else str(entry["label"])
     contact = int(entry["contact"])
     return Touch(contact, onset_s, (x, y, z), {task: label}, {task: confidence})
 
@@ -101,7 +100,8 @@ class TouchMap:
         waiting: dict[tuple[int, float], Touch] = {}
         for number, line in self._lines():
             if isinstance(line, Head):
-                head, waiting = line, {}
+                head = line
+                waiting = {}
                 if head[:2] != self.head[:2]:
                     raise InputError(
                         f"{self.path}: line {number} begins a run in the frame "

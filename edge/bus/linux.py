@@ -80,7 +80,8 @@ class LinuxBus:
             BusError: it does not exist, may not be opened, is in use, or carries no
                 plain I2C.
         """
-        self.name, self.timeout_s = device, timeout_s
+        self.name = device
+        self.timeout_s = timeout_s
         self._smbus: Any = None
         self._fd = -1
         self._asked: set[int] = set()
@@ -120,7 +121,8 @@ class LinuxBus:
         except OSError as error:
             smbus.close()
             raise bus_error(error.errno, self.name) from None
-        self._smbus, self._fd = smbus, smbus.fd
+        self._smbus = smbus
+        self._fd = smbus.fd
 
     def prepare(self, *messages: Message) -> Transfer:
         """Build smbus2's structures over the messages' own buffers, without a copy.

@@ -92,7 +92,8 @@ def serial_bits(messages: Sequence[Message]) -> int:
     >>> serial_bits([write(0, b"\\x10"), read(0, 4 + data_bytes(100, 12))])
     1630
     """
-    request, answer = 4, 1 + len(messages[-1].buffer)
+    request = 4
+    answer = 1 + len(messages[-1].buffer)
     packets = (n + n // 254 + 2 for n in (request, answer))
     return 10 * sum(packets)
 
@@ -130,7 +131,9 @@ class SerialBus:
             InputError: pyserial is not installed.
             BusError: the port does not exist or may not be opened.
         """
-        self.name, self.baud, self.timeout_s = port, baud, timeout_s
+        self.name = port
+        self.baud = baud
+        self.timeout_s = timeout_s
         self._port: Any = None
         self._received = bytearray()
         self._tag = 0
@@ -242,5 +245,6 @@ class SerialBus:
     def close(self) -> None:
         """Close the port; calling it twice is fine."""
         if self._port is not None:
-            port, self._port = self._port, None
+            port = self._port
+            self._port = None
             port.close()

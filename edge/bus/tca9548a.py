@@ -60,7 +60,9 @@ class TCA9548A:
         Raises:
             BusError: it does not answer, or does not keep its control byte.
         """
-        self.bus, self.address, self.verify = bus, address, verify
+        self.bus = bus
+        self.address = address
+        self.verify = verify
         self.control: int | None = None
         """The control byte, a bit for each connected channel; None where it is
         unknown."""
@@ -148,9 +150,12 @@ class Channel:
     """One channel of a mux: a bus that selects itself before it is used."""
 
     def __init__(self, mux: TCA9548A, n: int) -> None:
-        self.mux, self.n = mux, n
+        self.mux = mux
+        self.n = n
         self.name = f"{mux.bus.name}, mux {mux.address:#04x} channel {n}"
-        self.now, self.sleep, self.prepare = mux.bus.now, mux.bus.sleep, mux.bus.prepare
+        self.now = mux.bus.now
+        self.sleep = mux.bus.sleep
+        self.prepare = mux.bus.prepare
 
     def transfer(self, prepared: Transfer) -> None:
         """Select the channel if necessary, then send.

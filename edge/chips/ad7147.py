@@ -14,8 +14,13 @@ from numpy.typing import NDArray
 from edge.bus.protocol import Bus, fetch, read, send, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
-STAGES, STAGE_REGISTERS = 12, 8
-SYSTEM, STATUS, RESULTS, DEVICE_ID, STAGE_BANK = 0x00, 0x08, 0x0B, 0x17, 0x80
+STAGES = 12
+STAGE_REGISTERS = 8
+SYSTEM = 0x00
+STATUS = 0x08
+RESULTS = 0x0B
+DEVICE_ID = 0x17
+STAGE_BANK = 0x80
 REST = 20946
 """Cody's real skin rests there."""
 REFRESH_S = 0.009216
@@ -101,10 +106,8 @@ class AD7147(Chip):
         super().__init__(bus, address, words((RESULTS,)), into)
         self._checks = []
         for register, values in CHECK_ROWS:
-            pointer, row = (
-                write(address, words((register,))),
-                read(address, 2 * len(values)),
-            )
+            pointer = write(address, words((register,)))
+            row = read(address, 2 * len(values))
             self._checks.append((register, words(values), bus.prepare(pointer, row)))
         self._turn = -1
         identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")

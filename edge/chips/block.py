@@ -19,7 +19,8 @@ from edge.bus.crc import crc16, sealed
 from edge.bus.protocol import Bus, fetch, read, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
 
-IDENTITY, FRAME = b"\x00", b"\x10"
+IDENTITY = b"\x00"
+FRAME = b"\x10"
 MAGIC = b"TAXL\x01"
 BITS = (8, 12, 16)
 THREE_AXES = 0x80

@@ -15,9 +15,17 @@ from edge.bus.protocol import Bus, fetch, read, send, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
 ELECTRODES = 12
-TOUCH_HIGH, RESULTS, FILTER, THRESHOLDS = 0x01, 0x04, 0x2B, 0x41
-CONFIG1, CONFIG2, ECR, RESET = 0x5C, 0x5D, 0x5E, 0x80
-RESET_KEY, RESET_CONFIG2, RESET_WAIT_S = 0x63, 0x24, 0.001
+TOUCH_HIGH = 0x01
+RESULTS = 0x04
+FILTER = 0x2B
+THRESHOLDS = 0x41
+CONFIG1 = 0x5C
+CONFIG2 = 0x5D
+ECR = 0x5E
+RESET = 0x80
+RESET_KEY = 0x63
+RESET_CONFIG2 = 0x24
+RESET_WAIT_S = 0.001
 RUNNING = 0x8F
 """ECR: baseline from the first reading, twelve electrodes."""
 OVER_CURRENT = 0x80

@@ -26,12 +26,14 @@ from edge.touch.region import find_regions
 
 FRAMES = 1000
 """As many as the paper's lab averaged for its baseline."""
-FEWEST_FRAMES, MOST_FRAMES = 20, 1_000_000
+FEWEST_FRAMES = 20
+MOST_FRAMES = 1_000_000
 FEWEST_TOGETHER = 2
 """Taxels side by side that have moved as under a touch."""
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
-NOISY, NOISY_COUNTS = 10.0, 5.0
+NOISY = 10.0
+NOISY_COUNTS = 5.0
 """A taxel is being touched, or broken, if its noise exceeds this factor times the
 median noise plus so many counts."""
 

@@ -32,7 +32,8 @@ from edge.touch.frame import Frame
 from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
 
-LAST_TOUCHES, FEWEST_TOUCHES = 20, 8
+LAST_TOUCHES = 20
+FEWEST_TOUCHES = 8
 """Touches by which a model is judged to know the things that it meets."""
 
 

@@ -43,7 +43,8 @@ class FakeAD7147(FakeChip):
                 last one; 0 for results that are always fresh.
             power_up: draws the stage registers, which power-up leaves undefined.
         """
-        self._sense, self._refresh = sense, refresh_s
+        self._sense = sense
+        self._refresh = refresh_s
         self._power_up = power_up or random.Random("power-up")
         self.reset()
 
@@ -84,6 +85,7 @@ class FakeAD7147(FakeChip):
         results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
         results[last + 1 :] = 0
         self.registers[RESULTS : RESULTS + STAGES] = results
-        first, self._pointer = self._pointer, (self._pointer + (n + 1) // 2) & 0x3FF
+        first = self._pointer
+        self._pointer = (self._pointer + (n + 1) // 2) & 0x3FF
         served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
         return served.ljust(n, b"\0")[:n]

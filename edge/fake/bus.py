@@ -54,10 +54,13 @@ class FakeBus:
         """
         self.name = name
         self.chips = dict(chips or {})
-        self.clock_hz, self.timed, self.timeout_s = clock_hz, timed, timeout_s
+        self.clock_hz = clock_hz
+        self.timed = timed
+        self.timeout_s = timeout_s
         self.overhead_s = overhead_s
         self.hand = Hand(clock or VirtualClock())
-        self.now, self.sleep = self.hand.now, self.hand.advance
+        self.now = self.hand.now
+        self.sleep = self.hand.advance
         self.bits = 0
         """Bits on the wire so far."""
         self.transactions = 0
@@ -109,7 +112,8 @@ class FakeBus:
         return [room[address] for room in rooms if address in room]
 
     def _carry(self, message: Message, chips: Sequence[FakeChip]) -> None:
-        t, n = self.now(), len(message.buffer)
+        t = self.now()
+        n = len(message.buffer)
         if message.read:
             # Two chips at one address pull the same wire low.
             served = [np.frombuffer(chip.read(n, t), dtype=np.uint8) for chip in chips]

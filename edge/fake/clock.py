@@ -13,7 +13,8 @@ class Hand:
     """The time of one bus; buses run side by side, so each has its own."""
 
     def __init__(self, clock: VirtualClock) -> None:
-        self._clock, self._t = clock, clock.start
+        self._clock = clock
+        self._t = clock.start
         clock.hands.append(self)
 
     def now(self) -> float:

@@ -28,7 +28,8 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
-NOISE_FRAMES, NOISE_STEP_S = 97, 0.001
+NOISE_FRAMES = 97
+NOISE_STEP_S = 0.001
 """The noise is this many frames, repeated, each of which lasts for this many
 seconds."""
 PAUSES = 2.0

@@ -22,7 +22,8 @@ from edge.touch.layout import SkinLayout
 
 PITCH_M = 0.01
 """Assumed pitch of a skin whose own is unknown."""
-STRENGTH, SPEED = (0.8, 1.25), (0.9, 1.1)
+STRENGTH = (0.8, 1.25)
+SPEED = (0.9, 1.1)
 """Ranges from which the factors of a trial's forces and speed are drawn."""
 LEAD_S = 0.3
 """Time before the simulated contact begins."""
@@ -32,7 +33,8 @@ window."""
 LARGEST_RATIO = 0.4
 """Tangential over normal force at the end of a touch of a skin of three axes."""
 GOLDEN_ANGLE = 2.39996
-WEAKEST_ONSETS, LEAST_ONSET = 4.0, 10
+WEAKEST_ONSETS = 4.0
+LEAST_ONSET = 10
 """Where counts per newton are unknown, the strongest taxel of the weakest contact has
 the counts of this many onsets; an onset below the second number is taken to be that
 number of counts."""
@@ -136,7 +138,8 @@ def _mapped(
     row, col = (rng.uniform(0.25, 0.75) * (n - 1) for n in onto.shape)
     if onto.wraps:
         col = rng.uniform(0.0, onto.cols)
-    strength, speed = rng.uniform(*STRENGTH), rng.uniform(*SPEED)
+    strength = rng.uniform(*STRENGTH)
+    speed = rng.uniform(*SPEED)
     forces = strength * (source.frames / (source.layout.counts_per_newton or 1.0))
     lasts = float(source.t[-1] - source.t[0]) / speed
     t = np.arange(int((LEAD_S + lasts + TAIL_S) * rate_hz) + 1) / rate_hz
@@ -173,7 +176,8 @@ def _spread(
     Sources and taxels are as wide as their pitch. The position `middle` of the sources
     is mapped to the position `centre` of the taxels.
     """
-    sources, taxels = source.shape[axis], onto.shape[axis]
+    sources = source.shape[axis]
+    taxels = onto.shape[axis]
     offset = np.arange(sources) - middle
     if axis == 1 and source.wraps:
         offset = (offset + sources / 2.0) % sources - sources / 2.0

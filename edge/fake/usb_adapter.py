@@ -30,7 +30,8 @@ from edge.bus.protocol import (
 )
 from edge.errors import EdgeError, InputError
 
-VENDOR, PRODUCT = 0x0403, 0xC631
+VENDOR = 0x0403
+PRODUCT = 0xC631
 """The USB identity for which the kernel loads its driver."""
 DEVICE_DESCRIPTOR = struct.pack(
     "<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 8, VENDOR, PRODUCT, 0x0100, 0, 0, 0, 1
@@ -44,7 +45,10 @@ STANDARD = 0x00
 """The kind of a request that every USB device answers (bits 5 and 6 of its first
 byte)."""
 KIND = 0x60
-GET_STATUS, GET_DESCRIPTOR, SET_CONFIGURATION, SET_INTERFACE = 0, 6, 9, 11
+GET_STATUS = 0
+GET_DESCRIPTOR = 6
+SET_CONFIGURATION = 9
+SET_INTERFACE = 11
 STANDARD_ANSWERS = {
     (GET_STATUS, 0): bytes(2),
     (GET_DESCRIPTOR, 0x0100): DEVICE_DESCRIPTOR,
@@ -53,16 +57,24 @@ STANDARD_ANSWERS = {
     (SET_INTERFACE, 0): b"",
 }
 """Data by request and value."""
-FUNCTIONS, DELAY, STATUS, TRANSFER = 1, 2, 3, 4
+FUNCTIONS = 1
+DELAY = 2
+STATUS = 3
+TRANSFER = 4
 """Requests of the adapter; TRANSFER is the first of four, to which BEGIN and END are
 added."""
-BEGIN, END = 1, 2
+BEGIN = 1
+END = 2
 I2C_M_RD = 1
 CARRIES = struct.pack("<I", 0x0EFF0001)
 """Plain I2C, and SMBus made from it (I2C_FUNC_I2C | I2C_FUNC_SMBUS_EMUL)."""
-ACKNOWLEDGED, NOT_ACKNOWLEDGED = 1, 2
+ACKNOWLEDGED = 1
+NOT_ACKNOWLEDGED = 2
 
-SUBMIT, UNLINK, SUBMITTED, UNLINKED = 1, 2, 3, 4
+SUBMIT = 1
+UNLINK = 2
+SUBMITTED = 3
+UNLINKED = 4
 HEADER = 48
 TO_HOST = 1
 
@@ -102,7 +114,8 @@ class UsbAdapter:
         if command == UNLINK:
             # The kernel ignores this for a request that has been answered already.
             return struct.pack(">5Ii24x", UNLINKED, number, 0, 0, 0, -errno.ECONNRESET)
-        status, answer = 0, b""
+        status = 0
+        answer = b""
         try:
             answer = self.control(request[HEADER - 8 : HEADER], request[HEADER:])
         except BusTimeout:

@@ -34,7 +34,8 @@ def agreed(
         (distances[f][..., indices] for f, indices in columns.items()), distances[task]
     )
     best = np.asarray(totals.argmin(axis=-1))
-    labels, nearest = {task: best}, {task: totals}
+    labels = {task: best}
+    nearest = {task: totals}
     for factor, indices in columns.items():
         labels[factor] = indices[best]
         with_label = [

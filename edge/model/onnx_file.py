@@ -25,18 +25,28 @@ OPERATORS = frozenset(
 MOST_NODES = 1000
 """An exported model has about 20 nodes, and 15 more for each task."""
 
-GRAPH, METADATA, FUNCTIONS = 7, 14, 25
+GRAPH = 7
+METADATA = 14
+FUNCTIONS = 25
 """Fields of a ModelProto."""
-NODES, INITIALIZERS, INPUTS, OUTPUTS, SPARSE = 1, 5, 11, 12, 15
+NODES = 1
+INITIALIZERS = 5
+INPUTS = 11
+OUTPUTS = 12
+SPARSE = 15
 """Fields of a GraphProto."""
-OPERATOR, ATTRIBUTES, DOMAIN = 4, 5, 7
+OPERATOR = 4
+ATTRIBUTES = 5
+DOMAIN = 7
 """Fields of a NodeProto."""
 WHOLE = 3
 """Field of an attribute that is a whole number."""
 NUMBERS = frozenset({1, 2, 3, 4, 7, 8, 20})
 """Fields of an attribute that is a number, a text or several numbers, not a tensor or a
 graph."""
-TENSOR_NAME, EXTERNAL_DATA, DATA_LOCATION = 8, 13, 14
+TENSOR_NAME = 8
+EXTERNAL_DATA = 13
+DATA_LOCATION = 14
 """Fields of a TensorProto."""
 
 UNUSUAL = "functions, inner graphs or sparse tensors"

@@ -169,7 +169,9 @@ def _path(
     """Onsets, series and feature vectors of the trials."""
     info = model.info
     windows = (info.window_s, *info.decision_points_s)
-    onsets, integers, vectors = [], [], []
+    onsets = []
+    integers = []
+    vectors = []
     for i, trial in enumerate(_trials(arrays, meta)):
         model.require_joints(trial.dof, f"trial {i}")
         contact = first_series(trial, model)
@@ -178,7 +180,8 @@ def _path(
         onsets.append(contact[0])
         integers.append(contact[1].integers)
         vectors.append([info.vector(contact[1], window_s) for window_s in windows])
-    trials, at_windows = len(onsets), np.array(vectors).swapaxes(0, 1)
+    trials = len(onsets)
+    at_windows = np.array(vectors).swapaxes(0, 1)
     lengths = np.array([len(series) for series in integers])
     yield "series length", lengths, np.diff(arrays["series_start"]), 0.0
     yield "series counts", np.concatenate(integers), arrays["series_counts"], 0.0

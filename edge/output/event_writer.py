@@ -62,8 +62,12 @@ class LineWriter:
                 lines.
         """
         self.name = name
-        self.lost, self.problem, self.gone = 0, "", False
-        self._write, self._form, self._patient = write, form, patient
+        self.lost = 0
+        self.problem = ""
+        self.gone = False
+        self._write = write
+        self._form = form
+        self._patient = patient
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         """Lines that wait, and None at the end."""
         self._closed = False

@@ -61,7 +61,8 @@ class Periods:
 
         NaN without periods.
         """
-        rank, counted = math.ceil(self.n * percent / 100.0), 0
+        rank = math.ceil(self.n * percent / 100.0)
+        counted = 0
         for i, count in sorted(self._counts.items()):
             counted += count
             if counted >= rank:
@@ -83,7 +84,8 @@ class Schedule:
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:
-        self.clock, self.period_s = clock, period_s
+        self.clock = clock
+        self.period_s = period_s
         self.start = self._last = math.nan
         self.tick = -1
         self.missed_ticks = 0
@@ -95,7 +97,8 @@ class Schedule:
         Returns:
             The time for which the tick was planned, in seconds.
         """
-        now, stop = self.clock.now(), stop or Stop()
+        now = self.clock.now()
+        stop = stop or Stop()
         if self.tick < 0:
             self.start = now
         self.tick += 1
@@ -162,7 +165,8 @@ class Loop:
             lasts_s: duration.
             stop: ends the loop early.
         """
-        self.skin, self.joints = skin, joints
+        self.skin = skin
+        self.joints = joints
         self.schedule = Schedule(skin.clock, skin.period_s)
         self._lasts, self._stop = lasts_s, stop or Stop()
 

@@ -79,13 +79,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def measure(model: Model) -> dict[str, Any]:
     """The contents of board.json."""
-    real_s, own_s = time.perf_counter(), time.process_time()
+    real_s = time.perf_counter()
+    own_s = time.process_time()
     repeats = [time_stages(model, ROUNDS) for _ in range(REPEATS)]
-    real_s, own_s = time.perf_counter() - real_s, time.process_time() - own_s
-    waited, load = (
-        round(max(0.0, 1.0 - own_s / real_s), 3),
-        round(os.getloadavg()[0], 2),
-    )
+    real_s = time.perf_counter() - real_s
+    own_s = time.process_time() - own_s
+    waited = round(max(0.0, 1.0 - own_s / real_s), 3)
+    load = round(os.getloadavg()[0], 2)
     if waited > BUSY_SHARE:
         LOG.warning(
             f"this machine is busy: bench waited {waited:.0%} of the time, at a load "
@@ -130,7 +130,8 @@ def measure(model: Model) -> dict[str, Any]:
 def touch(model: Model, seconds: float) -> list[Frame]:
     """Frames of a touch on the model's skin that begins at once and grows in force and
     area."""
-    layout, dof = model.info.layout, model.info.dof
+    layout = model.info.layout
+    dof = model.info.dof
     rows, cols = np.ogrid[: layout.rows, : layout.cols]
     distance = np.hypot(rows - layout.rows // 2, cols - layout.cols // 2)
     frames = []
@@ -163,13 +164,17 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     the frame at which a decision is due, likewise.
     """
     info = model.info
-    layout, frames = info.layout, touch(model, info.window_s)
+    layout = info.layout
+    frames = touch(model, info.window_s)
     contact = first_contact(frames, info.tracker(layout))
     assert contact is not None
-    series, counts = contact[1], [frame.counts for frame in frames[INSIDE]]
+    series = contact[1]
+    counts = [frame.counts for frame in frames[INSIDE]]
     due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
 
-    limit, vector, calls = layout.threshold_counts, info.vector(series), range(rounds)
+    limit = layout.threshold_counts
+    vector = info.vector(series)
+    calls = range(rounds)
     model.decide(vector)
     few = max(rounds // 10, 4)
     stages = {

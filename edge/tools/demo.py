@@ -26,7 +26,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the events; 1 if a decision differs from its recording's label."""
-    classifier, output = Classifier(Model(demo.MODEL)), Output.of(arguments)
+    classifier = Classifier(Model(demo.MODEL))
+    output = Output.of(arguments)
     right = []
     for path in demo.recordings():
         recording = load(path)

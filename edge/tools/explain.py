@@ -35,7 +35,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print an explanation for each recording and task."""
-    model, output = Model(arguments.model), Output.of(arguments)
+    model = Model(arguments.model)
+    output = Output.of(arguments)
     for path in find(arguments.recordings):
         if not output.as_json:
             output.text(str(path))
@@ -56,7 +57,8 @@ def explanations(
     vector = info.vector(contact_of(model, recording, name))
     for task, decision in model.decide(vector).items():
         labels = info.tasks[task].labels
-        answer, rows = labels.index(decision.label), decision.neighbours.tolist()
+        answer = labels.index(decision.label)
+        rows = decision.neighbours.tolist()
         true_label = recording.labels.get(task)
         truth = labels.index(true_label) if true_label in labels else None
         space = Space.of(model, task)
@@ -85,7 +87,9 @@ def explanations(
 
 def text(line: dict[str, Any], info: ModelInfo) -> str:
     """An explanation for a person."""
-    label, nearest, rival = line["label"], line["nearest"], line["rival"]
+    label = line["label"]
+    nearest = line["nearest"]
+    rival = line["rival"]
     votes = round(line["votes"] * len(nearest))
     lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
     lines += [

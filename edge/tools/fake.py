@@ -96,16 +96,19 @@ def plug(file: SkinFile, recording: str, noise: float, output: Output) -> int:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings and print the commands to rehearse with, or plug the skin
     in."""
-    file, output = load(arguments.skin), Output.of(arguments)
+    file = load(arguments.skin)
+    output = Output.of(arguments)
     if arguments.plug is not None:
         return plug(file, arguments.plug, arguments.noise, output)
-    folder, rest = arguments.out / "touches", arguments.out / "still.npz"
+    folder = arguments.out / "touches"
+    rest = arguments.out / "still.npz"
     save(rest, still(file, STILL_S))
     paths = []
     for name, recording in touches(file, trials=arguments.trials, seed=arguments.seed):
         paths.append(folder / f"{name}.npz")
         save(paths[-1], recording)
-    skin, first = arguments.skin, paths[0]
+    skin = arguments.skin
+    first = paths[0]
     frames = round(STILL_S * file.reading.rate_hz)
     output.event(
         {

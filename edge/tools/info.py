@@ -30,7 +30,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the description, or the differences."""
-    output, model = Output.of(arguments), Model(arguments.model)
+    output = Output.of(arguments)
+    model = Model(arguments.model)
     if arguments.other is None:
         about = described(model)
         output.event(about, description(model.info, about))

@@ -101,7 +101,8 @@ class Keeper:
             LOG.info(f"{self._folder}: {self.kept} touches kept{lost}")
 
     def _hand_over(self, frames: list[Frame]) -> None:
-        first, last = frames[0].t, frames[-1].t
+        first = frames[0].t
+        last = frames[-1].t
         decided = [d for d in self._decided if first <= d.onset_s <= last]
         self._decided = [d for d in self._decided if d.onset_s > last]
         if not (decided and self._reasons & reasons_of(decided)):

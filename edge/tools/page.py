@@ -22,10 +22,12 @@ from edge.touch.track import ContactTracker
 
 PICTURE_S = 0.1
 """Between two pictures."""
-LAST_TRIALS, LAST_NOTICES = 200, 8
+LAST_TRIALS = 200
+LAST_NOTICES = 8
 CURVE_S = 5.0
 """Of a contact, the page draws so many seconds from its onset."""
-MOST_LABELS, LONGEST_LABEL = 16, 80
+MOST_LABELS = 16
+LONGEST_LABEL = 80
 
 
 class Page:
@@ -169,7 +171,8 @@ class Page:
 
     def _curves(self) -> dict[str, Any] | None:
         """The last contact: its taxels, and its features since onset."""
-        contact, region = self._contact, self._tracker.region
+        contact = self._contact
+        region = self._tracker.region
         if contact is None:
             return None
         series = contact.series()

@@ -42,9 +42,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the taught model and its golden file."""
-    model, output = Model(arguments.model), Output.of(arguments)
+    model = Model(arguments.model)
+    output = Output.of(arguments)
     remove_leftovers(arguments.out)
-    names, vectors, labels = [], [], []
+    names = []
+    vectors = []
+    labels = []
     for path in find(arguments.recordings):
         recording = load(path)
         series = contact_of(model, recording, str(path))

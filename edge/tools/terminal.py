@@ -20,13 +20,11 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import Region, find_regions
 
-CLEAR, HOME, HIDE, SHOW, PLAIN = (
-    "\x1b[2J",
-    "\x1b[H",
-    "\x1b[?25l",
-    "\x1b[?25h",
-    "\x1b[0m",
-)
+CLEAR = "\x1b[2J"
+HOME = "\x1b[H"
+HIDE = "\x1b[?25l"
+SHOW = "\x1b[?25h"
+PLAIN = "\x1b[0m"
 REST = tuple(range(233, 242))
 """256-colour greys by force, for taxels outside every region."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
@@ -49,7 +47,8 @@ def skin_colours(
     regions = find_regions(
         frame.counts, threshold, valid=frame.valid, wraps=layout.wraps
     )
-    counts, floor = frame.counts.astype(np.float64), max(threshold, 1)
+    counts = frame.counts.astype(np.float64)
+    floor = max(threshold, 1)
     colours = _shades(REST, np.log1p(np.minimum(counts, threshold)) / math.log1p(floor))
     span = math.log(max(full, threshold + 2) / floor)
     touched = _shades(TOUCH, np.log(np.maximum(counts, 1.0) / floor) / span)

@@ -25,7 +25,8 @@ from edge.touch.layout import SkinLayout
 
 RATE_HZ = 10.0
 """Pictures per second."""
-FULL_NEWTONS, FULL_FACTOR = 17.0, 50
+FULL_NEWTONS = 17.0
+FULL_FACTOR = 50
 """White is the force above which the paper's lab no longer trusted its readings; if the
 scale is unknown, this many times the threshold."""
 
@@ -38,7 +39,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
     """One picture: the skin, its caption, the decisions and the legend."""
-    scale, threshold = layout.counts_per_newton, layout.threshold_counts
+    scale = layout.counts_per_newton
+    threshold = layout.threshold_counts
     full = (
         FULL_FACTOR * max(threshold, 1)
         if scale is None

@@ -58,7 +58,8 @@ class Chain:
             InputError: a joint's axis has no direction, or its limits are swapped.
         """
         self.joints = tuple(joints)
-        self.base, self.tip = base, tip
+        self.base = base
+        self.tip = tip
         moving = [joint for joint in self.joints if joint.kind != "fixed"]
         self.dof = len(moving)
         """Number of angles that `pose` takes."""
@@ -149,11 +150,16 @@ class Chain:
         links = zip(reversed(angles), reversed(self._links), strict=True)
         for angle, (slides, (kx, ky, kz), step) in links:
             if slides:
-                x, y, z = x + angle * kx * w, y + angle * ky * w, z + angle * kz * w
+                x = x + angle * kx * w
+                y = y + angle * ky * w
+                z = z + angle * kz * w
             else:
                 half = sin(0.5 * angle)
-                f, g = sin(angle), 2.0 * half * half
-                ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
+                f = sin(angle)
+                g = 2.0 * half * half
+                ax = ky * z - kz * y
+                ay = kz * x - kx * z
+                az = kx * y - ky * x
                 x = x + (f * ax + g * (ky * az - kz * ay))
                 y = y + (f * ay + g * (kz * ax - kx * az))
                 z = z + (f * az + g * (kx * ay - ky * ax))
@@ -187,7 +193,8 @@ class Chain:
             _joint_from(joint, i)
             for i, joint in enumerate(table.tables("joint", "joint"))
         ]
-        base, tip = table.text("base", "base"), table.text("tip", "tip")
+        base = table.text("base", "base")
+        tip = table.text("tip", "tip")
         table.done()
         with about(where):
             chain = cls(joints, base, tip)

@@ -180,7 +180,9 @@ class _Course:
     def __init__(
         self, series: FeatureSeries, window_s: float, tables: Mapping[str, KernelTable]
     ) -> None:
-        self._series, self._window_s, self._tables = series, window_s, tables
+        self._series = series
+        self._window_s = window_s
+        self._tables = tables
         layout = series.layout
         self._scale = layout.counts_per_newton or 1.0
         self._zones = {
@@ -215,7 +217,8 @@ class _Course:
         self, group: tuple[Feature, ...], times: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """(rows, times) features of one value a frame, or of one wide feature."""
-        first, t = group[0], self._series.t
+        first = group[0]
+        t = self._series.t
         if first.wide:
             wide = self._series.joints if first.of_joints else self._series.taxels
             if wide is None:
@@ -249,7 +252,9 @@ class _Course:
 
     def _measured(self, feature: Feature) -> NDArray[Any]:
         """(n,) the feature's value in every frame; NaN where it cannot be known."""
-        series, name, quantity = self._series, feature.zone, feature.quantity
+        series = self._series
+        name = feature.zone
+        quantity = feature.quantity
         zone = self._zones.get(name)
         values: NDArray[Any] | None = None
         if quantity in ("motion", "force_motion"):
@@ -335,5 +340,6 @@ def _resample(
     step = t[after] - t[before]
     step[step == 0.0] = 1.0  # of a single frame
     fraction = np.clip((times - t[before]) / step, 0.0, 1.0)
-    low, high = values.take(before, axis=-1), values.take(after, axis=-1)
+    low = values.take(before, axis=-1)
+    high = values.take(after, axis=-1)
     return np.asarray(np.where(fraction == 1.0, high, low + fraction * (high - low)))

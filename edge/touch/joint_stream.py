@@ -37,7 +37,8 @@ LOG = logging.getLogger(__name__)
 OLDEST_S = 0.05
 """A pose older than this is not used: an arm at 0.35 rad/s has turned by a degree."""
 LONGEST_LINE = 65536
-MOST_LINES, MOST_BYTES = 64, 65536
+MOST_LINES = 64
+MOST_BYTES = 65536
 """Lines and bytes taken in a frame, so that a flood does not stop the loop. Of more
 lines the newest are taken: two senders at 1 kHz give 20 lines in a frame."""
 RECENT = 64
@@ -77,7 +78,10 @@ class Joints:
                 own names are ignored where this is None.
             now: the loop's clock.
         """
-        self._source, self._dof, self._names, self._now = source, dof, names, now
+        self._source = source
+        self._dof = dof
+        self._names = names
+        self._now = now
         self._rest = b""
         self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
         self._recent: deque[float] = deque(maxlen=RECENT)
@@ -122,7 +126,8 @@ class Joints:
 
     def _take(self) -> None:
         """Parse the lines that have come."""
-        arrived, data = self._now(), b""
+        arrived = self._now()
+        data = b""
         while not self._ended and len(data) < MOST_BYTES:
             piece = self._source()
             self._ended = piece is None
@@ -263,7 +268,8 @@ class Datagrams:
         if sender != self._sender and now - self._heard < SILENT_S:
             self.ignored += 1
             return b"\n"
-        self._sender, self._heard = sender, now
+        self._sender = sender
+        self._heard = now
         return data + b"\n"
 
     def close(self) -> None:

@@ -302,7 +302,8 @@ class Measurer:
         )
         half = layout.cols // 2
         self._halves = {"left": slice(0, half), "right": slice(half, layout.cols)}
-        rows, cols = np.arange(layout.rows), np.arange(layout.cols)
+        rows = np.arange(layout.rows)
+        cols = np.arange(layout.cols)
         self._rows = np.stack([rows**0, rows, rows**2])
         # Columns as counted from each cut of the circle, and their squares.
         turned = np.where(cols < cols[:, None], cols + layout.cols, cols)

@@ -33,7 +33,9 @@ class Grid:
     """
 
     def __init__(self, rows: int, cols: int, wraps: bool) -> None:
-        self.rows, self.cols, self.wraps = rows, cols, wraps
+        self.rows = rows
+        self.cols = cols
+        self.wraps = wraps
         self.stride = stride = cols + 1
         first = sum(1 << (row * stride) for row in range(rows))
         self._columns = [first << col for col in range(cols)]
@@ -70,7 +72,8 @@ class Grid:
     def neighbours(self, bits: int) -> int:
         """The taxels next to one of `bits`; bits outside the grid may be set too."""
         beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
-        first, last = bits & self._columns[0], bits & self._columns[-1]
+        first = bits & self._columns[0]
+        last = bits & self._columns[-1]
         if self.wraps and (first or last):
             return beside | first << self.cols - 1 | last >> self.cols - 1
         return beside
@@ -131,17 +134,20 @@ def best_cut(weights: Sequence[int]) -> int:
     Args:
         weights: of each column, whole numbers.
     """
-    turn, total = len(weights), sum(weights)
+    turn = len(weights)
+    total = sum(weights)
     weighted = [(col, weight) for col, weight in enumerate(weights) if weight]
     first = sum(col * weight for col, weight in weighted)
     second = sum(col * col * weight for col, weight in weighted)
-    best, lowest = 0, total * second - first * first
+    best = 0
+    lowest = total * second - first * first
     for col, weight in weighted:
         first += turn * weight
         second += turn * (turn + 2 * col) * weight
         variance = total * second - first * first
         if variance < lowest:
-            best, lowest = col + 1, variance
+            best = col + 1
+            lowest = variance
     return best
 
 
@@ -156,7 +162,8 @@ def _doublings(
     """Shifts of 1, 2, 4, ... steps, each with the taxels that it may fill (Kogge and
     Stone)."""
     rounds: list[tuple[int, int]] = []
-    shift, free = step, within
+    shift = step
+    free = within
     while shift < step * count and free:
         rounds.append((shift, free))
         free &= free << shift if down else free >> shift

@@ -46,7 +46,8 @@ def exported(X, y, components, path):
 
 def session(model):
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads, options.log_severity_level = 1, 3
+    options.intra_op_num_threads = 1
+    options.log_severity_level = 3
     return onnxruntime.InferenceSession(model, options)
 
 
@@ -61,7 +62,8 @@ def bench_decision(rows, components, against, tmp_path):
         StandardScaler(), PCA(components, svd_solver="full"), KNeighborsClassifier(K)
     ).fit(X, y)
     converted = to_onnx(usual, X[:1].astype(np.float32), options={"zipmap": False})
-    vector, calls = X[0] + 0.1, 200 if rows < 5000 else 10
+    vector = X[0] + 0.1
+    calls = 200 if rows < 5000 else 10
     ours = partial(session(model.path).run, None, {"features": vector[None]})
     theirs = session(converted.SerializeToString())
     single = {theirs.get_inputs()[0].name: vector[None].astype(np.float32)}

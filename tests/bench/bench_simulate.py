@@ -38,7 +38,8 @@ def mujoco_trial(solref, joint):
     assert model.nsensor == 384
 
     def trial():
-        data, highest = mujoco.MjData(model), 0.0
+        data = mujoco.MjData(model)
+        highest = 0.0
         for frame in range(200):
             data.ctrl[0] = 0.15 * frame * 0.01
             mujoco.mj_step(model, data)

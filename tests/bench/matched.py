@@ -24,7 +24,8 @@ from train.simulate.scene import from_dict
 UPRIGHT_DEG = (0.0, -4.0, 0.0, -3.9, 0.0)
 """With this start the forearm hangs straight as it touches, parallel to a standing
 face."""
-MIDDLE_M, PITCH_M = 0.10332, 0.0108
+MIDDLE_M = 0.10332
+PITCH_M = 0.0108
 """The middle of the skin's 16 rows, and the distance between two."""
 BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.3, below_m=0.15)
 FOAM = Thing(
@@ -47,7 +48,8 @@ ALLOWED = {
 }
 NOTHING = {"motion, mm": 1.0, "shear around, N": 0.2, "pull along, N": 0.7}
 """So little that a ratio says nothing."""
-FROM_S, TO_S = 0.9, 1.2
+FROM_S = 0.9
+TO_S = 1.2
 STEP_S = 0.00125
 
 

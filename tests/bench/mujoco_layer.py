@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 ABOVE_FLOOR_M = 0.30
 """Height of the middle of the contact."""
-NET_M, FACE_M, LAYER_KG_M2 = 0.0108, 0.008, 8.7
+NET_M = 0.0108
+FACE_M = 0.008
+LAYER_KG_M2 = 8.7
 """The pitch of the net, half the face's thickness, and the layer's mass."""
 SHEAR = 0.06
 """The layer's shear stiffness divided by modulus times thickness."""
 CONTACT = "-1e5 -600"
-SHEAR_N_M, SHEAR_NS_M = 1e4, 15.0
+SHEAR_N_M = 1e4
+SHEAR_NS_M = 15.0
 """The skin's stretch along the forearm: its stiffness and its loss."""
 
 
@@ -36,22 +39,26 @@ def layer_xml(
     elements of an elastic block (8 kPa, 0.1 m thick, the arm upright or askew by 17
     degrees), the net's depth, area and highest load are within 15 %.
     """
-    high, wide = min(height_m, 0.20), min(breadth_m, 0.15)
-    rows, cols = round(high / NET_M), round(wide / NET_M)
-    dz, dy = high / rows, wide / cols
+    high = min(height_m, 0.20)
+    wide = min(breadth_m, 0.15)
+    rows = round(high / NET_M)
+    cols = round(wide / NET_M)
+    dz = high / rows
+    dy = wide / cols
     k = modulus_pa * dz * dy / thick_m
     shear = SHEAR * modulus_pa * thick_m
     mass = LAYER_KG_M2 * dz * dy
     number = np.arange((rows + 1) * (cols + 1)).reshape(rows + 1, cols + 1)
-    knots, springs, triangles = "", "", []
+    knots = ""
+    springs = ""
+    triangles = []
     for (r, c), n in np.ndenumerate(number):
         # A knot on the rim stands for half of a cell, or at a corner for a quarter.
-        of_row, of_col = 0.5 if r in (0, rows) else 1.0, 0.5 if c in (0, cols) else 1.0
-        y, z, share = (
-            (c - cols / 2) * dy,
-            ABOVE_FLOOR_M + (r - rows / 2) * dz,
-            of_row * of_col,
-        )
+        of_row = 0.5 if r in (0, rows) else 1.0
+        of_col = 0.5 if c in (0, cols) else 1.0
+        y = (c - cols / 2) * dy
+        z = ABOVE_FLOOR_M + (r - rows / 2) * dz
+        share = of_row * of_col
         # A body with a face may have no damped joint, so the face hangs on a second
         # body.
         knots += (
@@ -73,7 +80,10 @@ def layer_xml(
                     f'<joint joint="b{m}" coef="-1"/></fixed>'
                 )
         if r < rows and c < cols:
-            a, b, d, e = n, n + 1, n + cols + 1, n + cols + 2
+            a = n
+            b = n + 1
+            d = n + cols + 1
+            e = n + cols + 2
             triangles += [a, b, e, a, e, d] if (r + c) % 2 else [a, b, d, b, e, d]
     bodies = " ".join(f"n{n}" for n in number.flat)
     face = (
@@ -96,7 +106,9 @@ class Rub:
     """
 
     def __init__(self, model: Any, friction: float) -> None:
-        self.model, self.friction, self.stretch = model, friction, 0.0
+        self.model = model
+        self.friction = friction
+        self.stretch = 0.0
         self.pull = 0.0
         """Newtons on the arm from elbow to wrist in the last step."""
         self.pads = [
@@ -119,10 +131,8 @@ class Rub:
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
         pull = min(max(pull, -most), most)
         self.pull = pull
-        stretch, longest = (
-            self.stretch + slips * self.model.opt.timestep,
-            most / SHEAR_N_M,
-        )
+        stretch = self.stretch + slips * self.model.opt.timestep
+        longest = most / SHEAR_N_M
         self.stretch = min(max(stretch, -longest), longest)
         for body, force in ((self.arm, -pull * along), (self.thing, pull * along)):
             mujoco.mj_applyFT(

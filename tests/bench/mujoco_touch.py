@@ -31,15 +31,21 @@ MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
 ARM = Chain.cody()
 START_DEG = (-41.0, 4.0, 0.0, 40.0, 0.0)
 RATE_DEG_S = 20.0
-LEAD_S, TOUCH_S, RATE_HZ = 0.3, 1.8, 100
+LEAD_S = 0.3
+TOUCH_S = 1.8
+RATE_HZ = 100
 """Seconds before the arm meets a rigid thing, and after that at the usual speed."""
 PLACE_M = 0.10
-COUNTS_PER_NEWTON, THRESHOLD_COUNTS, ONSET_COUNTS = 1000.0, 40, 60
+COUNTS_PER_NEWTON = 1000.0
+THRESHOLD_COUNTS = 40
+ONSET_COUNTS = 60
 RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
 """A taxel whose normal lies farther from the push than this cannot meet the thing."""
-PAD_M, PAD_KG, PAD_LOSS_S = 0.0048, 0.02, 0.0015
+PAD_M = 0.0048
+PAD_KG = 0.02
+PAD_LOSS_S = 0.0015
 """A pad's radius around the forearm; its mass; its damping divided by its stiffness."""
 RIGID = "-1e6 -2e3"
 """Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the
@@ -151,7 +157,8 @@ def joined(numbers: Any) -> str:
 def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
     """The arm's bodies, and the (row, column) of each pad."""
     links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
-    pads, where = "", []
+    pads = ""
+    where = []
     for row in range(ROWS):
         for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
             if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
@@ -163,7 +170,8 @@ def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]
                 f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
             )
             where.append((row, column))
-    xml, at = "", "0 0 0"
+    xml = ""
+    at = "0 0 0"
     for i, joint in enumerate(ARM.joints):
         size, mass, centre = links.get(i, ("0.02 0.01", 0.05, "0 0 0"))
         loss = CODY_DAMPING[i] * math.sqrt(touch.stiffness)
@@ -179,7 +187,8 @@ def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]
 def stems_xml(thing: Thing) -> str:
     """The stems of a plant, which bend along the push."""
     rng = np.random.default_rng(thing.seed)
-    hinge, xml = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2, ""
+    hinge = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2
+    xml = ""
     for _ in range(thing.stems):
         x = 0.012 + rng.uniform(0.0, 0.08)
         y = rng.uniform(-0.5, 0.5) * min(thing.breadth_m, 0.15)
@@ -200,13 +209,13 @@ def upper_xml(thing: Thing) -> tuple[str, str]:
         )
     if thing.soft:
         return stems_xml(thing), ""
-    half, across = (thing.below_m + thing.height_m / 2) / 2, thing.breadth_m / 2
-    deep, shape = HALF_M, f'type="box" size="{HALF_M} {across} {half}"'
+    half = (thing.below_m + thing.height_m / 2) / 2
+    across = thing.breadth_m / 2
+    deep = HALF_M
+    shape = f'type="box" size="{HALF_M} {across} {half}"'
     if thing.kind == "drum":
-        deep, shape = (
-            across + HALF_M,
-            f'type="cylinder" size="{across + HALF_M} {half}"',
-        )
+        deep = across + HALF_M
+        shape = f'type="cylinder" size="{across + HALF_M} {half}"'
     place = f'pos="{deep} 0 {ABOVE_FLOOR_M + thing.height_m / 2 - half}"'
     return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
@@ -215,13 +224,13 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
     """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
-    thing, k = touch.thing, touch.pad_n_m
-    start, rate = np.radians(START_DEG) + np.array(touch.start_rad), touch.rate_rad_s
+    thing = touch.thing
+    k = touch.pad_n_m
+    start = np.radians(START_DEG) + np.array(touch.start_rad)
+    rate = touch.rate_rad_s
     first = start - touch.lag_rad
-    pose, later = (
-        ARM.pose(first + rate * LEAD_S),
-        ARM.pose(first + rate * (LEAD_S + 0.01)),
-    )
+    pose = ARM.pose(first + rate * LEAD_S)
+    later = ARM.pose(first + rate * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
     speed = (later @ on)[:3] - point
@@ -236,7 +245,8 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
         f'<position joint="j{i}" kp="{CODY_STIFFNESS[i] * touch.stiffness}"/>'
         for i in range(ARM.dof)
     )
-    slope, g = touch.slope_rad, 9.81
+    slope = touch.slope_rad
+    g = 9.81
     gravity = joined((*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope)))
     words = {**vars(thing), "x": x, "y": y, "floor_m": z - ABOVE_FLOOR_M}
     words |= {
@@ -270,7 +280,9 @@ def simulate(
         moved at the height of the contact. The skin cannot see the last two.
     """
     model, start, where = model_of(touch)
-    thing, rate, dof = touch.thing, touch.rate_rad_s, ARM.dof
+    thing = touch.thing
+    rate = touch.rate_rad_s
+    dof = ARM.dof
     data = mujoco.MjData(model)
     data.qpos[:dof] = start - touch.lag_rad
     data.qvel[:dof] = rate
@@ -287,7 +299,8 @@ def simulate(
     loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
     tangents = Tangents(model, where)
     pulls = np.zeros((*loads.shape, 2))
-    joints, places = np.zeros((len(t), dof)), np.zeros((len(t), 3))
+    joints = np.zeros((len(t), dof))
+    places = np.zeros((len(t), 3))
     row, column = np.array(where).T
     body = data.body("thing")
     for i in range(len(t)):

@@ -60,7 +60,8 @@ OUTSIDE = 0.05
 """Share of the data sets whose accuracy may lie outside the interval of the front."""
 BINS = 10
 SHOWN = (*NAMES, "export")
-SEEDS, COUNT = 5, 20
+SEEDS = 5
+COUNT = 20
 """Batches, each of a seed of its own; trials of each object and condition in a
 batch."""
 
@@ -157,7 +158,8 @@ def judged(
         right[window] = {
             task: float((answered[task][0][0] == y[task]).mean()) for task in y
         }
-    model, seconds = fitted.sequential, np.array(POINTS_S)
+    model = fitted.sequential
+    seconds = np.array(POINTS_S)
     assert model is not None
     outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
     new = drawn.vectors(POINTS_S, others, fitted.dataset.names)
@@ -219,7 +221,8 @@ def run(arguments: argparse.Namespace) -> int:
     trials = np.array(
         [trial for dataset, _ in batches for trial in dataset.trials], dtype=object
     )
-    X, first = np.concatenate([x for _, x in batches], axis=1), batches[0][0]
+    X = np.concatenate([x for _, x in batches], axis=1)
+    first = batches[0][0]
     y = np.array([[trial.labels[task] for trial in trials] for task in first.tasks])
     rng = np.random.default_rng(arguments.seed)
     ends = np.cumsum(first.widths())

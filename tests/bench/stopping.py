@@ -76,17 +76,16 @@ def extra_trees(
     X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
 ) -> Curve:
     """Extra trees at each decision point, X (points, n, p), that decide when sure."""
-    model, split = ExtraTreesClassifier(random_state=0), PredefinedSplit(folds)
+    model = ExtraTreesClassifier(random_state=0)
+    split = PredefinedSplit(folds)
     shares = np.stack(
         [
             cross_val_predict(model, x, labels, cv=split, method="predict_proba")
             for x in X
         ]
     )
-    right, confidence = (
-        np.unique(labels)[shares.argmax(axis=2)] == labels,
-        shares.max(axis=2),
-    )
+    right = np.unique(labels)[shares.argmax(axis=2)] == labels
+    confidence = shares.max(axis=2)
     confidence[-1] = 1.0
     return [
         decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS
@@ -109,9 +108,11 @@ def halts(
         new: (points, m, classes) probabilities of the trials to decide.
         waiting: (points,) price of waiting, in wrong decisions.
     """
-    known, new = np.sort(known)[..., -2:], np.sort(new)[..., -2:]
+    known = np.sort(known)[..., -2:]
+    new = np.sort(new)[..., -2:]
     prices = 1.0 - known[..., -1] + waiting[:, None]
-    best, at = prices[-1], np.full(new.shape[1], len(waiting) - 1)
+    best = prices[-1]
+    at = np.full(new.shape[1], len(waiting) - 1)
     for point in range(len(waiting) - 2, -1, -1):
         model = KernelRidge(kernel="rbf").fit(known[point], prices[point] - best)
         best = np.where(model.predict(known[point]) <= 0.0, prices[point], best)
@@ -130,7 +131,8 @@ def calimera(
     model = CalibratedClassifierCV(ridge, cv=2)
     for fold in range(FOLDS):
         test = folds == fold
-        known, new = [], []
+        known = []
+        new = []
         for point, vectors in enumerate(X):
             train = vectors[~test], labels[~test]
             known.append(cross_val_predict(model, *train, cv=3, method="predict_proba"))
@@ -150,13 +152,15 @@ def of_aeon(
     trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
     looks = SECONDS[::2]  # half as many, as TEASER is slow
     points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
-    seconds, right = np.empty(len(labels)), np.empty(len(labels), dtype=bool)
+    seconds = np.empty(len(labels))
+    right = np.empty(len(labels), dtype=bool)
     for fold in range(FOLDS):
         test = folds == fold
         model = make(trees, classification_points=points, random_state=0)
         model.fit(series[~test], labels[~test]).predict(series[test])
         stop, _, said, _ = model.get_state_info().T
-        seconds[test], right[test] = looks[stop], model.classes_[said] == labels[test]
+        seconds[test] = looks[stop]
+        right[test] = model.classes_[said] == labels[test]
     return float(seconds.mean()), 1.0 - float(right.mean())
 
 

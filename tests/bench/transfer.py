@@ -53,7 +53,8 @@ HABITS: dict[str, dict[str, float]] = {
     ODD: {},
 }
 """Factors of what `draw_touch` draws. The objects take turns."""
-SLIDES_M, WINDOW_S = 0.02, 1.2
+SLIDES_M = 0.02
+WINDOW_S = 1.2
 """A movable object has moved this far by the end of the window, as in the scenes and
 the paper."""
 
@@ -165,10 +166,12 @@ def run(arguments: argparse.Namespace) -> int:
     The tables have right decisions by habit and in all, contacts called unknown, and
     each task's confusion. A contact without a decision counts as wrong.
     """
-    model, seed = Model(arguments.model), arguments.seed
+    model = Model(arguments.model)
+    seed = arguments.seed
     tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
     summaries = {habit: Summary(tasks) for habit in (*HABITS, "all")}
-    unknown, habits = 0, list(islice(cycle(HABITS), arguments.trials // 2))
+    unknown = 0
+    habits = list(islice(cycle(HABITS), arguments.trials // 2))
     touches = Parallel(n_jobs=cpu_count(), return_as="generator")(
         delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
     )

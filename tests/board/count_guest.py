@@ -13,7 +13,8 @@ from edge.events import Decided
 from edge.model.model import Model
 from edge.recording import load
 
-model, recording = Model(sys.argv[1]), load(sys.argv[2])
+model = Model(sys.argv[1])
+recording = load(sys.argv[2])
 for _ in range(10):  # caches fill in the first ones
     classifier = Classifier(model, recording.layout)
     for frame in recording:

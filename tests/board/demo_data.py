@@ -31,7 +31,9 @@ TOUCHES = (
 )
 META = ("labels", "skin", "source", "trial")
 """The model knows the arm."""
-EVERY, COUNT_STEP, ENCODER_STEPS = 4, 8, 2**13
+EVERY = 4
+COUNT_STEP = 8
+ENCODER_STEPS = 2**13
 """Every fourth frame takes a quarter of the bytes; features are sampled in time. Counts
 are multiples of 8, as of a coarser converter: their noise is most of the files. An
 encoder of 16 bits a turn has about so many steps a radian."""
@@ -39,10 +41,8 @@ encoder of 16 bits a turn has about so many steps a radian."""
 
 def main(folder: Path) -> None:
     """Write the files."""
-    demo, golden_file = (
-        CHECKOUT / "edge" / "demo",
-        CHECKOUT / "tests" / "golden" / "demo.npz",
-    )
+    demo = CHECKOUT / "edge" / "demo"
+    golden_file = CHECKOUT / "tests" / "golden" / "demo.npz"
     (demo / "model.onnx").write_bytes((folder / "model.onnx").read_bytes())
     model = Model(demo / "model.onnx")
     for touch in TOUCHES:

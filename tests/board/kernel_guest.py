@@ -41,8 +41,11 @@ SYSTEM = SKINS.parent / "system"
 PERIOD_S = 0.1
 CHIP_BYTES = 24
 """Bytes in which both kinds of chip serve their 12 taxels."""
-CHIP, OTHER_CHIP, ABSENT = 0x5A, 0x5B, 0x5C
-CONFIGURATION, EXPECTED = b"\x5d", b"\x24"
+CHIP = 0x5A
+OTHER_CHIP = 0x5B
+ABSENT = 0x5C
+CONFIGURATION = b"\x5d"
+EXPECTED = b"\x24"
 """A register of the pad's chips, and its value after a reset."""
 
 
@@ -51,8 +54,11 @@ class Adapter(UsbAdapter):
     short."""
 
     def __init__(self, file):
-        self._playback, self.short = None, False
-        self._chips, self._readings, self._interrupt_s = len(file.chips), 0, math.inf
+        self._playback = None
+        self.short = False
+        self._chips = len(file.chips)
+        self._readings = 0
+        self._interrupt_s = math.inf
         (bus,) = faulty_buses(file, lambda t: self._playback(t), VirtualClock())
         super().__init__(bus)
 
@@ -99,7 +105,8 @@ class Rig:
 
     def record(self, frames):
         """Save frames as a recording; returns its path."""
-        path, t = self.path.with_name("touch.npz"), np.arange(len(frames)) * PERIOD_S
+        path = self.path.with_name("touch.npz")
+        t = np.arange(len(frames)) * PERIOD_S
         meta = {
             "labels": {},
             "skin": self.layout.to_dict(),
@@ -176,11 +183,9 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
     tmp_path, edge, skin, command, options, expected, times
 ):
     rig = Rig(skin, tmp_path)
-    frames, loop, interrupt = (
-        rig.touch,
-        command == "calibrate",
-        command in ("run", "view"),
-    )
+    frames = rig.touch
+    loop = command == "calibrate"
+    interrupt = command in ("run", "view")
     if loop:
         frames = np.random.default_rng(5).integers(0, 4, frames[:20].shape, np.uint16)
     elif interrupt:
@@ -288,7 +293,8 @@ def test_a_skin_whose_adapter_comes_back_with_another_number_is_read_again(pad):
     pad.path.write_text(
         pad.path.read_text().replace("device = 0", 'device = "i2c-tiny-usb"')
     )
-    adapter, heard = ExitStack(), []
+    adapter = ExitStack()
+    heard = []
     before = adapter.enter_context(plugged(pad.adapter))
     with Skin.open(pad.path) as skin:
 

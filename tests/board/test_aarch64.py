@@ -88,7 +88,8 @@ def emulated_python(wheel: Path, counts: Path) -> list[str]:
     shutil.rmtree(AARCH64 / "wheel", ignore_errors=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(AARCH64 / "wheel")
-    plugin, source = AARCH64 / "count.so", CHECKOUT / "tests" / "board" / "count.c"
+    plugin = AARCH64 / "count.so"
+    source = CHECKOUT / "tests" / "board" / "count.c"
     run(["cc", "-O2", "-Wall", "-shared", "-fPIC", "-o", str(plugin), str(source)])
     variables = (
         f"PYTHONPATH={AARCH64}/wheel:{site}",

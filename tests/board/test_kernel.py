@@ -65,7 +65,8 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
             "the kernel of the test runs programs of x86-64 machines alone"
         )
     system = unpacked(FOLDER / "system", "amd64", PACKAGES)
-    kernel, initrd = next((system / "boot").glob("vmlinuz-*")), _initrd(system, command)
+    kernel = next((system / "boot").glob("vmlinuz-*"))
+    initrd = _initrd(system, command)
     qemu = ["timeout", str(LONGEST_S), *program(system, "qemu-system-x86_64")]
     qemu += QEMU.format(system=system, kernel=kernel, initrd=initrd).split()
     accelerators = next(system.rglob("accel-tcg-x86_64.so")).parent
@@ -86,7 +87,9 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
 
 def _initrd(system: Path, command: Sequence[str]) -> Path:
     """Make the archive that the kernel unpacks into memory and starts from."""
-    root, archive, names = FOLDER / "initrd.root", FOLDER / "initrd", MODULES.split()
+    root = FOLDER / "initrd.root"
+    archive = FOLDER / "initrd"
+    names = MODULES.split()
     shutil.rmtree(root, ignore_errors=True)
     for name in ("bin", "dev", "host", "modules", "proc", "sys"):
         (root / name).mkdir(parents=True)

@@ -31,10 +31,8 @@ class Machine:
 
     def __init__(self, folder):
         """Start it, with the files of a folder as those of the service."""
-        python, packages = (
-            Path(sys.executable).resolve().name,
-            Path(numpy.__file__).parents[1],
-        )
+        python = Path(sys.executable).resolve().name
+        packages = Path(numpy.__file__).parents[1]
         variables = {"BASE": sys.base_prefix, "PYTHON": python, "PACKAGES": packages}
         variables |= {"CHECKOUT": HERE.parents[1], "FOLDER": folder, "SYSTEMD": SYSTEMD}
         command = ["env", *(f"{name}={value}" for name, value in variables.items())]

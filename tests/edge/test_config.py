@@ -16,7 +16,8 @@ from edge.config import (
 )
 from edge.errors import InputError
 
-HUGE, BEYOND_FLOATS = 10**5000, 10**400
+HUGE = 10**5000
+BEYOND_FLOATS = 10**400
 
 
 def said(check):

@@ -118,7 +118,8 @@ def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none
 
 def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
     order = []
-    fsync, replace = os.fsync, os.replace
+    fsync = os.fsync
+    replace = os.replace
     monkeypatch.setattr(os, "fsync", lambda fd: order.append("fsync") or fsync(fd))
     monkeypatch.setattr(
         os, "replace", lambda *names: order.append("name") or replace(*names)

@@ -13,7 +13,8 @@ from edge.statistics import wilson
     ("right", "total"), [(0, 1), (1, 1), (7, 10), (139, 140), (8 / 2.5, 56)]
 )
 def test_the_ends_are_the_roots_of_the_score_equation_within_rounding(right, total):
-    z, n = Fraction(norm.ppf(0.975)), Fraction(total)
+    z = Fraction(norm.ppf(0.975))
+    n = Fraction(total)
     p = Fraction(right) / n
     for q in map(Fraction, wilson(right, total)):
         equation = n * (p - q) ** 2 - z * z * q * (1 - q)

@@ -71,7 +71,8 @@ def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
         ),
         "object": fitted.chosen["object"].choice,
     }
-    names, widths = fitted.dataset.names, fitted.dataset.widths(fitted.samples)
+    names = fitted.dataset.names
+    widths = fitted.dataset.widths(fitted.samples)
     classifier = train.fitting.ContactClassifier(own, names, widths)
     y = {task: fitted.dataset.labels(task) for task in own}
     export.save(

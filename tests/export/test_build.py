@@ -14,7 +14,9 @@ class Names:
     """Names and initialisers, kept as skl2onnx's scope and container keep them."""
 
     def __init__(self):
-        self.nodes, self.initial, self.count = [], [], 0
+        self.nodes = []
+        self.initial = []
+        self.count = 0
 
     def get_unique_variable_name(self, name):
         self.count += 1

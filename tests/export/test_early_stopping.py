@@ -79,7 +79,8 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     rng = np.random.default_rng(0)
     labels = rng.permutation(np.repeat(["common", "known", "rare"], [100, 30, 2]))
     width = early.info.samples * len(FEATURES)
-    X, queries = rng.normal(size=(3, len(labels), width)), rng.normal(size=(9, width))
+    X = rng.normal(size=(3, len(labels), width))
+    queries = rng.normal(size=(9, width))
     choices = {"t": Choice("none", 4, 3)}
     path = tmp_path / "model.onnx"
     sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
@@ -312,8 +313,10 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
     for point, vectors in zip(sequential.decision_points_, more, strict=True):
         for task, known in counted.items():
             classes = sorted(set(y[task]))
-            space, own = point.spaces_[task], (*point.spaces_[task], task)
-            point.spaces_[task], point.n_trials_ = own, 48
+            space = point.spaces_[task]
+            own = (*point.spaces_[task], task)
+            point.spaces_[task] = own
+            point.n_trials_ = 48
             for of_space in (point.projections_, point.columns_):
                 of_space[own] = of_space[space]
             rows = point.project(own, vectors[known])

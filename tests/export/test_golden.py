@@ -38,7 +38,8 @@ def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_fini
     exported,
 ):
     golden = np.load(exported / "golden.npz")
-    trials, vectors = len(golden["onset_s"]), golden["vectors"]
+    trials = len(golden["onset_s"])
+    vectors = golden["vectors"]
     assert len(golden["start"]) == trials + 1 == 17
     finite = np.isfinite(vectors).all(axis=1)
     assert finite[:-2].all()

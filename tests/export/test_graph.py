@@ -81,7 +81,8 @@ def test_a_task_that_some_trials_lack_names_its_neighbours_by_their_rows(export)
     X = features(30)
     choices = dict.fromkeys(("t", "some"), Choice("none", 2, 3))
     fitted, model = export(X, choices, labels=3, lack=["some"])
-    answers, known = model.run(X), np.arange(30) % 3 > 0
+    answers = model.run(X)
+    known = np.arange(30) % 3 > 0
     assert differences(fitted, answers, X) == []
     assert (answers["some_neighbours"][known, 0] == np.arange(30)[known]).all()
     assert (answers["some_neighbours"] % 3 > 0).all()
@@ -133,7 +134,8 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     z_name = [node.output[0] for node in proto.graph.node if node.op_type == "Clip"][-1]
     proto.graph.output.append(onnx.helper.make_empty_tensor_value_info(z_name))
     [space] = fitted.projections_
-    p, c = fitted.projections_[space], fitted.components_["t"]
+    p = fitted.projections_[space]
+    c = fitted.components_["t"]
     rows, points = (exact.coordinates(v, p, c) for v in (X, queries))
     assert (fitted.rows_[space][:, :c] / p.grid_.unit).tolist() == rows.tolist()
     outputs = [z_name, "t_distances", "t_neighbours", "t_label"]
@@ -156,9 +158,11 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
 
 def test_an_ulp_more_in_every_feature_changes_no_bit(export):
     """A difference of an ulp is lost when features are rounded to steps."""
-    X, queries = features(60), features(300, seed=1)
+    X = features(60)
+    queries = features(300, seed=1)
     _, model = export(X, {"t": Choice("IV", 6, 5)})
-    answers, moved = model.run(queries), model.run(np.nextafter(queries, np.inf))
+    answers = model.run(queries)
+    moved = model.run(np.nextafter(queries, np.inf))
     assert [
         name for name in answers if answers[name].tobytes() != moved[name].tobytes()
     ] == []
@@ -230,7 +234,9 @@ def test_vectors_that_are_not_finite_have_no_label_and_spoil_no_other(export, k)
     X = features(60)
     _, model = export(X, {"t": Choice("IV", 5, k)})
     queries = X[:8].copy()
-    queries[1, 0], queries[2, 119], queries[3, 60] = np.nan, np.inf, -np.inf
+    queries[1, 0] = np.nan
+    queries[2, 119] = np.inf
+    queries[3, 60] = -np.inf
     queries[4] = 1e305  # infinite once scaled
     answer = model.run(queries)
     assert (answer["t_label"][[1, 2, 3, 4]] == -1).all()

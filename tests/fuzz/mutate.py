@@ -116,7 +116,8 @@ def of_bytes(data: bytes, draw: Random) -> bytes:
     """Spans of bytes replaced, removed, repeated, inserted or cut off."""
     out = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 4, 16))):
-        at, span = draw.randrange(len(out) + 1), draw.choice((1, 2, 4, 16, 256))
+        at = draw.randrange(len(out) + 1)
+        span = draw.choice((1, 2, 4, 16, 256))
         size = draw.choice((1, 2, 4, 8))
         number = draw.choice(NUMBERS) % (1 << 8 * size)
         new = (
@@ -224,7 +225,8 @@ def of_npz(data: bytes, draw: Random) -> bytes:
         if draw.randrange(100) == 99:
             archive.writestr("more.npy", bomb(), zipfile.ZIP_DEFLATED)
         key = draw.choice(sorted(arrays))
-        array, way = arrays.pop(key), draw.randrange(8)
+        array = arrays.pop(key)
+        way = draw.randrange(8)
         names = (key, f"{key}.txt", f"../{key}.npy", f"{key}\x1b.npy")
         if way == 6 and arrays:
             array = arrays[draw.choice(sorted(arrays))]
@@ -245,7 +247,8 @@ def of_onnx(data: bytes, draw: Random) -> bytes:
         return of_bytes(data, draw)
     model = onnx.load_from_string(data)
     graph = model.graph
-    node, constant = draw.choice(graph.node), draw.choice(graph.initializer)
+    node = draw.choice(graph.node)
+    constant = draw.choice(graph.initializer)
     way = draw.randrange(10)
     if way < 4:
         prop = draw.choice(model.metadata_props)

@@ -76,7 +76,8 @@ def command(main: Callable[[list[str]], int], *words: object) -> None:
         InputError: the exit status is 2; all that it printed to stderr.
         Wrong: the exit status or a printed text is not allowed.
     """
-    out, err = io.StringIO(), io.StringIO()
+    out = io.StringIO()
+    err = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = main([str(word) for word in words])
     errors = err.getvalue().replace("\r", "\n").strip()

@@ -20,7 +20,8 @@ from tests.fuzz.readers import READERS, UNPRINTABLE
 CORPUS = Path(__file__).parent / "corpus"
 BY_NAME = {reader.name: reader for reader in READERS}
 FILES = int(os.environ.get("FUZZ_FILES", "30"))
-SECONDS, MEGABYTES = 5.0, 100.0
+SECONDS = 5.0
+MEGABYTES = 100.0
 HANGS_S = 180.0
 
 each_reader = pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
@@ -55,7 +56,8 @@ def refusal(reader, path):
 def limited_refusal(reader, path):
     """The same of a damaged file, within the limits of time and memory."""
     Path("/proc/self/clear_refs").write_text("5")  # VmHWM, the peak, starts anew
-    before, began = memory("VmRSS"), time.process_time()
+    before = memory("VmRSS")
+    began = time.process_time()
     faulthandler.dump_traceback_later(HANGS_S, exit=True)
     try:
         sentence = refusal(reader, path)
@@ -88,7 +90,8 @@ def test_the_valid_files_are_accepted(reader, path_for):
 
 @each_reader
 def test_damaged_files_end_in_an_answer_or_a_printable_sentence(reader, path_for):
-    path, seeds = path_for(reader), reader.seeds()
+    path = path_for(reader)
+    seeds = reader.seeds()
     path.write_bytes(seeds[0])
     reader.read(path)  # imports count for no file
 

@@ -19,7 +19,8 @@ SCENE = HERE.parents[1] / "train" / "scenes" / "demo.toml"
 
 def make(out: Path) -> None:
     """Write model.onnx and golden.npz: small, with ties (k = 6) and three tasks."""
-    golden.TRIALS, golden.VECTORS = 5, 40
+    golden.TRIALS = 5
+    golden.VECTORS = 40
     with TemporaryDirectory() as folder:
         train(["simulate", str(SCENE), "--trials", "3", "--out", folder])
         fixed = ["--features", "paper", "contact", "--projection", "lda", "--k", "6"]

@@ -42,10 +42,8 @@ def seam_usual() -> str:
     counts = SHAPES["seam"]
     labels, n = scipy.ndimage.label(counts > 50)
     largest = 1 + int(np.argmax([(labels == i + 1).sum() for i in range(n)]))
-    col, ours = (
-        np.nonzero(labels == largest)[1].mean(),
-        largest_region(counts, 50).centroid[1],
-    )
+    col = np.nonzero(labels == largest)[1].mean()
+    ours = largest_region(counts, 50).centroid[1]
     return f"scipy.ndimage.label: {n} regions, column {col:.2f}; ours column {ours:.2f}"
 
 
@@ -92,7 +90,8 @@ def times_error(seed: int, shortest: float) -> float:
     contact = contact_of(Frame(t, taxels((3, 3), value=peak)) for t, peak in read)
     vector = feature_vector(contact.series(), 1.2)[:40]
     latest = dict(read)
-    t, peaks = list(latest), list(latest.values())
+    t = list(latest)
+    peaks = list(latest.values())
     worst = 0.0
     for sample, time in zip(
         vector.tolist(), (np.arange(40) * (1.2 / 39)).tolist(), strict=True

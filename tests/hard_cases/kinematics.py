@@ -15,7 +15,8 @@ from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, seeded
 
 def orthonormal_error(steps: int, reach: float) -> float:
     """Largest |R R^T - 1| along a path of `steps` poses."""
-    chain, worst = Chain.cody(), 0.0
+    chain = Chain.cody()
+    worst = 0.0
     rate = np.array([0.7, -1.1, 0.3, 1.7, -0.9])
     for start in range(0, steps, 20000):
         i = np.arange(start, min(start + 20000, steps))[:, None]
@@ -31,7 +32,8 @@ def exact_turn(
     """Rodrigues' formula in 60 digits (400 for the reduction of large angles)."""
     with mpmath.workdps(400):
         a = mpmath.mpf(angle)
-        s, c = mpmath.sin(a), 1 - mpmath.cos(a)
+        s = mpmath.sin(a)
+        c = 1 - mpmath.cos(a)
         size = mpmath.sqrt(sum(mpmath.mpf(v) ** 2 for v in axis))
         x, y, z = (mpmath.mpf(v) / size for v in axis)
         k = mpmath.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])

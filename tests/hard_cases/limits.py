@@ -56,7 +56,8 @@ def clock_error(start: float) -> float:
     courses: list[list[Fraction]] = [[], [], []]
     pitch = Fraction(FOREARM.pitch_m[0])
     for i in range(11, 200):
-        rows, force = 2 + i // 50, 200 + 7 * i
+        rows = 2 + i // 50
+        force = 200 + 7 * i
         frames[i].counts[4 : 4 + rows, 5:8] = force
         # Each row below moves the centroid by half a row.
         moved = Fraction(rows - 2, 2) * pitch
@@ -69,7 +70,8 @@ def clock_error(start: float) -> float:
         for sample, time in zip(seen, np.linspace(0.0, 1.2, 40).tolist(), strict=True):
             place = Fraction(time) * 128
             whole = place.numerator // place.denominator
-            before, after = course[whole], course[whole + 1]
+            before = course[whole]
+            after = course[whole + 1]
             true = before + (place - whole) * (after - before)
             worst = max(worst, abs(Fraction(sample) - true) / max(course))
     return float(worst)
@@ -103,7 +105,8 @@ def gap_error(pause_s: float, frames: int, unit: float) -> float:
     One step covers more than a twelfth of the window, more than 0.1 s and more than two
     and a half usual steps, which four frames or more can tell.
     """
-    window, wrong = Fraction(shipped().info.window_s), 0
+    window = Fraction(shipped().info.window_s)
+    wrong = 0
     for touch in touches():
         recording = paused(touch, pause_s, frames, unit)
         onset, decided = decisions(recording)
@@ -122,7 +125,8 @@ def gap_error(pause_s: float, frames: int, unit: float) -> float:
 
 def gap_usual() -> str:
     """The labels that interpolation across the pause alone gives the touches."""
-    changed, sure = [], []
+    changed = []
+    sure = []
     for touch in touches():
         (_, right), (_, blind) = decisions(touch), decisions(paused(touch, 5.0, 3, 1.0))
         changed += [a.label != b.label for a, b in zip(right, blind, strict=True)]

@@ -23,7 +23,8 @@ from tests.hard_cases.models import (
     usual_pipeline,
 )
 
-FAILED, REFUSED = "fails", "refused with a sentence"
+FAILED = "fails"
+REFUSED = "refused with a sentence"
 SEEDS = range(5)
 """A case that draws by a seed must hold with each of these."""
 
@@ -67,9 +68,12 @@ def margin(case: Case) -> str:
 @cache
 def prices() -> Mapping[str, str]:
     """The cost of the guards of each group of cases."""
-    X, x = features(160), features(1, 1)
-    ours, pipe = Ours(X), usual_pipeline(X, 6, 5, labels_for(X))
-    exported, theirs = session(ours.data), converted(pipe, X)
+    X = features(160)
+    x = features(1, 1)
+    ours = Ours(X)
+    pipe = usual_pipeline(X, 6, 5, labels_for(X))
+    exported = session(ours.data)
+    theirs = converted(pipe, X)
     counts = np.zeros((16, 24), np.uint16)
     counts[4:12, 20:24] = counts[4:12, 0:4] = 65535
     series = contact_of(Frame(0.01 * i, counts) for i in range(4)).series()

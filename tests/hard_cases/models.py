@@ -108,7 +108,8 @@ class Ours:
     def wrong(self, queries: Array) -> int:
         """Queries whose neighbours, order, label or a bit of a distance is not the
         oracle's."""
-        seen, wrong = self.alone(queries), 0
+        seen = self.alone(queries)
+        wrong = 0
         for i, point in enumerate(self.whole(queries)):
             near, squares = exact.nearest(self.rows, point, self.k)
             label = exact.winner([self.labels[j] for j in near])

@@ -67,7 +67,8 @@ def lattice(seed: int, n: int = 160) -> tuple[Array, Array]:
     """Whole numbers in three columns, and queries midway between rows: pairs lie
     equally far."""
     rng = np.random.default_rng(seed)
-    X, queries = np.zeros((n, 120)), np.zeros((24, 120))
+    X = np.zeros((n, 120))
+    queries = np.zeros((24, 120))
     half = rng.integers(-3, 4, (n // 2, 3))
     X[:, [0, 40, 80]] = np.concatenate([half, -half])  # the mean is exactly 0
     queries[:, [0, 40, 80]] = rng.integers(-6, 7, (24, 3)) / 2.0
@@ -95,7 +96,8 @@ def dominated(power: float, seed: int) -> tuple[Array, Array]:
 def denormals(times: int, seed: int) -> tuple[Array, Array]:
     """One feature has a few of the smallest numbers of float64; the others are
     ordinary."""
-    X, queries = features(160, seed), features(24, seed + 1)
+    X = features(160, seed)
+    queries = features(24, seed + 1)
     smallest = float(np.finfo(np.float64).smallest_subnormal)
     X[:, :40] = (
         np.random.default_rng(seed).integers(0, 50, (160, 40)) * times * smallest
@@ -193,7 +195,8 @@ def grid_error(spread: float, seed: int) -> float:
     numbers."""
     X, queries = near_duplicates(80, spread, seed, 8)
     ours = Ours(X, choice=Choice("none", 6, 80))
-    seen, p = ours.alone(queries), ours.projection
+    seen = ours.alone(queries)
+    p = ours.projection
     true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
         float
     )
@@ -211,9 +214,11 @@ def grid_error(spread: float, seed: int) -> float:
 def ties_usual() -> str:
     """The last of 12 overlapping classes is hardly ever said where the lowest number
     wins."""
-    X, queries = features(160), features(400, 1)
+    X = features(160)
+    queries = features(400, 1)
     ours = Ours(X, labels_for(X, 12), Choice("none", 6, 2))
-    seen, labels = ours.alone(queries), np.array(ours.labels)
+    seen = ours.alone(queries)
+    labels = np.array(ours.labels)
     pipe = usual_pipeline(X, 6, 2, labels)
     tied = (np.sort(seen["scores"], axis=1)[:, -2:] == 0.5).all(axis=1).mean()
     shares = ", ".join(

@@ -35,7 +35,8 @@ BAD = (float("nan"), float("inf"), float("-inf"))
 
 
 def recording(bad: float, key: str) -> None:
-    t, joints = np.arange(3.0), np.zeros((3, 5))
+    t = np.arange(3.0)
+    joints = np.zeros((3, 5))
     {"t": t, "joints": joints.reshape(-1)}[key][2] = bad
     trial = Recording(t, np.zeros((3, 4, 4), np.uint16), joints, None, {})
     with tempfile.TemporaryDirectory() as folder:

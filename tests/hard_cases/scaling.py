@@ -50,7 +50,8 @@ def orders(top: int, count: int) -> Array:
 def decades_error(top: int, count: int, seed: int) -> float:
     """Largest error of a singular value over the largest one; a rank that is off counts
     1."""
-    X, truth = hadamard_data(orders(top, count), seed), 128.0 * orders(top, count)
+    X = hadamard_data(orders(top, count), seed)
+    truth = 128.0 * orders(top, count)
     _, axes, values = principal_axes(X)
     limit = truth[0] * max(X.shape) * np.finfo(float).eps
     if not (truth > 2.0 * limit).sum() <= len(axes) <= (truth > 0.5 * limit).sum():

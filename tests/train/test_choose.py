@@ -83,8 +83,10 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
 def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():
     """One candidate is right on other trials of known objects, the other on new
     objects."""
-    near, far = Choice("IV", 1, 1, "lda"), Choice("IV", 1, 3, "lda")
-    folds, prices = np.arange(12) % 3, np.zeros(2, dtype=np.int64)
+    near = Choice("IV", 1, 1, "lda")
+    far = Choice("IV", 1, 3, "lda")
+    folds = np.arange(12) % 3
+    prices = np.zeros(2, dtype=np.int64)
     right = np.repeat([[True], [False]], 12, axis=1)
     by_trial = AnswerTable(folds, {"t": [near, far]}, {"t": np.stack([right] * 3)})
     by_group = AnswerTable(
@@ -110,19 +112,19 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together():
     X[:, 0] += mobility == "m"
     X[:, 3] += softness == "s"
     choices = {task: Choice("IV", 2, 3, "lda") for task in y}
-    folds, none_right = np.arange(60) % 5, Promise(0, 60, hits=np.zeros(60, dtype=bool))
+    folds = np.arange(60) % 5
+    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {
         task: Chosen(choice, none_right, none_right, "trial")
         for task, choice in choices.items()
     }
     plans = {"trial": (folds, [choices] * 5)}
     decided = decided_together(chosen, Vectors(X, y, TWO, (3, 3)), plans)
-    alone, together = (
-        np.zeros(60, dtype=bool),
-        {task: np.zeros(60, dtype=bool) for task in y},
-    )
+    alone = np.zeros(60, dtype=bool)
+    together = {task: np.zeros(60, dtype=bool) for task in y}
     for fold in range(5):
-        train, test = folds != fold, folds == fold
+        train = folds != fold
+        test = folds == fold
         model = ContactClassifier(choices, TWO, (3, 3))
         model.fit(X[train], {task: labels[train] for task, labels in y.items()})
         for task, (labels, *_) in model.decide(X[test]).items():

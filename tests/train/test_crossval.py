@@ -45,7 +45,8 @@ def overlapping(n=24, seed=0):
 @pytest.mark.parametrize("scaling", ["none", "IV"])
 def test_the_table_is_that_of_grid_search(scaling):
     X, y = overlapping()
-    components, ks = [1, 3, 20], [1, 2, 4, 20]
+    components = [1, 3, 20]
+    ks = [1, 2, 4, 20]
     ours = accuracies(neighbours(X, scaling=scaling), y)
     theirs = sklearn_table(X, y, scaling, components, ks)
     assert ours.shape == (20, 20)

@@ -137,7 +137,8 @@ def test_recordings_that_are_never_touched_are_left_out_and_named(folder, make_t
 def test_a_taxel_is_dead_that_no_frame_of_any_recording_could_read(
     make_touch, tmp_path
 ):
-    touch, valid = make_touch(), np.ones((16, 24), dtype=bool)
+    touch = make_touch()
+    valid = np.ones((16, 24), dtype=bool)
     valid[0, :3] = False
     by_frame = np.tile(valid, (len(touch.t), 1, 1))
     by_frame[5, 0, 1] = True
@@ -298,16 +299,15 @@ def test_angles_are_measured_by_the_names_of_their_joints(
 ):
     """A recording whose columns are reversed, with a wheel between them, has the same
     features."""
-    arm, trial = Chain.cody(), make_touch()
+    arm = Chain.cody()
+    trial = make_touch()
     save(tmp_path / "a" / "one.npz", trial)
     names = list(arm.names)[::-1]
     shuffled = np.insert(trial.joints[:, ::-1], 2, 7.0, axis=1)
     meta = {**trial.meta, "joint_names": [*names[:2], "wheel", *names[2:]]}
     save(tmp_path / "b" / "one.npz", replace(trial, joints=shuffled, meta=meta))
-    straight, reordered = (
-        load_trials([tmp_path / "a"]),
-        load_trials([tmp_path / "b"], arm=arm),
-    )
+    straight = load_trials([tmp_path / "a"])
+    reordered = load_trials([tmp_path / "b"], arm=arm)
     np.testing.assert_array_equal(reordered.features(), straight.features())
 
 

@@ -70,7 +70,8 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
         X = np.repeat(trials(6, seed)[0], 2, axis=0) * 10.0 ** (seed - 4)
         table = evaluate(Vectors(X, {"t": y}, TWO), folds, grids)
         for fold in range(3):
-            train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+            train = np.flatnonzero(folds != fold)
+            test = np.flatnonzero(folds == fold)
             for choice, right in zip(
                 table.choices["t"], table.right["t"][fold], strict=True
             ):
@@ -87,7 +88,8 @@ def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_o
     tested = own & (y != "")
     assert (table.tested["t"] == tested).all()
     for fold in range(3):
-        train, test = folds != fold, (folds == fold) & tested
+        train = folds != fold
+        test = (folds == fold) & tested
         for choice, right in zip(
             table.choices["t"], table.right["t"][fold], strict=True
         ):
@@ -128,9 +130,11 @@ def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
 
 def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_scores():
     rng = np.random.default_rng(2)
-    best, honest = [], []
+    best = []
+    honest = []
     for _ in range(6):
-        X, y = rng.normal(size=(40, 12)), rng.choice(["a", "b"], 40)
+        X = rng.normal(size=(40, 12))
+        y = rng.choice(["a", "b"], 40)
         table = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 5), GRIDS[1:2])
         best.append(table.held_out("t").mean(axis=1).max())
         honest.append(table.nested("t").accuracy)
@@ -168,7 +172,8 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
         most_directions=most,
     )
     table = evaluate(Vectors(X, labels, TWO), stratified_folds(y, 4), [grid])
-    train, test = np.flatnonzero(table.folds), np.flatnonzero(table.folds == 0)
+    train = np.flatnonzero(table.folds)
+    test = np.flatnonzero(table.folds == 0)
     (choice,) = table.choices["t"]
     assert choice.components == (
         most or sum(len(set(labels[task])) - 1 for task in labels)
@@ -217,8 +222,10 @@ def test_what_cannot_be_parted_or_measured_is_one_sentence():
 
 
 def test_progress_is_told_after_each_of_the_fits_that_are_announced():
-    X, y = np.random.default_rng(0).normal(size=(20, 4)), np.array(list("ab") * 10)
-    folds, seen = stratified_folds(y, 5), []
+    X = np.random.default_rng(0).normal(size=(20, 4))
+    y = np.array(list("ab") * 10)
+    folds = stratified_folds(y, 5)
+    seen = []
     for nested, count in ((True, 15), (False, 5)):
         seen.clear()
         options = {

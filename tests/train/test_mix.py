@@ -91,7 +91,8 @@ def test_two_trials_choose_nothing(make_touch, tmp_path):
 
 def test_a_weight_of_three_is_a_trial_that_stands_three_times():
     rng = np.random.default_rng(0)
-    X, labels = rng.normal(size=(12, 6)), np.array(["a", "b", "c"] * 4)
+    X = rng.normal(size=(12, 6))
+    labels = np.array(["a", "b", "c"] * 4)
     own = np.arange(12) >= 8
     choice = Choice("IV", 2, 1, "lda", weights=(1, 3))
     fitted = ContactClassifier({"t": choice}, ("max_force", "contact_area")).fit(

@@ -19,7 +19,8 @@ from train import model_report as report
 def written(recordings, tmp_path_factory):
     """A report of 16 trials, of which hard_3 is labelled wrong and hard_7 touches
     nothing."""
-    folder, out = tmp_path_factory.mktemp("labelled"), tmp_path_factory.mktemp("report")
+    folder = tmp_path_factory.mktemp("labelled")
+    out = tmp_path_factory.mktemp("report")
     for path in sorted(recordings.glob("*.npz")):
         trial = load(path)
         if path.stem == "hard_3":

@@ -21,10 +21,8 @@ def test_votes_and_ties():
 
 
 def test_equal_distances_go_to_the_earlier_row():
-    rows, y = (
-        np.array([[-1.0], [1.0], [-1.0], [3.0]]),
-        {"t": np.array(["d", "c", "b", "a"])},
-    )
+    rows = np.array([[-1.0], [1.0], [-1.0], [3.0]])
+    y = {"t": np.array(["d", "c", "b", "a"])}
     for k in (1, 2, 3):
         model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
             rows, y
@@ -33,7 +31,8 @@ def test_equal_distances_go_to_the_earlier_row():
 
 
 def test_the_projection_works_in_a_scikit_learn_pipeline():
-    X, y = features(30), np.repeat(["a", "b"], 15)
+    X = features(30)
+    y = np.repeat(["a", "b"], 15)
     for kind in ("pca", "lda"):
         pipe = make_pipeline(Projection("IV", 3, kind=kind), KNeighborsClassifier(1))
         assert (pipe.fit(X, y).predict(X) == y).all()
@@ -70,10 +69,8 @@ def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
 def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
     """Discriminants of 200 columns separate any two labels of 40 trials, but not of new
     ones."""
-    X, y = (
-        np.random.default_rng(0).normal(size=(40, 200)),
-        {"real": np.tile(["a", "b"], 20)},
-    )
+    X = np.random.default_rng(0).normal(size=(40, 200))
+    y = {"real": np.tile(["a", "b"], 20)}
     X[::2, 0] += 9.0
     y["random"] = np.random.default_rng(1).permutation(y["real"])
     choices = dict.fromkeys(y, Choice("none", 1, 1, "lda", 1e-3, weights=(0, 1)))

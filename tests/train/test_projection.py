@@ -66,7 +66,8 @@ def test_coordinates_are_those_of_whole_numbers_in_any_order(
     p = Projection(scaling, 4).fit(X)
     z = p.transform(X)
     assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
-    d, order = (X - p.mean_) * p.gain_, np.random.default_rng(seed).permutation(120)
+    d = (X - p.mean_) * p.gain_
+    order = np.random.default_rng(seed).permutation(120)
     assert (p.grid_.project(d[:, order], p.weights_[order]) == z).all()
 
 
@@ -88,7 +89,8 @@ def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
 )
 def test_squared_distances_stay_below_2_to_the_53(components, bits):
     assert coordinate_bits(components) == bits
-    longest, limit = 2**bits, 2 ** (bits + 1)
+    longest = 2**bits
+    limit = 2 ** (bits + 1)
     assert (longest + components**0.5 * limit) ** 2 < 2**53
 
 
@@ -96,7 +98,8 @@ def test_squared_distances_stay_below_2_to_the_53(components, bits):
 def test_the_grid_of_principal_components_does_not_depend_on_their_number(components):
     """So that leave-one-out serves every number with one decomposition."""
     X = features(40)
-    many, few = Projection("IV", 20).fit(X), Projection("IV", components).fit(X)
+    many = Projection("IV", 20).fit(X)
+    few = Projection("IV", components).fit(X)
     assert few.grid_ == many.grid_
     assert (few.transform(X) == many.transform(X)[:, :components]).all()
 
@@ -113,7 +116,8 @@ def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
 def exact_distances(rows, labels, shrinkage):
     """Squared distances of integer rows among their discriminants, to 50 digits."""
     with mpmath.workdps(50):
-        n, classes = len(rows), sorted(set(labels))
+        n = len(rows)
+        classes = sorted(set(labels))
         X = mpmath.matrix(rows)
         mean = mpmath.matrix([[mpmath.fsum(X[:, j]) / n for j in range(X.cols)]])
         own = {c: [i for i, label in enumerate(labels) if label == c] for c in classes}
@@ -191,7 +195,8 @@ def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
 
 
 def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
-    X, labels = features(60), np.repeat([0, 1, 2], 20)
+    X = features(60)
+    labels = np.repeat([0, 1, 2], 20)
     X[labels == 1, :40] += 3.0
     X[labels == 2, 40:80] += 90.0
     weights = Spectrum(X).discriminants(labels, 1e-9)
@@ -208,7 +213,8 @@ def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
 
 def test_the_discriminants_of_several_tasks_stand_side_by_side():
     X = features(40)
-    sides, shapes = np.repeat(["a", "b"], 20), np.tile(["x", "y", "z", "z"], 10)
+    sides = np.repeat(["a", "b"], 20)
+    shapes = np.tile(["x", "y", "z", "z"], 10)
     both = Projection("IV", kind="lda").fit(X, np.column_stack([sides, shapes]))
     alone = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (sides, shapes)]
     assert (both.weights_ == np.hstack(alone)).all()

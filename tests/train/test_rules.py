@@ -80,7 +80,8 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
 def test_certificates_fail_no_oftener_than_they_say():
     """Of 300 calibrations the share whose rule errs more often than certified; at most
     a tenth."""
-    error, rng = 0.2, np.random.default_rng(2)
+    error = 0.2
+    rng = np.random.default_rng(2)
     world_confidence, world = drawn(20_000, rng)
     failed = 0
     for _ in range(300):

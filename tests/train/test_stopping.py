@@ -40,7 +40,8 @@ class TestCurve:
     ):
         outcomes = np.full(len(margins), right)
         curve = Curve.of(margins, np.zeros(len(margins)), outcomes)
-        mean, spread = margins.mean(), margins.std() or 1.0
+        mean = margins.mean()
+        spread = margins.std() or 1.0
         errors = expit(curve.slope * margins + curve.intercept) - right
         assert errors @ (margins - mean) == pytest.approx(
             0.5 * spread * (1.0 - curve.slope * spread)
@@ -67,7 +68,8 @@ class TestCurve:
 
     def test_the_unit_of_the_distances_does_not_matter(self):
         rng = np.random.default_rng(2)
-        margins, right = rng.normal(size=60), rng.random(60) < 0.8
+        margins = rng.normal(size=60)
+        right = rng.random(60) < 0.8
         excess = np.zeros(60)
         in_metres = Curve.of(margins, excess, right)
         in_microns = Curve.of(1e-6 * margins, excess, right)

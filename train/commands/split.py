@@ -55,9 +55,12 @@ def split(recording: Recording) -> list[Recording]:
     labels = labels_of(recording, len(ends_s))
     if len(labels) < len(ends_s):
         labels = [recording.labels] * len(ends_s)
-    t, valid, joints = recording.t, recording.valid, recording.joints
+    t = recording.t
+    valid = recording.valid
+    joints = recording.joints
     meta = {key: value for key, value in recording.meta.items() if key != "contacts"}
-    contacts, previous_end_s = [], -np.inf
+    contacts = []
+    previous_end_s = -np.inf
     for (contact, end_s), own in zip(ends_s.items(), labels, strict=True):
         start_s = max(contact.onset_s - LEAD_S, previous_end_s)
         span = slice(*np.searchsorted(t, (start_s, end_s), side="right"))

@@ -69,7 +69,8 @@ def cost(text: str) -> tuple[float, float]:
     """
     with suppress(ValueError, KeyError):
         prices = dict(term.split("=") for term in text.split(","))
-        wrong, second = float(prices.pop("wrong")), float(prices.pop("second"))
+        wrong = float(prices.pop("wrong"))
+        second = float(prices.pop("second"))
         if not prices and 0.0 <= wrong < math.inf and 0.0 <= second < math.inf:
             return wrong, second
     raise argparse.ArgumentTypeError(f"must be like wrong=10,second=1, not {text!r}")

@@ -20,10 +20,13 @@ from train.draw.comparison import contact_of
 from train.draw.recording import curves, units
 from train.report.figures import STROKES, STYLE
 
-TOUCH, SAME, OTHER = STROKES[0], STROKES[2], STROKES[1]
+TOUCH = STROKES[0]
+SAME = STROKES[2]
+OTHER = STROKES[1]
 """Colour, marker and dashes of the touch, of trials with its answer, and of those with
 another."""
-MOST_NEAR, MOST_PULLS = 4, 5
+MOST_NEAR = 4
+MOST_PULLS = 5
 
 
 @dataclass(frozen=True)
@@ -135,10 +138,9 @@ def draw(
 
 def _trial(folder: Path, name: str) -> FeatureSeries | None:
     """A trial's contact by its name, if its recording is in the folder."""
-    path, number = folder / f"{name}.npz", 1
+    path = folder / f"{name}.npz"
+    number = 1
     if not path.is_file() and name.rpartition(" ")[2].isdecimal():
-        path, number = (
-            folder / f"{name.rpartition(' ')[0]}.npz",
-            int(name.rpartition(" ")[2]),
-        )
+        path = folder / f"{name.rpartition(' ')[0]}.npz"
+        number = int(name.rpartition(" ")[2])
     return contact_of(str(path), load(path), number)[1] if path.is_file() else None

@@ -120,7 +120,8 @@ def _frames(
     figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float
 ) -> None:
     """Draw a frame before the onset, and others spread over the window."""
-    frames, t = list(recording), recording.t
+    frames = list(recording)
+    t = recording.t
     spread = np.linspace(0.0, min(WINDOW_S, float(t[-1]) - onset), FRAMES - 1)
     times = [max(onset - 0.05, float(t[0])), *(onset + spread)]
     shown = np.searchsorted(t, times).clip(0, len(t) - 1)
@@ -131,7 +132,8 @@ def _frames(
         longest = max(float(np.abs(recording.shear[shown].astype(float)).max()), 1.0)
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
     for axis, k in zip(axes, shown, strict=True):
-        counts, valid = frames[k].counts, frames[k].valid
+        counts = frames[k].counts
+        valid = frames[k].valid
         force = np.ma.masked_array(
             counts / scale, mask=False if valid is None else ~valid
         )

@@ -14,7 +14,8 @@ from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 
-DEPTH_M, STANDS_M = 0.12, 0.15
+DEPTH_M = 0.12
+STANDS_M = 0.15
 """Depth of an object, and its foot's distance below the contact, where the scene gives
 none."""
 ABOVE_M = 0.02
@@ -51,7 +52,8 @@ def draw_side(
     An object that was simulated (`meta.simulation`) stands on its table, and slides,
     leans or turns there.
     """
-    joints, drawn = recording.joints, recording.meta.get("simulation")
+    joints = recording.joints
+    drawn = recording.meta.get("simulation")
     assert joints is not None
     first: Place | None = None
     motion = ""
@@ -101,7 +103,8 @@ def draw_side(
 
 def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
     """(4, 2) x and z of the corners of a cylinder's skin, seen from the side."""
-    first_m, length_m = layout.row0_z_m, layout.pitch[0] * (layout.rows - 1)
+    first_m = layout.row0_z_m
+    length_m = layout.pitch[0] * (layout.rows - 1)
     ends = pose[:3, 3] + np.outer([first_m, first_m - length_m], pose[:3, 2])
     (x, z), radius = ends[0, [0, 2]] - ends[1, [0, 2]], layout.radius_m or 0.0
     across = np.array([z, -x]) * radius / max(math.hypot(x, z), 1e-9)
@@ -118,12 +121,11 @@ def _last_contact(
             recording.frames[i], layout.threshold_counts, wraps=layout.wraps
         )
         if region is not None:
-            pose, position = chain.pose(joints[i]), layout.position(*region.centroid)
+            pose = chain.pose(joints[i])
+            position = layout.position(*region.centroid)
             place = pose[:3, :3] @ position + pose[:3, 3]
-            normal, above = (
-                pose[:3, :2] @ position[:2],
-                region.centroid[0] * layout.pitch[0],
-            )
+            normal = pose[:3, :2] @ position[:2]
+            above = region.centroid[0] * layout.pitch[0]
             return float(recording.t[k] - recording.t[i]), (place, normal, above)
     return None
 

@@ -27,7 +27,8 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
     In the map's frame: the skin's edges, or the arm with each joint in the middle of
     its range.
     """
-    layout, chain = info.layout, info.chain
+    layout = info.layout
+    chain = info.chain
     if chain is not None:
         middle = [0.0 if limit is None else sum(limit) / 2.0 for limit in chain.limits]
         return "the arm, its joints mid-range", [link_positions(chain, middle)]

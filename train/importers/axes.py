@@ -188,7 +188,8 @@ def three_by_three(table: Table, axes: Axes) -> Parted:
     for first in range(0, len(names), 3):
         of_taxel = dict(zip(LETTERS, names[first : first + 3], strict=True))
         plain = f"{stem}.{first // 3 + 1}".strip(".")
-        along, around = of_taxel[axes.along], of_taxel[axes.around]
+        along = of_taxel[axes.along]
+        around = of_taxel[axes.around]
         shear[plain] = along, around
         dropped += [along, around]
         renamed[of_taxel[axes.normal]] = plain

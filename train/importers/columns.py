@@ -28,7 +28,8 @@ RUNNING = re.compile(r"(?P<stem>.*?)(?P<first>\d+)(?:[_x,](?P<second>\d+))?")
 """A name with a number at its end, or with a row and a column."""
 EPOCHS = {"s": 9e8, "ms": 9e11, "us": 9e14, "ns": 9e17}
 """The least time since 1970 in each unit that a log of today has."""
-SECONDS_AT_MOST, DOUBTFUL_BELOW = 0.75, 3.0
+SECONDS_AT_MOST = 0.75
+DOUBTFUL_BELOW = 3.0
 """Median steps that are certainly seconds, and that may be seconds or milliseconds."""
 LONGEST_STEPS = {"ms": 2e3, "us": 2e6}
 """Longest median steps that are taken for these units."""

@@ -85,7 +85,8 @@ def grasp(file: Path) -> Recording:
 
 def _recording(root: ElementTree.Element, file: Path) -> Recording:
     alive, places, cells, pitch_m = _pads(root)
-    stamps, frames = [], []
+    stamps = []
+    frames = []
     for frame in root.iterfind("./data/frame"):
         stamps.append(_number(frame, "time_stamp"))
         frames.append(_unpacked(frame.findtext("frame_data") or "", cells))
@@ -125,7 +126,9 @@ def _pads(
         frame of all matrices; the number of cells in such a frame; the distance between
         texels in metres.
     """
-    cells, places, alive = 0, {}, {}
+    cells = 0
+    places = {}
+    alive = {}
     pitch_m = math.nan
     for matrix in root.iterfind("./sensor/matrix"):
         rows, cols = (
@@ -184,7 +187,8 @@ def _joints(
 ) -> NDArray[np.float64] | None:
     """(n, 7) radians at the frames' times, NaN where they are not known; None if the
     file has none."""
-    stamps, angles = [], []
+    stamps = []
+    angles = []
     for angle in root.iterfind("./joint_angles/angle"):
         stamps.append(_number(angle, "time_stamp"))
         angles.append(

@@ -34,7 +34,8 @@ STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "hatch.linewidth": 0.6,
 }
-WIDE, PHONE = 7.6, 3.6
+WIDE = 7.6
+PHONE = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
@@ -198,11 +199,13 @@ def bars(
         mark: the diamonds' name in the legend.
         reference: {text: percent} of vertical lines.
     """
-    m, g = len(names), len(groups)
+    m = len(names)
+    g = len(groups)
     height = 0.8 / g
 
     def draw(canvas: Any, phone: bool) -> None:
-        axes, diamonds = canvas.subplots(), []
+        axes = canvas.subplots()
+        diamonds = []
         for i, (stroke, (group, row)) in enumerate(
             zip(STROKES, groups.items(), strict=False)
         ):

@@ -152,7 +152,8 @@ def paired(
     table (Agresti and Min, Simple improved confidence intervals for comparing matched
     proportions, 2005).
     """
-    gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
+    gained = int((after & ~before).sum())
+    lost = int((before & ~after).sum())
     total = len(before) + 2.0
     gap = (gained - lost) / total
     reach = 1.96 * float(np.sqrt(((gained + lost + 1.0) / total - gap**2) / total))

@@ -120,7 +120,8 @@ def _described(choice: Choice, fitted: Fitted) -> str:
 
 def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that make a model worse, or make it look better than it is."""
-    dataset, lines = fitted.dataset, []
+    dataset = fitted.dataset
+    lines = []
     untouched = [
         path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
     ]
@@ -163,16 +164,12 @@ def warnings(fitted: Fitted) -> list[str]:
 
 def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     """The sentences that concern a single task."""
-    dataset, classifier, choice = (
-        fitted.dataset,
-        fitted.classifier,
-        fitted.chosen[task].choice,
-    )
-    space, components, lines = (
-        classifier.spaces_[task],
-        classifier.components_[task],
-        [],
-    )
+    dataset = fitted.dataset
+    classifier = fitted.classifier
+    choice = fitted.chosen[task].choice
+    space = classifier.spaces_[task]
+    components = classifier.components_[task]
+    lines = []
     if any(
         measures.feature(name).quantity == "joint_angle" for name in choice.features
     ):
@@ -258,7 +255,8 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
         known = joints[np.isfinite(joints).all(axis=1)]
         at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
-    angles, labels = np.array(at_onset)[labels != ""], labels[labels != ""]
+    angles = np.array(at_onset)[labels != ""]
+    labels = labels[labels != ""]
     nearest = (
         NearestNeighbors(n_neighbors=1)
         .fit(angles)
@@ -279,7 +277,8 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     paths = [
         t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials
     ]
-    counts, seen = Counter(paths), Counter[Path]()
+    counts = Counter(paths)
+    seen = Counter[Path]()
     trials = []
     for path in paths:
         seen[path] += 1

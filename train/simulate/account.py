@@ -183,10 +183,8 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
         f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
         for s, e in zip(measured.steps_s, measured.errors, strict=False)
     )
-    goal, best = (
-        f"{100.0 * scene.trials['tolerance']:g} %",
-        f"{1e3 * measured.step_s:g} ms",
-    )
+    goal = f"{100.0 * scene.trials['tolerance']:g} %"
+    best = f"{1e3 * measured.step_s:g} ms"
     verdict = f"{best} is enough for {goal}"
     if not measured.within:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"

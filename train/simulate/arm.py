@@ -81,8 +81,10 @@ class Kinematics:
     def pose(self, q: Array) -> Pose:
         """The arms' poses at joint angles (dof, n)."""
         dof, n = q.shape
-        sines, cosines = np.sin(q), np.cos(q)
-        origin, rotation = np.zeros((3, n)), np.zeros((3, 3, n))
+        sines = np.sin(q)
+        cosines = np.cos(q)
+        origin = np.zeros((3, n))
+        rotation = np.zeros((3, 3, n))
         rotation[0, 0] = rotation[1, 1] = rotation[2, 2] = 1.0
         axes, origins = np.empty((2, 3, dof, n))
         for j, link in enumerate(self.links):
@@ -97,7 +99,8 @@ class Kinematics:
 def _link(fixed: list[Joint], axis: Array) -> Link:
     """The step of fixed joints, then a joint that turns about an axis."""
     step = Chain(fixed).pose([])
-    turn, main = step[:3, :3], int(np.argmax(np.abs(axis)))
+    turn = step[:3, :3]
+    main = int(np.argmax(np.abs(axis)))
     return Link(
         step[:3, 3],
         None if np.array_equal(turn, np.eye(3)) else turn,
@@ -132,15 +135,19 @@ def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
         # A turn about an axis of the frame turns the other two in their plane.
         if link.axis[link.main] < 0.0:
             sine = -sine
-        first, second = (link.main + 1) % 3, (link.main + 2) % 3
-        a, b = rotation[first], rotation[second]
+        first = (link.main + 1) % 3
+        second = (link.main + 2) % 3
+        a = rotation[first]
+        b = rotation[second]
         out[link.main] = rotation[link.main]
         out[first] = a * cosine + b * sine
         out[second] = b * cosine - a * sine
         return out
     (x, y, z), (a, b, c), versine = link.axis.tolist(), rotation, 1.0 - cosine
     # Each row of the rotation times K, and that times K again.
-    u, v, w = b * z - c * y, c * x - a * z, a * y - b * x
+    u = b * z - c * y
+    v = c * x - a * z
+    w = a * y - b * x
     out[0] = a + (sine * u + versine * (v * z - w * y))
     out[1] = b + (sine * v + versine * (w * x - u * z))
     out[2] = c + (sine * w + versine * (u * y - v * x))

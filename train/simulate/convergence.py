@@ -119,7 +119,8 @@ def at_middle(scene: Scene) -> Scene:
         replace(item, values={key: middle(value) for key, value in item.values.items()})
         for item in scene.objects
     )
-    lead, taxel = middle(scene.lead), middle(scene.taxel_n_m)
+    lead = middle(scene.lead)
+    taxel = middle(scene.taxel_n_m)
     return replace(scene, spread={}, objects=objects, lead=lead, taxel_n_m=taxel)
 
 
@@ -151,7 +152,8 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
     scene = at_middle(replace(scene, trials={**scene.trials, "after_s": after_s}))
-    tolerance, frame_s = scene.trials["tolerance"], 1.0 / scene.trials["rate_hz"]
+    tolerance = scene.trials["tolerance"]
+    frame_s = 1.0 / scene.trials["rate_hz"]
     objects = {item.slug: item for item in scene.objects}
     kinds = [
         _Kind(

@@ -68,7 +68,8 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
 def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     """The values of trials that share streams: same object, condition and number of
     redraws."""
-    first, numbers = trials[0], np.array([trial.number for trial in trials])
+    first = trials[0]
+    numbers = np.array([trial.number for trial in trials])
     values = {
         **first.object.values,
         "lead_s": scene.lead,
@@ -114,11 +115,13 @@ def begin(
     """
     t = Trials(scene, specs, values_of(scene, specs), plan or make_plan(scene, specs))
     t.plan.run((*SETUP, *TUNE, *FRAME), t)
-    t.y[:], t.compliance[:] = t.y_frame, 0.0
+    t.y[:] = t.y_frame
+    t.compliance[:] = 0.0
     held = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
     if held.any():
         i = int(np.argmax(held))
-        trial, yaw = t.specs[i], abs(t.values["yaw_deg"][i])
+        trial = t.specs[i]
+        yaw = abs(t.values["yaw_deg"][i])
         raise InputError(
             f"{scene.name}: object {trial.object.name!r} touches the arm before it "
             "moves, in "
@@ -174,7 +177,8 @@ def run_physics(
     """
     t = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
-    joints, force = np.empty((t.n, frames, len(t.q))), np.zeros((t.n, frames))
+    joints = np.empty((t.n, frames, len(t.q)))
+    force = np.zeros((t.n, frames))
     sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
     for effect in t.plan.calls:
         for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
@@ -189,7 +193,8 @@ def run_physics(
         effect: np.zeros((*window.shape, len(names)), dtype=np.float32)
         for effect, names in further.items()
     }
-    scale, active = scene.skin.counts_per_newton, np.arange(t.n)
+    scale = scene.skin.counts_per_newton
+    active = np.arange(t.n)
     while active.size:
         starts = active[t.left[active] == 0]
         if starts.size:
@@ -270,7 +275,8 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
     Raises:
         EdgeError: a trial gains energy; the sentence names the first one.
     """
-    scene, k = t.scene, t.joint_k.T
+    scene = t.scene
+    k = t.joint_k.T
     moving = 0.5 * sum(
         i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False)
     )
@@ -287,7 +293,8 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
         np.pad(np.add.accumulate(energy, axis=1), ((0, 0), (1, 0)))
         for energy in (put_in, np.abs(put_in), turned.sum(axis=2))
     )
-    held, brought = stored + lost, stored[:, :1] + moving + work
+    held = stored + lost
+    brought = stored[:, :1] + moving + work
     made = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
     if made.any():
         i = int(np.argmax(made.any(axis=1)))

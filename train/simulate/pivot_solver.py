@@ -21,7 +21,8 @@ from train.simulate.trials import pick
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; most searches need two or
 three."""
-CLOSE_M, CLOSE_RAD = 1e-14, 1e-13
+CLOSE_M = 1e-14
+CLOSE_RAD = 1e-13
 """A step below both is rounding error."""
 CUTS = 40
 GUARDED_ROUNDS = 5000
@@ -96,15 +97,15 @@ class Pivots:
         np.maximum(inside, 0.0, out=inside)
         touched = (inside > 0.0) * pick(self.stiffness[:deep], self.at)
         np.multiply(inside, touched, out=inside)
-        force, held = total(inside), total(touched)
-        force, held = force * self.weight, held * self.weight
+        force = total(inside)
+        held = total(touched)
+        force = force * self.weight
+        held = held * self.weight
         if not isinstance(self.load, float):
             borne = self.gain * force + self.load
             bears = (force > 0.0) & (borne > 0.0)
-            force, held = (
-                np.where(bears, borne, 0.0),
-                np.where(bears, self.gain * held, 0.0),
-            )
+            force = np.where(bears, borne, 0.0)
+            held = np.where(bears, self.gain * held, 0.0)
         stiffness = total(held)
         mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
         off = self.lever - mean
@@ -126,7 +127,8 @@ class Pivots:
         b01 = c01 + mean * c11
         b00 = c00 + mean * (c01 + b01)
         r = r0 + mean * r1
-        first, second = 1.0 + c11 * spread, 1.0 + b00 * k
+        first = 1.0 + c11 * spread
+        second = 1.0 + b00 * k
         det = 1.0 + b00 * k + c11 * spread + self.det * k * spread
         p0 = (first * r - b01 * spread * r1) / det
         p1 = (second * r1 - b01 * k * r) / det
@@ -144,7 +146,8 @@ class Pivots:
         """The loads of the arm at y, and (n,) whether C has an inverse that gives both
         of them."""
         c00, c01, c11 = self.c
-        invertible, d = self.det > 0.0, self.free - y
+        invertible = self.det > 0.0
+        d = self.free - y
         divisor = np.where(invertible, self.det, 1.0)
         loads = np.array([c11 * d[0] - c01 * d[1], c00 * d[1] - c01 * d[0]]) / divisor
         return loads, invertible
@@ -204,7 +207,8 @@ def search(
 
 def _cut(contacts: Pivots, at: Array, loads: Loads, p: Array) -> Array:
     """(n,) the part of a step p to take, so that it does not go too far."""
-    begin, size = contacts.slope(at, loads, p), np.ones(at.shape[1])
+    begin = contacts.slope(at, loads, p)
+    size = np.ones(at.shape[1])
     far = np.ones(at.shape[1], dtype=bool)
     for _ in range(CUTS):
         z = at - size * p

@@ -55,9 +55,11 @@ def recordings(
     `readings`."""
     trials = physics.trials
     scene = scene or trials.scene
-    arm, skin = scene.arm.to_dict(), scene.skin.to_dict()
+    arm = scene.arm.to_dict()
+    skin = scene.skin.to_dict()
     for seen in readings(physics, which, scene):
-        trial, kept = seen.trial, slice(None) if seen.kept is None else seen.kept
+        trial = seen.trial
+        kept = slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
         drawn = {
             name: float(value[seen.which]) for name, value in trials.values.items()
@@ -161,7 +163,9 @@ def write(
     work = batches_of(
         scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1
     )
-    paths, redrawn, unfelt = [], 0, 0
+    paths = []
+    redrawn = 0
+    unfelt = 0
     for name, trial in _simulated(scene, work, jobs, address):
         saving.save(target / name, trial, lasting=False)
         paths.append(target / name)

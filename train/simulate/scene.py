@@ -445,7 +445,9 @@ def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
 
 
 def _draw(generator: np.random.Generator, value: Value) -> float:
-    low, high, part = value.low, value.high, generator.random()
+    low = value.low
+    high = value.high
+    part = generator.random()
     if low <= 0.0:
         return low + (high - low) * part
     return math.exp(math.log(low) + (math.log(high) - math.log(low)) * part)

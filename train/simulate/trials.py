@@ -85,10 +85,15 @@ class Trials:
 
     def __post_init__(self) -> None:
         """Fill the attributes above with zeros."""
-        self.skin, self.kinematics = self.scene.skin, self.scene.kinematics
-        skin, n, dof = self.skin, len(self.specs), len(self.scene.stiffness)
-        rate_hz, zeros = self.scene.trials["rate_hz"], np.zeros
-        self.n, self.rate_hz = n, rate_hz
+        self.skin = self.scene.skin
+        self.kinematics = self.scene.kinematics
+        skin = self.skin
+        n = len(self.specs)
+        dof = len(self.scene.stiffness)
+        rate_hz = self.scene.trials["rate_hz"]
+        zeros = np.zeros
+        self.n = n
+        self.rate_hz = rate_hz
         self.rows, window = skin.rows, 2 * min(WINDOW_HALF, (skin.cols - 1) // 2) + 1
         self.usual = np.array(
             [max(1, round(1.0 / (rate_hz * spec.step_s))) for spec in self.specs],
@@ -98,7 +103,8 @@ class Trials:
             self.usual.copy(),
             *zeros((2, n), dtype=np.int64),
         )
-        self.t, self.h = zeros(n), 1.0 / (rate_hz * self.usual)
+        self.t = zeros(n)
+        self.h = 1.0 / (rate_hz * self.usual)
         self.damping = np.array(self.scene.damping)[:, None]
         self.joint_k = np.array(self.scene.stiffness)[:, None]
         self.rate = np.array(self.scene.rate)[:, None]
@@ -145,11 +151,10 @@ class Trials:
 
     def add_springs(self, i: Index, gaps: Array, stiffness: Array) -> None:
         """Add springs (S, n of i) to each row of some trials."""
-        more, added = (
-            np.full((len(gaps), self.n), np.inf),
-            np.zeros((len(gaps), self.n)),
-        )
-        more[:, i], added[:, i] = np.where(stiffness > 0.0, gaps, np.inf), stiffness
+        more = np.full((len(gaps), self.n), np.inf)
+        added = np.zeros((len(gaps), self.n))
+        more[:, i] = np.where(stiffness > 0.0, gaps, np.inf)
+        added[:, i] = stiffness
         self.gaps = np.concatenate([self.gaps, more])
         self.stiffness = np.concatenate([self.stiffness, added])
 

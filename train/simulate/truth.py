@@ -44,12 +44,11 @@ class Contradiction:
 
 def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     """For each trial of a run, how it contradicts its label, or None."""
-    trials, labels, touched = (
-        physics.trials,
-        physics.trials.scene.labels,
-        physics.force > 0.0,
-    )
-    onset, every = np.argmax(touched, axis=1), np.arange(trials.n)
+    trials = physics.trials
+    labels = physics.trials.scene.labels
+    touched = physics.force > 0.0
+    onset = np.argmax(touched, axis=1)
+    every = np.arange(trials.n)
     last = onset + round(labels["window_s"] * trials.rate_hz)
     last = np.minimum(last, touched.shape[1] - 1)
 
@@ -57,12 +56,14 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
         trace = physics.traces.get(name, np.zeros(touched.shape))
         return np.maximum.accumulate(trace, axis=1)[every, last]
 
-    depth, slide = by_then("depth_m"), by_then("slide_m")
+    depth = by_then("depth_m")
+    slide = by_then("slide_m")
     out: list[Contradiction | None] = []
     for i, trial in enumerate(trials.specs):
         key = FAMILIES[trial.object.family].thickness
         thickness = trials.values[key][i] if key else 0.0
-        label, course = trial.condition, ""
+        label = trial.condition
+        course = ""
         if not touched[i, onset[i]]:
             course = "was never touched"
             remedy = "let [motion] reach it, and turn the skin's columns to it"
@@ -87,7 +88,8 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     """The cause in words, if trial i ended before its window, and the remedy; else
     empty texts."""
     trials = physics.trials
-    scene, moves = trials.scene, trials.rate[:, 0] != 0.0
+    scene = trials.scene
+    moves = trials.rate[:, 0] != 0.0
     stroke_s = float(trials.travel_s[moves, i].max())
     ends_s = min(physics.t[-1], stroke_s)
     if ends_s - onset_s >= scene.labels["window_s"]:

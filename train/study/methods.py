@@ -22,7 +22,8 @@ from train.study.context import Context
 from train.study.sweeps import by_task
 from train.vectors import Labels
 
-PAPER, SEARCHED = "the paper's method", "the paper's method, best of its grid"
+PAPER = "the paper's method"
+SEARCHED = "the paper's method, best of its grid"
 GUESS = "always the most frequent label"
 OURS = (("paper", "pca"), ("paper", "lda"), ("contact", "lda"), ("moments", "lda"))
 """Feature sets and their projections."""
@@ -41,7 +42,8 @@ Answers = Mapping[str, Result]
 
 def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> Answers:
     """The accuracy of extra trees, a widely used method, on X (n, taxels over time)."""
-    trees, split = ExtraTreesClassifier(TREES, random_state=0), PredefinedSplit(folds)
+    trees = ExtraTreesClassifier(TREES, random_state=0)
+    split = PredefinedSplit(folds)
     hits = {
         task: cross_val_predict(trees, X, y[task], cv=split) == y[task] for task in y
     }
@@ -90,7 +92,8 @@ def section(context: Context) -> Section:
     left out."""
     y = context.labels
     others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
-    compared, splits = methods(context), [(y, stratified_folds(y[finest(y)]))]
+    compared = methods(context)
+    splits = [(y, stratified_folds(y[finest(y)]))]
     if GROUP_TASK in y and others:
         splits.append((others, group_folds(y[GROUP_TASK])))
     cases = [(method, *split) for split in splits for method in compared.values()]
@@ -157,7 +160,8 @@ def sentence(
     never met."""
 
     def share(method: str) -> str:
-        result, new = known[method][task], unseen.get(method, {}).get(task)
+        result = known[method][task]
+        new = unseen.get(method, {}).get(task)
         beside = (
             ""
             if new is None

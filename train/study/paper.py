@@ -329,7 +329,8 @@ def _against(known: Mapping[Entry, Row], title: str) -> Figure:
         axes.plot(ends, ends, color="0.4", lw=1, label="equal")
         for entry, row in known.items():
             colour, _, dashes = strokes[entry.task]
-            x, face = entry.percent, colour if row["within"] == "yes" else "white"
+            x = entry.percent
+            face = colour if row["within"] == "yes" else "white"
             bar = [x + row["from"], x + row["to"]]
             axes.plot([x, x], bar, color=colour, lw=1, alpha=0.6, ls=dashes)
             axes.plot(

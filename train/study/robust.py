@@ -87,7 +87,9 @@ def section(context: Context) -> Section | None:
     scene = context.scene
     if scene is None:
         return None
-    changes, X, y = variants(scene), context.vectors(), context.labels
+    changes = variants(scene)
+    X = context.vectors()
+    y = context.labels
     cases = [(changed, context.dataset) for changed in (scene, *changes.values())]
     unchanged, *series = context.workers.map("simulated again", simulated_again, cases)
     if not np.array_equal(vectors(unchanged), X):

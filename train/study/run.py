@@ -118,7 +118,9 @@ def study(
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     """The paragraphs below the title: the data set, and the labels and recordings left
     out."""
-    dataset, scene, layout = context.dataset, context.scene, context.dataset.layout
+    dataset = context.dataset
+    scene = context.scene
+    layout = context.dataset.layout
     tasks = ", ".join(
         f"{task} ({len(set(y))} classes)" for task, y in context.labels.items()
     )

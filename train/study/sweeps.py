@@ -205,7 +205,8 @@ def _with_skin(
 
 def resolution(context: Context) -> Section:
     """Accuracy with larger taxels (Table I, Fig. 9)."""
-    data, labels = context.dataset, context.labels
+    data = context.dataset
+    labels = context.labels
     recordings = [trial.recording for trial in data.trials]
     skins = [(data.layout, recordings), *coarser(data.layout, recordings)]
     cases = [(*skin, data.chain, labels) for skin in skins]

@@ -70,7 +70,8 @@ def section(measured: Measured) -> Section:
 
 def early(measured: Measured) -> Section:
     """Early decisions of each task, compared with waiting for the full window."""
-    board, count = measured.board, len(measured.points)
+    board = measured.board
+    count = len(measured.points)
     decision_us = sum(board.stages_us[stage][0] for stage in ("features", "decision"))
     rows: list[Row] = [
         {
@@ -220,7 +221,8 @@ GLOSSARY = {
 def drawn(measured: Measured) -> Figure:
     """The picture: accuracy against time in a panel for each task, and the parts of the
     time."""
-    compared, m = measured.comparisons, len(measured.comparisons)
+    compared = measured.comparisons
+    m = len(measured.comparisons)
     wide = m if m <= ACROSS else -(-m // 2)
     heights = 3.0 * -(-m // wide) + 2.2, 2.6 * m + 2.2
 
@@ -250,7 +252,8 @@ def _panel(
     axes: Any, task: str, compared: StoppingComparison, measured: Measured
 ) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
-    results, after_s = measured.results(task), measured.after_s
+    results = measured.results(task)
+    after_s = measured.after_s
     chance = 100 * majority(measured.y[task]).accuracy
     axes.axhline(
         chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label"
@@ -290,7 +293,8 @@ def _panel(
 def _split(figure: Any, measured: Measured) -> None:
     """Draw the parts of the time until a decision after the full window, and the end
     magnified."""
-    window, after_ms = max(measured.points), 1e3 * measured.after_s
+    window = max(measured.points)
+    after_ms = 1e3 * measured.after_s
     arithmetic_ms = 1e3 * measured.board.arithmetic_s
     stages = [(f"wait {window:g} s", 1e3 * window)]
     if measured.wire_s is not None:

@@ -60,7 +60,8 @@ class Change:
 
 def every_nth(recording: Recording, n: int) -> Recording:
     """The recording as a wire that carries only every n-th frame would have made it."""
-    joints, valid = recording.joints, recording.valid
+    joints = recording.joints
+    valid = recording.valid
     return replace(
         recording,
         t=recording.t[::n],
@@ -133,7 +134,8 @@ def _slowest(choices: Sequence[Wire]) -> Wire:
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     """{task: {(recording, number of its contact): whether the answer is right}}."""
-    contacts, numbers = [], Counter[Path]()
+    contacts = []
+    numbers = Counter[Path]()
     for trial in dataset.trials:
         contacts.append((trial.path, numbers[trial.path]))
         numbers[trial.path] += 1
@@ -154,7 +156,8 @@ def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
         like: the skin whose thresholds are taken.
     """
     began = time.process_time()
-    source, quick = change.source, change.given.get("quick", True)
+    source = change.source
+    quick = change.given.get("quick", True)
     dataset = source
     if not isinstance(dataset, DataSet):
         dataset = followed(dataset, quick=quick, like=like)

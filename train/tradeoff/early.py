@@ -84,7 +84,8 @@ class StoppingComparison:
     def calibration_error(self) -> float:
         """Expected calibration error: the mean gap between confidence and share of
         right decisions, in equal ranges of confidence."""
-        confidence, right = self.confidence.reshape(-1), self.right.reshape(-1)
+        confidence = self.confidence.reshape(-1)
+        right = self.right.reshape(-1)
         ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
         gaps = np.bincount(ranges, confidence - right)
         return float(np.abs(gaps).sum() / len(right))
@@ -117,9 +118,11 @@ def compare_stopping(
     shape = len(decision_points_s), len(dataset.trials)
     comparisons = {}
     for task in y:
-        right, confidence = np.empty(shape, dtype=bool), np.empty(shape)
+        right = np.empty(shape, dtype=bool)
+        confidence = np.empty(shape)
         for test, (_, hits, sure, _) in zip(tests, held_out, strict=True):
-            right[:, test], confidence[:, test] = hits[task], sure[task]
+            right[:, test] = hits[task]
+            confidence[:, test] = sure[task]
         courses = [courses[task] for *_, courses in held_out]
         rules = list(
             zip(courses, (model.stopping_[task] for model, *_ in held_out), strict=True)
@@ -149,10 +152,8 @@ def _held_out(
     (`judged`)."""
     given: dict[str, Any] = {"leave_out": TRIAL, "decision_points_s": decision_points_s}
     fitted = fit(dataset.part(~test), quick=quick, jobs=1, **given)
-    model, others = (
-        fitted.sequential,
-        replace(dataset.part(test), kernels=fitted.dataset.kernels),
-    )
+    model = fitted.sequential
+    others = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
     new = np.stack(
         [

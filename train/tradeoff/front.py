@@ -102,7 +102,8 @@ class ParetoFront:
                 )
                 for point in content["points"]
             ]
-            task, measured = str(content["task"]), str(content["data_digest"])
+            task = str(content["task"])
+            measured = str(content["data_digest"])
             quick = bool(content["quick"])
             if not points or not all(
                 0.0 < p.window_s <= 60.0 and p.milliseconds for p in points
@@ -131,7 +132,8 @@ class ParetoFront:
             InputError: `wanted` has another form, or no point is as fast or as
                 accurate.
         """
-        first, last = self.points[0], self.points[-1]
+        first = self.points[0]
+        last = self.points[-1]
         balanced = [
             first,
             *(point for point in self.points if point.window_s <= BALANCED_S),

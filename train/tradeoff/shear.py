@@ -21,7 +21,8 @@ from train.tradeoff.wires import microcontroller
 
 LEVELS = (0.8, 0.9, 0.95)
 """Accuracies for which the time is told."""
-KNOWN, UNMET = "known objects", "objects never met"
+KNOWN = "known objects"
+UNMET = "objects never met"
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,8 @@ def price_lines(measured: Measured) -> list[str]:
 def _texts(choice: Chosen) -> dict[str, str]:
     """{class in the page: accuracy, its interval, or accuracy on objects never met, as
     text}."""
-    unmet, result = unseen(choice), choice.by_trial
+    unmet = unseen(choice)
+    result = choice.by_trial
     return {
         "share": f"{100 * result.accuracy:.0f} %",
         "interval": f"({interval(result)})",

@@ -20,7 +20,8 @@ FRAMES = 100
 """Frames counted together, so that rare transactions have their share."""
 STAGES = 12
 """Taxels of an AD7147."""
-CHANNELS, CHIPS = 8, 4
+CHANNELS = 8
+CHIPS = 4
 """Channels of a TCA9548A, and AD7147 on each."""
 MUX = 0x70
 

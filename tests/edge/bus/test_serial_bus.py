@@ -33,7 +33,8 @@ from edge.skin.skin import Skin
 from tests.edge.skin.small import one_chip
 
 TAXELS = 6
-PATIENT_S, HASTY_S = 3.0, 0.05
+PATIENT_S = 3.0
+HASTY_S = 0.05
 """Timeouts: of an answer that comes, however busy the machine, and of one that does
 not."""
 
@@ -85,7 +86,8 @@ class Board:
         self.serving.start()
 
     def unplug(self):
-        master, self.master = self.master, None
+        master = self.master
+        self.master = None
         self.serving.join()
         os.close(self.slave)
         os.close(master)
@@ -235,7 +237,8 @@ def test_bits_on_the_line_are_those_of_the_packets():
 @pytest.fixture
 def skin(board, tmp_path):
     """A skin whose microcontroller stands on a serial port, by a stable name."""
-    path, link = tmp_path / "skin.toml", tmp_path / "port"
+    path = tmp_path / "skin.toml"
+    link = tmp_path / "port"
     link.symlink_to(board.port)
     path.write_text(
         one_chip(2, 3, bus=f'serial = "{link}"', at="") + "[read]\ntimeout_s = 0.5\n"

@@ -125,7 +125,8 @@ def test_a_further_chip_is_one_entry_of_the_list(toy, tmp_path, edge):
     with fake_skin(file, lambda t: picture) as skin:
         np.testing.assert_array_equal(skin.read().counts, picture)
         assert (skin.raw()[0] == picture + 20).all()
-    path, recording = tmp_path / "toy.toml", tmp_path / "rest.npz"
+    path = tmp_path / "toy.toml"
+    recording = tmp_path / "rest.npz"
     path.write_text(TOY_SKIN)
     save(recording, Recording(np.arange(50) / 100.0, np.zeros((50, 2, 4), np.uint16)))
     fake = ("--skin", path, "--fake", recording)

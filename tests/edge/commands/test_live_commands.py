@@ -26,7 +26,8 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
 ):
     """Its sequence number stands still."""
     monkeypatch.setattr("edge.fake.block.RATE_HZ", 0.0)
-    skin, rest = skinfile.shipped("matrix"), tmp_path / "rest.npz"
+    skin = skinfile.shipped("matrix")
+    rest = tmp_path / "rest.npz"
     saving.save(rest, still(skinfile.load(skin), 2.0))
     fake = ("--skin", skin, "--fake", rest, "--noise", 0)
     status, (chip,), err = edge("scan", *fake)
@@ -70,7 +71,8 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
 
 
 def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted):
-    model, path = exported / "model.onnx", parted
+    model = exported / "model.onnx"
+    path = parted
     once = edge("run", "--model", model, "--fake", path)[1]
     twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 4.6)[1]
     assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [
@@ -168,7 +170,8 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
     edge, exported, recordings, tmp_path, monkeypatch, command
 ):
     """A silent serial port may take seconds, and there is nothing to lose yet."""
-    handled, open_skin = [], source.open_skin
+    handled = []
+    open_skin = source.open_skin
 
     def opened(*arguments, **options):
         handled.append(signal.getsignal(signal.SIGTERM))

@@ -51,7 +51,8 @@ def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
     monkeypatch,
 ):
     fake = bus()
-    mux, connected = fake.chips[0x70], []
+    mux = fake.chips[0x70]
+    connected = []
     mux.channels[0][0x20], mux.channels[1][0x20] = Echo(0b1100), Echo(0b1010)
     plain = mux.write
     monkeypatch.setattr(
@@ -63,7 +64,8 @@ def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
 
 
 def test_time_advances_by_the_bits_only_where_it_is_asked_for():
-    still, timed = bus(), bus(timed=True, clock_hz=100_000)
+    still = bus()
+    timed = bus(timed=True, clock_hz=100_000)
     for fake in (still, timed):
         fetch(fake, 0x10, b"\x00", 4)
         assert fake.bits == 1 + 18 + 1 + 45 + 1

@@ -52,7 +52,8 @@ def test_raw_values_saturate_as_a_chip_does():
 def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
     frames = np.arange(3, dtype=np.uint16).reshape(3, 1, 1)
     recording = Recording(np.array([5.0, 5.01, 5.04]), frames)
-    once, looped = Playback(recording), Playback(recording, loop=True)
+    once = Playback(recording)
+    looped = Playback(recording, loop=True)
     times = [0.0, 0.0099, 0.01, 0.039, 0.04, 0.9]
     assert [int(once(t)[0, 0]) for t in times] == [0, 0, 1, 1, 2, 2]
     assert once.ends == pytest.approx(0.06)

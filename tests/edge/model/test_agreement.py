@@ -23,7 +23,8 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
             (m, s): category[i, 2 * s + m] + mobility[i, m] + softness[i, s]
             for m, s in itertools.product((0, 1), repeat=2)
         }
-        m, s = labels["mobility"][i], labels["softness"][i]
+        m = labels["mobility"][i]
+        s = labels["softness"][i]
         assert sums[m, s] == min(sums.values())
         assert labels["category"][i] == 2 * s + m
         assert nearest["softness"][i].tolist() == [

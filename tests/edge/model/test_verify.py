@@ -10,7 +10,8 @@ from edge.model.model import Model
 from edge.model.verify import compared, verify
 from export.arithmetic import in_float32
 
-NAN, INF = float("nan"), float("inf")
+NAN = float("nan")
+INF = float("inf")
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,8 @@ def test_a_bound_allows_its_share_of_what_is_expected(seen, expected, share):
 
 
 def test_a_bound_of_zero_allows_nothing():
-    one, other = np.array([1.0]), np.array([np.nextafter(1.0, 2.0)])
+    one = np.array([1.0])
+    other = np.array([np.nextafter(1.0, 2.0)])
     assert compared("it", one, one, 0.0).passed
     assert not compared("it", other, one, 0.0).passed
 

@@ -85,7 +85,8 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
     model = Model(demo.MODEL)
     for path in demo.recordings():
         recording = load(path)
-        alone, several = Classifier(model), Classifier(model, max_contacts=8)
+        alone = Classifier(model)
+        several = Classifier(model, max_contacts=8)
         expected, seen = (
             [e.to_dict() for f in recording for e in w.push(f)]
             for w in (alone, several)
@@ -149,7 +150,8 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
 
 def on_the_skin(place, recording):
     """Whether a place is on the cylinder in some frame, by the chain alone."""
-    layout, chain = recording.layout, Chain.cody()
+    layout = recording.layout
+    chain = Chain.cody()
     for q in recording.joints:
         pose = chain.pose(q)
         x, y, z = pose[:3, :3].T @ (np.array(place) - pose[:3, 3])
@@ -254,7 +256,8 @@ def test_a_full_disk_costs_lines_and_not_decisions():
 
 
 def test_only_the_head_of_a_long_map_is_read_before_a_run(tmp_path):
-    path, info = tmp_path / "map.jsonl", Model(demo.MODEL).info
+    path = tmp_path / "map.jsonl"
+    info = Model(demo.MODEL).info
     write(path, info, [])
     before = path.stat().st_size
     os.truncate(path, 1 << 31)  # takes no room

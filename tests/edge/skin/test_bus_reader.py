@@ -88,7 +88,8 @@ def test_without_reading_back_a_wrong_channel_gives_wrong_values():
 
 def test_no_result_depends_on_registers_that_power_up_leaves_undefined():
     def frames(seed):
-        clock, feels = VirtualClock(), Pattern(CODY)
+        clock = VirtualClock()
+        feels = Pattern(CODY)
         buses = faulty_buses(CODY, feels, clock, timed=True, seed=seed)
         with Skin(CODY, buses, clock=clock) as skin:
             skin.start()
@@ -186,7 +187,8 @@ def test_a_chip_that_cannot_send_a_frame_is_heard_of_once():
     """An adapter that carries reads of at most 16 bytes: the registers, but not 12
     taxels."""
     with faulty_skin(CODY, lambda t: QUIET) as skin:
-        chip, bus = skin.readers[1].slots[5].chip, skin.readers[1].bus
+        chip = skin.readers[1].slots[5].chip
+        bus = skin.readers[1].bus
         transfer = bus.transfer
 
         def limited(prepared):
@@ -208,7 +210,8 @@ def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_hea
     closed."""
     name = CODY.buses[1].device
     gone = Fault(code=errno.EIO, bus=name, during=(0.1, 10.0))
-    opened, heard = [], []
+    opened = []
+    heard = []
     with faulty_skin(CODY, lambda t: QUIET, faults=[gone]) as skin:
         bus = skin.readers[1].bus
         reopen = bus.reopen
@@ -227,7 +230,8 @@ def test_a_lost_bus_is_opened_again_with_growing_pauses_and_both_changes_are_hea
 def test_a_chip_that_another_program_kept_half_set_up_is_back_in_half_a_second():
     """The mux turned away during its set-up, whose rows were read back from another
     chip."""
-    fault, at = KINDS["another program's mux channel"], {"first": 609, "every": 1000}
+    fault = KINDS["another program's mux channel"]
+    at = {"first": 609, "every": 1000}
     outcome = sweep("", SKINS["one bus"], fault, set_up=True, overhead_s=100e-6, **at)
     assert (outcome.met, outcome.missing, outcome.wrong) == (1, 48, 0)
     assert outcome.back_s < BACK_S

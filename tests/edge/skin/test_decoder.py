@@ -42,7 +42,9 @@ def test_block_chips_of_each_width_serve_a_whole_skin(bits):
 
 
 def test_chips_of_different_kinds_make_one_skin():
-    ad, mpr, mcu = CODY.chips[0], CODY.chips[1], CODY.chips[2:]
+    ad = CODY.chips[0]
+    mpr = CODY.chips[1]
+    mcu = CODY.chips[2:]
     file = replace(
         CODY,
         buses=(
@@ -91,7 +93,8 @@ def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(
 
 
 def test_dead_and_uncovered_taxels_are_never_valid():
-    first, signal = CODY.buses[0], replace(CODY.signal, dead=((1, 1), (2, 3)))
+    first = CODY.buses[0]
+    signal = replace(CODY.signal, dead=((1, 1), (2, 3)))
     bare = replace(CODY, buses=(replace(first, chips=first.chips[:1]),), signal=signal)
     with fake_skin(bare, lambda t: PICTURE) as skin:
         frame = skin.read()

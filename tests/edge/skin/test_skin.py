@@ -123,7 +123,8 @@ def test_counts_above_the_threshold_are_a_touch_and_are_not_followed(above):
 
 
 def test_a_skin_without_a_single_chip_says_so():
-    clock, file = VirtualClock(), calibrated(PAD)
+    clock = VirtualClock()
+    file = calibrated(PAD)
     buses = faulty_buses(file, lambda t: PICTURE, clock, faults=[Fault()])
     skin = Skin(file, buses, clock=clock)
     with (

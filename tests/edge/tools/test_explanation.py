@@ -115,10 +115,8 @@ def test_a_trial_without_a_label_is_no_rival():
 def why_of(model, task, vector, decision):
     """The explanation of a model's decision, and the distances of the trials that
     voted."""
-    rows, label = (
-        decision.neighbours.tolist(),
-        model.info.tasks[task].labels.index(decision.label),
-    )
+    rows = decision.neighbours.tolist()
+    label = model.info.tasks[task].labels.index(decision.label)
     named = (model.info.features, model.info.widths)
     why = explain(Space.of(model, task), vector, rows, label, *named)
     return why, [near.distance for near in why.voters]
@@ -134,7 +132,8 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
         "partial": Choice("none", 4, 3),
     }
     rng = np.random.default_rng(0)
-    X, vectors = rng.normal(size=(3, 60, info.width)), rng.normal(size=(9, info.width))
+    X = rng.normal(size=(3, 60, info.width))
+    vectors = rng.normal(size=(9, info.width))
     vectors[-1] *= 1e3  # beyond the reach of features and coordinates
     y = {
         "of_area": np.array(["a", "b", "c"] * 20),
@@ -164,16 +163,15 @@ def test_without_another_label_there_is_no_rival():
 @pytest.mark.parametrize("name", ["golden", "exported"])
 def test_the_parts_add_up_to_the_graphs_distances(name, exported):
     folder = exported if name == "exported" else GOLDEN
-    model, golden = Model(folder / "model.onnx"), np.load(folder / "golden.npz")
+    model = Model(folder / "model.onnx")
+    golden = np.load(folder / "golden.npz")
     info = model.info
     for task in info.tasks:
         space = Space.of(model, task)
         reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
         for i in range(24):
-            rows, label = (
-                golden[f"{task}_neighbours"][i],
-                int(golden[f"{task}_label"][i]),
-            )
+            rows = golden[f"{task}_neighbours"][i]
+            label = int(golden[f"{task}_label"][i])
             vector = golden["vectors"][i]
             why = explain(
                 space, vector, rows.tolist(), label, info.features, info.widths

@@ -42,7 +42,8 @@ def recorder(folder, out=None, *, names=None):
 
 
 def frames(*poses):
-    counts, valid = np.zeros((2, 2), np.uint16), np.ones((2, 2), bool)
+    counts = np.zeros((2, 2), np.uint16)
+    valid = np.ones((2, 2), bool)
     return [Frame(i / 100, counts, valid, joints=pose) for i, pose in enumerate(poses)]
 
 
@@ -114,7 +115,8 @@ def test_record_keeps_the_names_of_a_recordings_joints(record, recordings, tmp_p
 def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
     record, recordings, monkeypatch, number
 ):
-    push, pushed = Trials.push, []
+    push = Trials.push
+    pushed = []
 
     def interrupted(trials, frame):
         pushed.append(frame)
@@ -245,7 +247,8 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
     def push(page, frame, *_):
         pushed.append(frame)
         if len(pushed) == 2:
-            page.labels, page.recording = {"object": "from the page"}, True
+            page.labels = {"object": "from the page"}
+            page.recording = True
 
     monkeypatch.setattr("edge.tools.page.Page.push", push)
     monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)

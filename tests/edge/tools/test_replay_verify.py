@@ -203,7 +203,8 @@ def test_two_models_are_compared_on_the_same_recordings(exported, recordings, ed
 
 
 def test_a_comparison_counts_what_is_gained_and_lost():
-    first, other = Summary({"t": None}), Summary({"t": None})
+    first = Summary({"t": None})
+    other = Summary({"t": None})
     for i in range(10):
         decided = [{"event": "decision", "task": "t", "label": "a", "flags": []}]
         first.add({"t": "a" if i < 4 else "b"}, decided, str(i))

@@ -88,7 +88,8 @@ def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
     assert "object: 3 trials of the new label 'cup'\n" in messages
     assert "'soft-movable'; did you mean 'soft-fixed'?" not in messages
     model = tmp_path / "taught" / "model.onnx"
-    before, after = Model(exported / "model.onnx"), Model(model)
+    before = Model(exported / "model.onnx")
+    after = Model(model)
     for task, labels in new.items():
         known = before.info.tasks[task].labels
         assert after.info.tasks[task].labels == (*known, *labels)

@@ -109,7 +109,8 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
     (tmp_path / "model.onnx").write_bytes(again)
     assert len(again) == len(data)
     vectors = np.random.default_rng(0).normal(size=(5, model.info.width))
-    before, after = model.run(vectors), Model(tmp_path / "model.onnx").run(vectors)
+    before = model.run(vectors)
+    after = Model(tmp_path / "model.onnx").run(vectors)
     assert all((values == before[key]).all() for key, values in after.items())
 
 

@@ -17,7 +17,8 @@ def pressed(layout, t, taxels, **more):
 
 def followed(layout, frames, debounce=DEBOUNCE, **options):
     """The last contact that a frame belongs to."""
-    tracker, contact = ContactTracker(layout, debounce, **options), None
+    tracker = ContactTracker(layout, debounce, **options)
+    contact = None
     for frame in frames:
         (contact,) = tracker.push(frame) or [contact]
     return contact

@@ -129,7 +129,8 @@ def test_a_point_is_where_the_pose_takes_it(seed):
         for i, kind in enumerate(kinds)
     ]
     for chain in (Chain(joints), Chain.cody(), Chain([])):
-        q, at = rng.normal(size=chain.dof), rng.normal(size=3)
+        q = rng.normal(size=chain.dof)
+        at = rng.normal(size=3)
         pose = chain.pose(q)
         seen = chain.point(q, tuple(at))
         assert seen == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)

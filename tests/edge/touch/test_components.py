@@ -18,7 +18,8 @@ def spiral(side):
     """One winding run of taxels, whose ends are far apart along it."""
     out = np.zeros((side, side), dtype=bool)
     row = col = 0
-    step, length = (0, 1), side - 1
+    step = (0, 1)
+    length = side - 1
     out[0, 0] = True
     turns = 0
     while length > 0:

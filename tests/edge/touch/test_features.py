@@ -35,7 +35,8 @@ def test_a_short_lift_off_is_bridged():
     held = feature_vector(series(t, [100] * 130, [4] * 130, 0.1 * t), 1.2)
     for first, length in [(10, 1), (50, 20), (30, 29), (110, 20)]:
         away = np.arange(first, first + length)
-        area, peak = np.full(130, 4), np.full(130, 100)
+        area = np.full(130, 4)
+        peak = np.full(130, 100)
         area[away] = peak[away] = 0
         motion = 0.1 * t
         motion[away] = motion[first - 1]
@@ -47,7 +48,8 @@ def test_a_short_lift_off_is_bridged():
 
 def test_a_contact_that_is_over_was_over_when_it_lifted_off():
     t = np.arange(130) / 100
-    peak, area = np.full(130, 100), np.full(130, 4)
+    peak = np.full(130, 100)
+    area = np.full(130, 4)
     peak[60:] = area[60:] = peak[58] = area[58] = 0  # it bounces just before
     vector = feature_vector(series(t, peak, area), 1.2)
     assert set(vector[:20]) == {100.0}
@@ -104,11 +106,13 @@ def test_times_that_stand_still_or_go_back_never_reach_the_samples(steps, lags):
     """Frames of equal times, and taxels read earlier than in the frame before, in
     sixteenths."""
     layout = SkinLayout(1, 2, threshold_counts=10, onset_counts=10, release_s=60.0)
-    frames, kept = [], {}
+    frames = []
+    kept = {}
     for i, (t, lag) in enumerate(
         zip(np.cumsum([0, *steps]).tolist(), [0, *lags], strict=False)
     ):
-        at, peak = (t - lag) / 16, 100 + 50 * (i % 3)
+        at = (t - lag) / 16
+        peak = 100 + 50 * (i % 3)
         frames.append(
             pressed(layout, t / 16, {(0, 0): peak}, times=np.full((1, 2), at))
         )
@@ -128,7 +132,8 @@ def between(values, t):
     if t >= times[-1]:
         return values[times[-1]]
     right = next(i for i, time in enumerate(times) if time > t)
-    a, b = times[right - 1], times[right]
+    a = times[right - 1]
+    b = times[right]
     return float(values[a] + (t - a) / (b - a) * (values[b] - values[a]))
 
 
@@ -166,7 +171,8 @@ def test_too_few_samples_and_an_empty_series_are_refused():
 
 @pytest.mark.parametrize("power", [-1000, -600, 0, 600, 1000])
 def test_a_deviation_loses_no_digit_where_its_squares_leave_the_range_of_floats(power):
-    peaks, scale = [100, 230, 410, 90, 0], 2.0**-power
+    peaks = [100, 230, 410, 90, 0]
+    scale = 2.0**-power
     course = series([0.0, 0.25, 0.5, 0.75, 1.0], peaks, [1] * 5, scale=scale)
     (deviation,) = feature_vector(course, 1.0, 5, ["max_force_deviation"])
     variance = Fraction(sum(p * p for p in peaks), 5) - Fraction(sum(peaks), 5) ** 2

@@ -17,11 +17,13 @@ class Wire:
     """Lines that arrive at times of our clock."""
 
     def __init__(self, **options):
-        self.now, self.data = 0.0, b""
+        self.now = 0.0
+        self.data = b""
         self.joints = Joints(self.take, dof=2, now=lambda: self.now, **options)
 
     def take(self):
-        data, self.data = self.data, b""
+        data = self.data
+        self.data = b""
         return data
 
     def send(self, t, q, **more):

@@ -111,7 +111,8 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(
 
 @pytest.mark.parametrize("wraps", [False, True])
 def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
-    rows, cols = 1024, 1024
+    rows = 1024
+    cols = 1024
     layout = SkinLayout(rows, cols, wraps=wraps)
     frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
     active = ActiveTaxels(frame.counts, 0)
@@ -161,8 +162,10 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     def mean(of) -> Fraction:
         return Fraction(sum(f * of(r, c) for (r, c), f in taxels.items()), force)
 
-    row, col = mean(lambda r, c: r), mean(lambda r, c: c)
-    rr, cc = mean(lambda r, c: (r - row) ** 2), mean(lambda r, c: (c - col) ** 2)
+    row = mean(lambda r, c: r)
+    col = mean(lambda r, c: c)
+    rr = mean(lambda r, c: (r - row) ** 2)
+    cc = mean(lambda r, c: (c - col) ** 2)
     rc = mean(lambda r, c: (r - row) * (c - col))
     with mpmath.workdps(60):
         a, b, m = (mpmath.mpf(x.numerator) / x.denominator for x in (rr, cc, rc))

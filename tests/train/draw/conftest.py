@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 @pytest.fixture
 def drawn(monkeypatch):
     """The figures that are saved."""
-    figures, save = [], Figure.savefig
+    figures = []
+    save = Figure.savefig
     monkeypatch.setattr(
         Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k))
     )

@@ -17,7 +17,8 @@ TOUCH = demo.recordings()[0]
 
 
 def test_the_sketch_is_drawn_below_the_curves(tmp_path):
-    plain, sketched = tmp_path / "plain.png", tmp_path / "sketched.png"
+    plain = tmp_path / "plain.png"
+    sketched = tmp_path / "sketched.png"
     assert main(["show", str(TOUCH), "--out", str(plain)]) == 0
     assert main(["show", str(TOUCH), "--scene", "--out", str(sketched)]) == 0
     assert sketched.stat().st_size > plain.stat().st_size

@@ -25,7 +25,8 @@ def outline(axis):
 
 
 def test_an_object_that_slides_stands_on_its_floor_where_it_was_pushed_to():
-    still, moved = sketch(["sliding"], 0.0)[0], sketch(["sliding"], 0.1)[0]
+    still = sketch(["sliding"], 0.0)[0]
+    moved = sketch(["sliding"], 0.1)[0]
     np.testing.assert_allclose(
         outline(moved) - outline(still), [[0.1, 0.0]] * len(outline(still))
     )

@@ -67,7 +67,8 @@ def test_what_cannot_be_drawn_is_one_sentence(path, refusal, text, options, sent
 
 
 def test_the_arm_or_skin_of_a_model_is_drawn_behind_the_contacts(path, tmp_path):
-    plain, behind = tmp_path / "plain.png", tmp_path / "behind.png"
+    plain = tmp_path / "plain.png"
+    behind = tmp_path / "behind.png"
     assert main(["show", str(path), "--out", str(plain)]) == 0
     assert (
         main(["show", str(path), "--model", str(demo.MODEL), "--out", str(behind)]) == 0

@@ -67,7 +67,8 @@ def of_structures(path):
 
 def of_cells(path):
     cells = np.empty(2, dtype=object)
-    cells[0], cells[1] = FRAMES, FRAMES + 1
+    cells[0] = FRAMES
+    cells[1] = FRAMES + 1
     savemat(path, {"frames": cells, "label": np.array(["cup", "pen"], dtype=object)})
 
 

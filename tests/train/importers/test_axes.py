@@ -8,7 +8,8 @@ import edge
 from train.__main__ import main
 from train.importers.axes import lettered
 
-FRAMES, TAXELS = 60, 4
+FRAMES = 60
+TAXELS = 4
 
 
 def values() -> np.ndarray:

@@ -73,7 +73,8 @@ def written(folder, text, name="cup_1.dsa"):
 
 def test_a_grasp_is_unpacked_cell_by_cell(tmp_path):
     recording = sdh2.grasp(written(tmp_path, dsa()))
-    left, right = recording.frames[:, :, :6], recording.frames[:, :, 7:]
+    left = recording.frames[:, :, :6]
+    right = recording.frames[:, :, 7:]
     assert left.reshape(3, -1)[:, 8:10].tolist() == [[0, 0], [70, 80], [170, 180]]
     assert right.reshape(3, -1)[:, [0, -1]].tolist() == [[0, 0], [90, 0], [0, 4095]]
     assert int(recording.frames.sum()) == 70 + 80 + 170 + 180 + 90 + 4095

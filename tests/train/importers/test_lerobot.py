@@ -11,7 +11,8 @@ from train.__main__ import main
 
 pytest.importorskip("pyarrow", reason="needs pyarrow")
 
-N, TAXELS = 30, 6
+N = 30
+TAXELS = 6
 TASKS = ("grasp the cup", "grasp the box")
 
 

@@ -15,7 +15,10 @@ from edge.recording import load
 from train.__main__ import main
 from train.importers.topics import Log
 
-N, ROWS, COLS, DOF = 12, 4, 6, 5
+N = 12
+ROWS = 4
+COLS = 6
+DOF = 5
 RNG = np.random.default_rng(8)
 FRAMES = RNG.integers(0, 65536, (N, ROWS, COLS)).astype(np.uint16)
 T = 100.0 + np.arange(N) / 100
@@ -484,7 +487,8 @@ def sensor_types():
 def sensor_messages(types):
     """Messages whose taxels have x and y beside the counts of `FRAMES`, cut to 15
     bits."""
-    taxel, stream = types.types["xela/msg/Taxel"], types.types[SENSOR_KIND]
+    taxel = types.types["xela/msg/Taxel"]
+    stream = types.types[SENSOR_KIND]
     for t, frame in zip(T, FRAMES >> 1, strict=True):
         taxels = [taxel(x=z // 4, y=-(z // 8), z=z) for z in frame.reshape(-1).tolist()]
         yield t, stream(header=header(types, t), taxels=taxels)

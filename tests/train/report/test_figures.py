@@ -10,7 +10,8 @@ from train.report.figures import PHONE, confusion
 
 
 def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
-    truth, said = np.array(["a", "a", "b"]), np.array(["a", "z", "b"])
+    truth = np.array(["a", "a", "b"])
+    said = np.array(["a", "z", "b"])
     first = confusion("n", "t", truth, said)
     assert first == confusion("n", "t", truth, said)
     assert first.png != confusion("n", "t", truth, truth).png

@@ -67,7 +67,8 @@ def test_nested_accuracy_of_clear_classes_is_one():
 
 
 def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
-    searched, plain = score(Result(10, 20, components=3, k=2)), score(Result(10, 20))
+    searched = score(Result(10, 20, components=3, k=2))
+    plain = score(Result(10, 20))
     assert (
         list(searched)
         == list(plain)

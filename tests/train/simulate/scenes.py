@@ -107,12 +107,10 @@ class Rig:
             np.ones((5, 1)),
             np.zeros((5, 1)),
         )
-        t.rate[0], t.joint_k[0], t.damping[0], t.travel_s[0] = (
-            speed,
-            arm_k,
-            arm_d,
-            travel_s,
-        )
+        t.rate[0] = speed
+        t.joint_k[0] = arm_k
+        t.damping[0] = arm_d
+        t.travel_s[0] = travel_s
         t.jacobian[0, 0] = 1.0
         shape = (len(law[1]), n)
         t.law_gaps, t.slopes, t.intercepts = (
@@ -122,7 +120,9 @@ class Rig:
         t.compliance[0] = t.give[0]
 
     def run(self, steps: int) -> Trace:
-        t, seen, still = self.trials, [], np.zeros(self.trials.n)
+        t = self.trials
+        seen = []
+        still = np.zeros(self.trials.n)
         for _ in range(steps):
             t.plan.run(STEP, t)
             mover = t.own.get("sliding", SimpleNamespace(slide=still, speed=still))

@@ -33,11 +33,9 @@ def sponge(tmp_path, monkeypatch):
 def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
     # F' = K (v - F / eta), so F = eta v (1 - exp(-K t / eta)), with arm and bed in
     # series.
-    eta, speed, stiffness = (
-        np.array([20.0, 60.0]),
-        0.15,
-        1.0 / (1.0 / 115.0 + 1.0 / 1e4),
-    )
+    eta = np.array([20.0, 60.0])
+    speed = 0.15
+    stiffness = 1.0 / (1.0 / 115.0 + 1.0 / 1e4)
     trace = Rig(h=5e-4, speed=speed, effects=("sponge",), sponge_n_s_m=eta).run(2000)
     want = eta * speed * (1.0 - np.exp(-stiffness * trace.t / eta))
     np.testing.assert_allclose(trace.force, want, atol=2e-3 * want.max())
@@ -45,7 +43,8 @@ def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
 
 @pytest.mark.usefixtures("sponge")
 def test_an_object_calls_for_it_by_its_key():
-    soft, hard = one_object(sponge_n_s_m=50.0)[0], {**one_object()[0], "name": "other"}
+    soft = one_object(sponge_n_s_m=50.0)[0]
+    hard = {**one_object()[0], "name": "other"}
     batch = run(make([soft, hard]))
     alone = run(make([hard]))
     crept = batch.trials.own["sponge"].crept

@@ -111,13 +111,15 @@ def tilt_error(springs, free, c, loads):
     y1 = free[1] - (c[1] * loads.force + c[2] * loads.moment)
     inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
     held = (inside > 0.0) * springs.stiffness * springs.weight[:, None]
-    force, k = (inside * held).sum(axis=1), held.sum(axis=1)
+    force = (inside * held).sum(axis=1)
+    k = held.sum(axis=1)
     stiffness = k.sum(axis=0)
     mean = (k * springs.lever).sum(axis=0) / np.where(stiffness > 0.0, stiffness, 1.0)
     spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
     left = force.sum(axis=0) - loads.force
     turning = (force * springs.lever).sum(axis=0) - loads.moment
-    r0, r1 = c[0] * left + c[1] * turning, c[1] * left + c[2] * turning
+    r0 = c[0] * left + c[1] * turning
+    r1 = c[1] * left + c[2] * turning
     # (I + C H) p = r, about the mean lever, where H is diagonal.
     c01 = c[1] + mean * c[2]
     c00 = c[0] + mean * (c[1] + c01)

@@ -128,7 +128,8 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     trial_scene = scene("noise")
     other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
     trials = tuple(next(iter(kinds(trial_scene).values())))
-    a, b = values_of(trial_scene, trials), values_of(other_scene, trials)
+    a = values_of(trial_scene, trials)
+    b = values_of(other_scene, trials)
     assert a.keys() == b.keys()
     assert all(a[key].tobytes() == b[key].tobytes() for key in a)
     # Before the contact nothing but the noise's own draws is to be seen.
@@ -148,7 +149,8 @@ def test_5_each_trial_runs_its_own_hooks_and_no_other():
     added = [name for name in EFFECTS if name not in implied]
     trial_scene = scene(*added, objects=everything(), axes=3)
     specs = tuple(specs[0] for specs in kinds(trial_scene).values())
-    plan, seen = make_plan(trial_scene, specs), set()
+    plan = make_plan(trial_scene, specs)
+    seen = set()
     for i, effects in enumerate(plan.effects):
         shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
         owners = ["base", *shared, *effects]
@@ -170,16 +172,15 @@ def test_6_results_do_not_depend_on_the_batch(sensor):
     together = run_batch(trial_scene, every)
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
-        some, where = (
-            run_batch(trial_scene, specs),
-            [every.index(spec) for spec in specs],
-        )
+        some = run_batch(trial_scene, specs)
+        where = [every.index(spec) for spec in specs]
         for name in ("counts", "joints", "force"):
             bits = getattr(together, name)[where].tobytes()
             assert getattr(some, name).tobytes() == bits, (name, specs[0].key)
         for one_seen, k in zip(some.seen, where, strict=True) if sensor else ():
             for name in ("times", "kept", "valid"):
-                read, before = getattr(one_seen, name), getattr(together.seen[k], name)
+                read = getattr(one_seen, name)
+                before = getattr(together.seen[k], name)
                 assert read.tobytes() == before.tobytes(), (name, specs[0].key)
 
 

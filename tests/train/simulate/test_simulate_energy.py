@@ -63,7 +63,9 @@ class Ledger:
 
     def __init__(self, scene, specs, meddle=None):
         """Of a scene's trials; `meddle` changes them after each step."""
-        self.scene, self.specs, self.meddle = scene, specs, meddle
+        self.scene = scene
+        self.specs = specs
+        self.meddle = meddle
         plan = make_plan(scene, specs)
         book = Call("ledger", self.book, np.ones(len(specs), dtype=bool))
         self.plan = replace(
@@ -72,7 +74,10 @@ class Ledger:
         self.inertia = (
             np.array(scene.inertia)[:, None] if "inertia" in plan.calls else 0.0
         )
-        self.took, self.idle, self.pushed, self.has = [], [], [], []
+        self.took = []
+        self.idle = []
+        self.pushed = []
+        self.has = []
         self.q = None
 
     def run(self):
@@ -88,18 +93,21 @@ class Ledger:
             self.meddle(t)
         moved = np.zeros(t.n, dtype=bool)
         moved[i] = True
-        dq, load = t.q - self.q, t.loads[0]
+        dq = t.q - self.q
+        load = t.loads[0]
         v = np.where(moved, dq / t.h, self.v)
         spring = t.joint_k * (t.q - t.equilibrium(t.t))
         torque = self.inertia * (v - self.v) / t.h + t.damping * v + spring
         self.took.append(-(torque * dq).sum(axis=0))
-        self.q, self.v = t.q.copy(), v
+        self.q = t.q.copy()
+        self.v = v
         idle = load == 0.0
         if "viscous" in t.own:
             idle = idle & (np.abs(t.own["viscous"].load).max(axis=0) < 1e-6)
         if "sliding" in t.own:
             mover = t.own["sliding"]
-            way, self.slide = mover.slide - self.slide, mover.slide.copy()
+            way = mover.slide - self.slide
+            self.slide = mover.slide.copy()
             self.pushed.append(load * way)
             self.speed = np.where(moved, way / t.h, self.speed)
             has = 0.5 * mover.inertia * self.speed * self.speed + lean(t, mover)
@@ -147,7 +155,8 @@ def pair_scene(first, second):
         return None
     called = [key for name in pair for key in EFFECTS[name].keys]
     keys = {key: RANGES[key] for key in ("width_m", *MOVES, *called)}
-    family, condition = common[0], "movable" if "sliding" in pair else "fixed"
+    family = common[0]
+    condition = "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
     own = set(FAMILIES[family].effects[1:])
     trial_scene = scene(

@@ -46,7 +46,8 @@ class TestArm:
     @pytest.mark.parametrize("chain", [Chain.cody(), SKEW], ids=["cody", "skew"])
     def test_kinematics_are_the_edges(self, chain):
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (chain.dof, 50))
-        pose, want = Kinematics(chain).pose(q), chain.pose(q.T)
+        pose = Kinematics(chain).pose(q)
+        want = chain.pose(q.T)
         np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
         np.testing.assert_allclose(pose.rotation.T, want[:, :3, :3], atol=2e-15)
 
@@ -69,7 +70,9 @@ class TestArm:
         assert batch.force[0, 31] > 0.0
 
     def test_a_damped_joint_answers_a_step_as_its_equation_does(self):
-        k, d, h = 20.0, 1.11, 1e-4
+        k = 20.0
+        d = 1.11
+        h = 1e-4
         rig = Rig(h=h, arm_k=k, arm_d=d, speed=1e6, travel_s=1e-6, slopes=[[0.0]])
         trace = rig.run(3000)
         want = 1.0 - np.exp(-trace.t[:, 0] * k / d)
@@ -96,7 +99,9 @@ class TestArm:
 
 
 class TestSliding:
-    MASS, MU_S, MU_K = 2.0, 0.5, 0.4
+    MASS = 2.0
+    MU_S = 0.5
+    MU_K = 0.4
 
     def rig(self, h, speed=0.15):
         return slider(h, self.MASS, self.MU_S, self.MU_K, speed=speed, slopes=[[1e7]])
@@ -139,7 +144,9 @@ class TestSliding:
 class TestInertia:
     """One joint that swings a bar of 0.3 m against a narrow post."""
 
-    INERTIA, STIFFNESS, DAMPING = 0.09, 12.0, 0.4
+    INERTIA = 0.09
+    STIFFNESS = 12.0
+    DAMPING = 0.4
 
     def swing(self, tmp_path, h, loss_s, after_s=0.6):
         chain = tmp_path / "arm.toml"
@@ -163,8 +170,10 @@ class TestInertia:
     def oracle(self, batch, loss_s):
         """I q'' + d q' + k (q - q_eq) = -J F with F = K(a) (a + loss a'), never
         pulling."""
-        t, rate = batch.trials, math.radians(30.0)
-        slopes, intercepts = t.slopes[:, 0], t.intercepts[:, 0]
+        t = batch.trials
+        rate = math.radians(30.0)
+        slopes = t.slopes[:, 0]
+        intercepts = t.intercepts[:, 0]
 
         def contact_at(q, speed):
             pose = t.kinematics.pose(np.array([[q]]))
@@ -206,7 +215,9 @@ class TestInertia:
         assert errors[1] < 0.75 * errors[0]
 
     def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
-        trial_scene, h, loss_s = self.swing(tmp_path, 0.01, loss_s=0.003), 0.01, 0.003
+        trial_scene = self.swing(tmp_path, 0.01, loss_s=0.003)
+        h = 0.01
+        loss_s = 0.003
         plan = make_plan(trial_scene, specs_of(trial_scene))
         plans = plan, replace(plan, stages={**plan.stages, "pace": []})
         paced, plain = (run(trial_scene, h, plan=plan) for plan in plans)
@@ -223,7 +234,8 @@ class TestInertia:
 
     def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path, monkeypatch):
         trial_scene = self.swing(tmp_path, 0.01, loss_s=0.02)
-        steps, start_frames = [], engine.start_frames
+        steps = []
+        start_frames = engine.start_frames
 
         def watched(t, starts):
             start_frames(t, starts)
@@ -248,7 +260,8 @@ class TestFriction:
         shear = held.trials.own["friction"]
         force = held.force[0, -1]
         assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
-        c_nn, c_nt = held.trials.compliance[0, 0], shear.coupled[0, 0]
+        c_nn = held.trials.compliance[0, 0]
+        c_nt = shear.coupled[0, 0]
         want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(shear.pull[0]) * c_nt)
         assert force == pytest.approx(want, rel=0.05)
         assert force < 0.95 * plain.force[0, -1]
@@ -300,7 +313,8 @@ class TestFriction:
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         held = run(make(movable(0.05, 0.5, 0.5, skin_friction=0.5, width_m=0.2)))
-        shear, mover = held.trials.own["friction"], held.trials.own["sliding"]
+        shear = held.trials.own["friction"]
+        mover = held.trials.own["sliding"]
         shear.pull = 5.0 / held.trials.along_face[2]
         friction.drag(held.trials, ALL)
         assert mover.weight.tolist() == [0.0, 0.0]
@@ -311,7 +325,8 @@ class TestFriction:
             for more in ({}, {"skin_friction": 0.5})
         )
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
-        shear, mover = held.trials.own["friction"], held.trials.own["sliding"]
+        shear = held.trials.own["friction"]
+        mover = held.trials.own["sliding"]
         assert mover.weight[0] == pytest.approx(
             GRAVITY - shear.pull[0] * held.trials.along_face[2, 0], rel=0.01
         )
@@ -322,7 +337,8 @@ class TestTilt:
     def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
         t = run(make(one_object(width_m=0.05), "tilt")).trials
         tilt.locate(t, ALL)
-        before, jacobian = t.y_frame.copy(), t.jacobian.copy()
+        before = t.y_frame.copy()
+        jacobian = t.jacobian.copy()
         middle = t.own["tilt"].lever[0].copy()
         for j in range(4):
             t.q[j] += 1e-6

@@ -75,7 +75,8 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
 
 
 def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
-    force, motion = dataset.features()[:, 39], dataset.features()[:, 119]
+    force = dataset.features()[:, 39]
+    motion = dataset.features()[:, 119]
     category = dataset.labels("category")
     mean = {
         c: (force[category == c].mean(), motion[category == c].mean())

@@ -11,7 +11,8 @@ from train.simulate.contact import GRAVITY
 from train.simulate.effects import base, sliding, stribeck, tipping
 from train.simulate.plan import ALL
 
-MU, MASS = 0.4, 1.0
+MU = 0.4
+MASS = 1.0
 AT_THE_END = slice(-40, None)
 
 
@@ -34,14 +35,13 @@ class TestTurning:
         lever = 2.0 / 3.0 * 0.12
         force = MU * MASS * GRAVITY / math.sqrt(1.0 + (aside / lever) ** 2)
         assert batch.force[0, AT_THE_END].mean() == pytest.approx(force, rel=0.02)
-        turned, slid = batch.traces["turn_rad"][0, -1], batch.traces["slide_m"][0, -1]
+        turned = batch.traces["turn_rad"][0, -1]
+        slid = batch.traces["slide_m"][0, -1]
         assert turned == pytest.approx(slid * aside / (lever**2 + aside**2), rel=1e-12)
 
     def test_the_contact_moves_around_the_forearm_with_the_face(self):
-        straight, turned = (
-            push(aside_m=0.0, foot_m=0.24),
-            push(aside_m=0.06, foot_m=0.24),
-        )
+        straight = push(aside_m=0.0, foot_m=0.24)
+        turned = push(aside_m=0.06, foot_m=0.24)
 
         def column(batch):
             weight = batch.counts[0, -1].sum(axis=0, dtype=float)
@@ -55,7 +55,8 @@ class TestTurning:
 
     def test_off_its_middle_it_is_lighter_by_its_own_turn(self):
         # A free disc of mass m, pushed e beside its middle: 1 / m + e^2 / (m R^2 / 2).
-        aside, radius = 0.06, 0.12
+        aside = 0.06
+        radius = 0.12
         felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
         batch = push(aside_m=aside, foot_m=2.0 * radius)
         assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
@@ -98,7 +99,8 @@ class TestToppling:
         # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
         felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
         assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
-        slide, lies = batch.traces["slide_m"][0], 0.5 * math.pi * 0.4
+        slide = batch.traces["slide_m"][0]
+        lies = 0.5 * math.pi * 0.4
         fallen = slide >= lies - 1e-12
         assert fallen.any()
         assert (slide[np.argmax(fallen) :] == lies).all()
@@ -106,9 +108,12 @@ class TestToppling:
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
         # it is.
-        own, mover = batch.trials.own["tipping"], batch.trials.own["sliding"]
-        travel, lies = own.travel[0], mover.lies[0]
-        slide, force = batch.traces["slide_m"][0], batch.force[0]
+        own = batch.trials.own["tipping"]
+        mover = batch.trials.own["sliding"]
+        travel = own.travel[0]
+        lies = mover.lies[0]
+        slide = batch.traces["slide_m"][0]
+        force = batch.force[0]
         speed = np.gradient(slide, batch.t)
         free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
         free[1:-1] &= (force[:-2] == 0.0) & (force[2:] == 0.0)
@@ -121,7 +126,9 @@ class TestToppling:
     def test_let_go_it_falls_back_onto_its_foot(self, batch):
         t = batch.trials
         mover = t.own["sliding"]
-        mover.slide[:], mover.speed[:], t.y[:] = 1e-6, 0.0, -0.1
+        mover.slide[:] = 1e-6
+        mover.speed[:] = 0.0
+        t.y[:] = -0.1
         tipping.drag(t, ALL)
         sliding.give_way(t, ALL)
         base.press(t, ALL)

@@ -78,11 +78,9 @@ def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(
 ):
     write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
     write(scenes.load(DEMO, count=3), tmp_path / "more")
-    first, other, more = (
-        digests(written[0]),
-        digests(tmp_path / "seed"),
-        digests(tmp_path / "more"),
-    )
+    first = digests(written[0])
+    other = digests(tmp_path / "seed")
+    more = digests(tmp_path / "more")
     assert all(first[name] != digest for name, digest in other.items())
     assert all(more[name] == digest for name, digest in first.items())
 

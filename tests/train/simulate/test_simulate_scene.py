@@ -188,7 +188,8 @@ def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
     )
     other = tmp_path / "other.toml"
     other.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
-    first, second = scenes.load(tmp_path / "one.toml"), scenes.load(other)
+    first = scenes.load(tmp_path / "one.toml")
+    second = scenes.load(other)
     assert (first.trials["count"], second.trials["count"]) == (3, 4)
     assert second.name == "other"
     assert second.trials["after_s"] == 1.5
@@ -240,7 +241,8 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
         'link="c"/>'
         '<origin xyz="0 0 -0.4"/></joint></robot>'
     )
-    urdf, here = tmp_path / "arm.urdf", str(tmp_path / "scene.toml")
+    urdf = tmp_path / "arm.urdf"
+    here = str(tmp_path / "scene.toml")
     arm = {"chain": "arm.urdf", "base": "a", "tip": "c"}
     arm |= {"stiffness_nm_rad": [12.0], "damping_nms_rad": [0.4]}
     table = {**GOOD, "arm": arm, "motion": {"start_deg": [0.0], "rate_deg_s": [30.0]}}

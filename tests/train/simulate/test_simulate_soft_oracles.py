@@ -20,7 +20,10 @@ RADIUS = 0.04604
 class TestRelaxation:
     @pytest.mark.parametrize("tau", [1e-6, 0.004, 0.05, 0.5, 2.0, 1e5])
     def test_ramp_and_hold_of_the_standard_linear_solid(self, tau):
-        k, ratio, rate, up = 500.0, 1.2, 0.02, 0.5
+        k = 500.0
+        ratio = 1.2
+        rate = 0.02
+        up = 0.5
         law = {"effects": ("relaxation",), "relax_ratio": ratio, "relax_s": tau}
         steps_s = [0.01, 0.002, 0.1]
         rig = Rig(
@@ -136,7 +139,8 @@ def layer_solution(half_width, step=1 / 200):
     """Load, depth and mean pressure's peak of a cylinder of radius 1 on a bonded layer
     of E = 1 and H = 1 without lateral strain, by its Green's function (Fourier),
     half_width a."""
-    n, length = 8192, 8192 * step
+    n = 8192
+    length = 8192 * step
     w = 2.0 * np.pi * np.fft.rfftfreq(n, step)
     v = np.clip(w, 1e-9, 20.0)
     bonded = (6.0 * np.sinh(2 * v) - 4.0 * v) / (
@@ -194,12 +198,11 @@ class TestAskew:
     Poisson's ratio 0.1)."""
 
     def test_a_face_that_goes_on_beyond_the_skin_has_no_end_there(self):
-        rising, falling = np.arange(4.0), -np.arange(4.0)
-        covered, begins, ends = (
-            np.ones(4),
-            np.array([0.0, 1, 1, 1]),
-            np.array([1.0, 1, 1, 0]),
-        )
+        rising = np.arange(4.0)
+        falling = -np.arange(4.0)
+        covered = np.ones(4)
+        begins = np.array([0.0, 1, 1, 1])
+        ends = np.array([1.0, 1, 1, 0])
 
         def askew(depth, weight):
             return lateral.askew(depth[:, None], weight[:, None], 0.5)[:, 0].tolist()
@@ -227,10 +230,12 @@ class TestAskew:
     ):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
-        slope, pitch = np.tan(np.radians(degrees)), t.skin.pitch[0]
+        slope = np.tan(np.radians(degrees))
+        pitch = t.skin.pitch[0]
         # The face covers the skin's rows but the first and the last.
         depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
-        t.weight[:], t.line_depth[:] = np.pad(np.ones(14), 1)[:, None], depth[:, None]
+        t.weight[:] = np.pad(np.ones(14), 1)[:, None]
+        t.line_depth[:] = depth[:, None]
         t.force[:] = force
         # Half a column from the nearest on either side, as in the block's sum over
         # taxels.
@@ -250,7 +255,8 @@ def test_foam_pressed_flat_is_as_hard_as_the_skin():
     # 20 mm at 2 kPa: its column ends at 93 %, and then the taxel is all that gives.
     foam = {"family": "foam", "modulus_pa": 2e3, "depth_m": 0.02}
     batch = run(make(one_object(**foam), after_s=4.0))
-    depth, force = batch.traces["depth_m"][0], batch.force[0]
+    depth = batch.traces["depth_m"][0]
+    force = batch.force[0]
     give = np.diff(depth)[-50:] / np.diff(force)[-50:]
     assert (give > 0.0).all()
     assert (give <= 1.0 / (16 * 1e4)).all()
@@ -280,12 +286,15 @@ def test_a_sleeve_gives_each_of_four_neighbours_its_part():
     cover.pass_on(t, ALL)
     image = t.image[..., 0]
     want = np.zeros_like(image)
-    want[5, 3], want[[4, 6], 3], want[5, [2, 4]] = 0.6, 0.1, 0.1
+    want[5, 3] = 0.6
+    want[[4, 6], 3] = 0.1
+    want[5, [2, 4]] = 0.1
     np.testing.assert_allclose(image, want, atol=1e-15)
 
 
 class TestBubbles:
-    HEIGHT, STIFFNESS = 0.008, 1500.0
+    HEIGHT = 0.008
+    STIFFNESS = 1500.0
 
     def wrap(self, **keys):
         thing = {
@@ -304,9 +313,11 @@ class TestBubbles:
     def test_they_stiffen_by_the_gas_law(self, part):
         # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
         t = self.wrap(pop_n=1e6).trials
-        bed, columns = t.own["pop"], len(t.reach)
+        bed = t.own["pop"]
+        columns = len(t.reach)
         middle = slice(columns // 2, None, columns)
-        touched, stiffness = bed.gaps[middle, 0][:3], bed.stiffness[middle, 0][:3]
+        touched = bed.gaps[middle, 0][:3]
+        stiffness = bed.stiffness[middle, 0][:3]
         depth = part * self.HEIGHT
         force = (np.maximum(touched[0] + depth - touched, 0.0) * stiffness).sum()
         want = self.STIFFNESS * depth / (1.0 - part)
@@ -326,7 +337,8 @@ class TestBubbles:
 
     def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
         t = self.wrap(pop_n=0.5, width_m=0.05).trials
-        bubbles, weight = t.own["pop"], t.weight[:, 0]
+        bubbles = t.own["pop"]
+        weight = t.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
         left = weight * bubbles.alive[..., 0] * bubbles.stiffness[:, :1]
         law = [t.slopes[-1, 0], t.intercepts[-1, 0]]
@@ -364,7 +376,8 @@ def test_stems_that_have_slipped_off_damp_no_more():
 def test_no_row_that_the_face_does_not_cover_is_the_deepest():
     keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
     batch = run(make(one_object(width_m=0.02, **keys), "tilt"))
-    covered, depth = batch.trials.weight > 0.0, batch.trials.line_depth
+    covered = batch.trials.weight > 0.0
+    depth = batch.trials.line_depth
     want = np.where(covered, depth, 0.0).max(axis=0)
     assert (want < depth.max(axis=0)).all()
     np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)

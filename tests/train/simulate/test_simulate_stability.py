@@ -7,12 +7,16 @@ from tests.train.simulate.scenes import Rig, slider
 from train.simulate import contact
 from train.simulate.contact import GRAVITY
 
-MU_S, MU_K, ARM_K, SPEED = 0.5, 0.4, 115.0, 0.15
+MU_S = 0.5
+MU_K = 0.4
+ARM_K = 115.0
+SPEED = 0.15
 
 
 def judge(trace, stiffness, mass, mu_s, mu_k):
     """The laws that a trace breaks, as complaints."""
-    force, moved = trace.force, np.diff(trace.slide, axis=0, prepend=0.0)
+    force = trace.force
+    moved = np.diff(trace.slide, axis=0, prepend=0.0)
     if not all(np.isfinite(v).all() for v in trace):
         return ["not finite"]
     hold = mu_s * mass * GRAVITY
@@ -21,14 +25,16 @@ def judge(trace, stiffness, mass, mu_s, mu_k):
     gap = np.abs(ARM_K * (trace.target - trace.q) - force)
     most = ARM_K * np.maximum(trace.target, 0.0)
     # The target's motion at fixed q puts energy in; after that nothing may add any.
-    bed, moving = 0.5 * force**2 / stiffness, 0.5 * mass * trace.speed**2
+    bed = 0.5 * force**2 / stiffness
+    moving = 0.5 * mass * trace.speed**2
     q0, bed0, moving0 = (
         np.pad(a[:-1], ((1, 0), (0, 0))) for a in (trace.q, bed, moving)
     )
     before = bed0 + moving0 + 0.5 * ARM_K * (trace.target - q0) ** 2
     after = bed + moving + 0.5 * ARM_K * (trace.target - trace.q) ** 2
     friction = mu_k * mass * GRAVITY * moved
-    lost, scale = before - after - friction, before + after + friction
+    lost = before - after - friction
+    scale = before + after + friction
     complaints = {
         "a force pulls": force < 0.0,
         "no force though pressed": force[trace.target > trace.slide] <= 0.0,
@@ -54,14 +60,16 @@ def test_the_judge_rejects_a_finite_trace_that_reset_itself():
 
 
 def test_taxel_forces_as_stiffness_times_depth_lose_digits():
-    n, stiff = 200, 1e15
+    n = 200
+    stiff = 1e15
     rng = np.random.default_rng(2)
     gaps = np.sort(rng.uniform(0.0, 1e-3, (7, n)), axis=0)
     gaps[0] = 0.0
     k = np.full((7, n), stiff)
     law = dict(zip(("slopes", "intercepts"), contact.bed_law(gaps, k), strict=True))
     trace = Rig(h=0.01, gaps=gaps, **law).run(50)
-    force, loads = trace.force[-1], contact.spring_loads(trace.depth[-1:], gaps, k, 1.0)
+    force = trace.force[-1]
+    loads = contact.spring_loads(trace.depth[-1:], gaps, k, 1.0)
     naive = loads.sum(axis=(0, 1))
     contact.share_out(force, loads)
     shared = loads.sum(axis=(0, 1))

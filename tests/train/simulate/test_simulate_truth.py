@@ -120,7 +120,8 @@ class TestFamilies:
         masses = [o.values["mass_kg"].low for o in trial_scene.objects]
         assert len(set(masses)) == 6
         for o in trial_scene.objects:
-            mu, mass = o.values["friction_static"].low, o.values["mass_kg"].low
+            mu = o.values["friction_static"].low
+            mass = o.values["mass_kg"].low
             assert mu * mass * 9.80665 <= 6.0
             assert 0.8 * mu <= o.values["friction_kinetic"].low <= 0.95 * mu
             assert o.conditions == ("fixed", "movable")

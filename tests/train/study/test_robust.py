@@ -73,7 +73,8 @@ def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene)
 def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(
     context, scene, change
 ):
-    data, changed = context.dataset, variants(scene)[change]
+    data = context.dataset
+    changed = variants(scene)[change]
     trials = dict(simulate(changed))
     asked = [trials[trial.path.name] for trial in data.trials]
     expected = vectors(follow(asked, data.layout, data.chain))

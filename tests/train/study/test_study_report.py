@@ -64,7 +64,8 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
         ]
     )
     assert 0.03 < out < 0.07
-    one, eight = difference(80.0, 85.0, 140), difference(80.0, 85.0, 8 * 140)
+    one = difference(80.0, 85.0, 140)
+    eight = difference(80.0, 85.0, 8 * 140)
     assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
     assert mean_of([{("I", "1", "t"): 80.0}, {("I", "1", "t"): 90.0}]) == {
         ("I", "1", "t"): 85.0

@@ -53,7 +53,8 @@ def place(t: Trials, i: Index) -> None:
     Raises:
         InputError: the forearm does not move at that place.
     """
-    skin, values = t.skin, t.values
+    skin = t.skin
+    values = t.values
     t.z[:] = t.scene.place_m + values["place_m"]
     pose = t.kinematics.pose(t.equilibrium(values["lead_s"]) - t.lag)
     along = pose.rotation[2]
@@ -68,7 +69,8 @@ def place(t: Trials, i: Index) -> None:
             "to meet "
             "an object (motion.place_m); turn a joint that carries it there"
         )
-    normal, yaw = speed / size, np.radians(values["yaw_deg"])
+    normal = speed / size
+    yaw = np.radians(values["yaw_deg"])
     t.normal[:] = normal * np.cos(yaw) + along * np.sin(yaw)
     t.along_face[:] = along * np.cos(yaw) - normal * np.sin(yaw)
     t.face[:] = point + skin.radius_m * normal
@@ -98,7 +100,8 @@ def lay(t: Trials, i: Index) -> None:
 def lay_rows(t: Trials, i: Index) -> None:
     """Find the part of each row that the face covers, and how far the face draws back
     there."""
-    offset, radius = t.row_z - pick(t.z, i), pick(t.values["radius_m"], i)
+    offset = t.row_z - pick(t.z, i)
+    radius = pick(t.values["radius_m"], i)
     t.weight[:, i] = covered(offset, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = np.where(radius < FLAT_M, curve_gap(offset, radius), 0.0)
 
@@ -107,7 +110,8 @@ def law(t: Trials, i: Index) -> None:
     """The bed's law as lines K a - B; a flat face needs only one for each column."""
     trials = np.arange(t.n)[i]
     curved = t.line_gap[:, trials].any(axis=0)
-    flat, round_ = trials[~curved], trials[curved]
+    flat = trials[~curved]
+    round_ = trials[curved]
     if flat.size:
         stiffness = pick(t.stiffness, flat) * total(pick(t.weight, flat))
         t.obey(flat, pick(t.gaps, flat), stiffness)
@@ -129,7 +133,9 @@ def tune(t: Trials, i: Index) -> None:
 def locate(t: Trials, i: Index) -> None:
     """Find the depth, its Jacobian and the compliance of a step at the frame's joint
     angles."""
-    q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
+    q = pick(t.q, i)
+    normal = pick(t.normal, i)
+    face = pick(t.face, i)
     pose = t.kinematics.pose(q)
     along = pose.rotation[2]
     point = pose.origin + along * pick(t.z, i)
@@ -142,8 +148,10 @@ def locate(t: Trials, i: Index) -> None:
 
 def keep_pose(t: Trials, i: Index, q: Array, point: Array, pose: Pose) -> None:
     """Keep the arm's pose at the frame, for the effects."""
-    t.q_frame[:, i], t.point[:, i] = q, point
-    t.axes[:, :, i], t.origins[:, :, i] = pose.axes, pose.origins
+    t.q_frame[:, i] = q
+    t.point[:, i] = point
+    t.axes[:, :, i] = pose.axes
+    t.origins[:, :, i] = pose.origins
 
 
 def predict(t: Trials, i: Index) -> None:
@@ -155,7 +163,8 @@ def predict(t: Trials, i: Index) -> None:
     pulled = t.joint_k * t.equilibrium(now, i)
     q_free = (pick(t.held, i) * pick(t.q, i) + pulled) * pick(t.give, i)
     moved = q_free - pick(t.q_frame, i)
-    t.t[i], t.q_free[:, i] = now, q_free
+    t.t[i] = now
+    t.q_free[:, i] = q_free
     t.y[:, i] = pick(t.y_frame, i) + total(pick(t.jacobian, i) * moved[:, None])
 
 
@@ -175,7 +184,8 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """
     law = pick(t.law_gaps, i), pick(t.slopes, i), pick(t.intercepts, i)
     if "viscous" in t.own:
-        load, gain = pick(t.own["viscous"].load[0], i), pick(t.own["viscous"].gain, i)
+        load = pick(t.own["viscous"].load[0], i)
+        gain = pick(t.own["viscous"].gain, i)
         elastic = closed_form(*law, y - c * load, c * gain)
         force = gain * elastic + load
         force = np.where((elastic > 0.0) & (force > 0.0), force, 0.0)
@@ -186,7 +196,9 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
 
 def settle(t: Trials, i: Index) -> None:
     """Let the joints give way to the loads."""
-    loads, y, c = pick(t.loads, i), pick(t.y, i), pick(t.compliance, i)
+    loads = pick(t.loads, i)
+    y = pick(t.y, i)
+    c = pick(t.compliance, i)
     jacobian = pick(t.jacobian, i)
     torque = jacobian[:, 0] * loads[0] + jacobian[:, 1] * loads[1]
     t.q[:, i] = pick(t.q_free, i) - pick(t.give, i) * torque

@@ -11,7 +11,8 @@ import numpy as np
 
 from train.simulate.trials import Index, Trials, pick
 
-CLOSING, CLOSED = 0.65, 0.93
+CLOSING = 0.65
+CLOSED = 0.93
 """Compression, as a part of the thickness, at which the cells begin to close and are
 closed."""
 STIFFER = 5.0
@@ -20,8 +21,10 @@ STIFFER = 5.0
 
 def fill(t: Trials, i: Index) -> None:
     """Add each column's tangents: the closing cells, then the surface behind."""
-    gaps, reach = pick(t.column_gaps, i), pick(t.reach, i)
-    depth, soft = pick(t.values["depth_m"], i), reach * pick(t.taxel_k, i)
+    gaps = pick(t.column_gaps, i)
+    reach = pick(t.reach, i)
+    depth = pick(t.values["depth_m"], i)
+    soft = reach * pick(t.taxel_k, i)
     t.add_springs(
         i,
         np.concatenate([gaps + CLOSING * depth, gaps + CLOSED * depth]),

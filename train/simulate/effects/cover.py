@@ -19,8 +19,6 @@ def pass_on(t: Trials, i: Index) -> None:
     image = pick(t.image, i)
     moved = image * pick(t.values["cover_spread"], i)
     around = np.pad(moved, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    beside, above = (
-        around[1:-1, 2:] + around[1:-1, :-2],
-        around[2:, 1:-1] + around[:-2, 1:-1],
-    )
+    beside = around[1:-1, 2:] + around[1:-1, :-2]
+    above = around[2:, 1:-1] + around[:-2, 1:-1]
     t.image[:, :, i] = image - 4.0 * moved + beside + above

@@ -59,8 +59,10 @@ def stand(t: Trials, i: Index) -> None:
 
 def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
     """The lower and the upper limit of the pull under the present load."""
-    force, fits = pick(t.loads[0], i), pick(t.own["friction"].fits, i)
-    limit, tilt = pick(t.values["skin_friction"], i) * force, pick(t.y_frame[1], i)
+    force = pick(t.loads[0], i)
+    fits = pick(t.own["friction"].fits, i)
+    limit = pick(t.values["skin_friction"], i) * force
+    tilt = pick(t.y_frame[1], i)
     normal = np.where(fits, -force * tilt / np.sqrt(1.0 - tilt * tilt), 0.0)
     return normal - limit, normal + limit
 
@@ -79,15 +81,19 @@ def reach_along(t: Trials, i: Index) -> None:
 def predict(t: Trials, i: Index) -> None:
     """Choose the pull of this step, and let arm and contact give way to it."""
     state = t.own["friction"]
-    q, q_free, loads = pick(t.q, i), pick(t.q_free, i), pick(t.loads, i)
-    jacobian, coupled = pick(state.jacobian, i), pick(state.coupled, i)
+    q = pick(t.q, i)
+    q_free = pick(t.q_free, i)
+    loads = pick(t.loads, i)
+    jacobian = pick(state.jacobian, i)
+    coupled = pick(state.coupled, i)
     drawn = (
         total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
     )
     stuck = state.stiffness * (pick(state.stretch, i) + drawn)
     stuck = stuck / (1.0 + state.stiffness * pick(state.give, i))
     pull = np.clip(stuck, *bounds(t, i))
-    state.before[:, i], state.pull[i] = q, pull
+    state.before[:, i] = q
+    state.pull[i] = pull
     t.q_free[:, i] = q_free - pick(t.give, i) * jacobian * pull
     t.y[:, i] = pick(t.y, i) - coupled * pull
 
@@ -113,6 +119,7 @@ def settle(t: Trials, i: Index) -> None:
 def lean(t: Trials, i: Index) -> None:
     """Add the shear's component along the normal of skin that lies askew."""
     i = np.arange(t.n)[i][t.plan.also("tilt", i)]
-    force, pull = pick(t.force, i), pick(t.own["friction"].pull, i)
+    force = pick(t.force, i)
+    pull = pick(t.own["friction"].pull, i)
     leant = np.maximum(force - pull * pick(t.depth[1], i), 0.0)
     t.force[i] = np.where(force > 0.0, leant, 0.0)

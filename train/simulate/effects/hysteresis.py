@@ -8,10 +8,8 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """y = min(max(y before, x - half), x + half), from a rest at x = 0."""
-    counts, half = (
-        readings.counts,
-        np.float32(readings.scene.setting("hysteresis", "counts")),
-    )
+    counts = readings.counts
+    half = np.float32(readings.scene.setting("hysteresis", "counts"))
     y = np.zeros(counts.shape[1:], dtype=counts.dtype)
     for frame in counts:
         y = np.minimum(np.maximum(y, frame - half), frame + half)

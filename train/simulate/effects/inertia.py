@@ -56,7 +56,8 @@ class Momentum:
 
 def swing(t: Trials, i: Index) -> None:
     """Begin with the joints at the speed of the equilibrium point."""
-    inertia, speed = np.array(t.scene.inertia)[:, None], np.repeat(t.rate, t.n, axis=1)
+    inertia = np.array(t.scene.inertia)[:, None]
+    speed = np.repeat(t.rate, t.n, axis=1)
     before, weight = np.zeros((2, *t.q.shape))
     t.keep(
         "inertia", Momentum, inertia=inertia, speed=speed, before=before, weight=weight
@@ -70,28 +71,31 @@ def stand(t: Trials, i: Index) -> None:
 
 def pace(t: Trials, i: Index) -> None:
     """Shorten the steps when a touch is near, and for a while after a jolt."""
-    state, depth, force = t.own["inertia"], pick(t.inside, i), pick(t.force, i)
+    state = t.own["inertia"]
+    depth = pick(t.inside, i)
+    force = pick(t.force, i)
     closing = np.maximum(depth - pick(state.depth, i), 0.0)
-    change, peak = force - pick(state.force, i), np.maximum(pick(state.peak, i), force)
+    change = force - pick(state.force, i)
+    peak = np.maximum(pick(state.peak, i), force)
     jolts = np.abs(change - pick(state.change, i)) > JOLT * peak
     left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
     near = (force == 0.0) & (depth + NEAR * closing > 0.0)
-    state.depth[i], state.force[i], state.change[i], state.peak[i] = (
-        depth,
-        force,
-        change,
-        peak,
-    )
+    state.depth[i] = depth
+    state.force[i] = force
+    state.change[i] = change
+    state.peak[i] = peak
     t.steps[i] = np.where(near | (left > 0), FINER, 1) * pick(t.usual, i)
     state.left[i] = np.maximum(left - 1, 0)
 
 
 def tune(t: Trials, i: Index) -> None:
     """Add inertia to the joint's stiffness within a step."""
-    state, h = t.own["inertia"], pick(t.h, i)
+    state = t.own["inertia"]
+    h = pick(t.h, i)
     weight = state.inertia / h
     held = pick(t.held, i) + weight / h
-    state.weight[:, i], t.held[:, i] = weight, held
+    state.weight[:, i] = weight
+    t.held[:, i] = held
     t.give[:, i] = 1.0 / (held + t.joint_k)
 
 

@@ -11,8 +11,10 @@ from train.simulate.readings import Readings
 
 def clock(readings: Readings) -> None:
     """Shift the times, and interpolate load and joints between neighbouring frames."""
-    t, counts = readings.t, readings.counts.reshape(len(readings.t), -1)
-    frame, part = t[1] - t[0], np.zeros(len(t))
+    t = readings.t
+    counts = readings.counts.reshape(len(readings.t), -1)
+    frame = t[1] - t[0]
+    part = np.zeros(len(t))
     drawn = readings.stream("jitter").standard_normal(len(t) - 2)
     part[1:-1] = np.clip(
         drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45

@@ -87,16 +87,16 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
     within 10 % of that on an elastic block by finite elements, askew by 10 and 17
     degrees.
     """
-    depth, weight = pick(t.line_depth, i), pick(t.weight, i)
-    gaps, stiffness = pick(t.gaps, i), pick(t.stiffness, i)
+    depth = pick(t.line_depth, i)
+    weight = pick(t.weight, i)
+    gaps = pick(t.gaps, i)
+    stiffness = pick(t.stiffness, i)
     touched = (gaps < depth.max(axis=0)).any(axis=1)
     inside = np.maximum(depth - gaps[touched][:, None], 0.0)
     pressed = total(inside * stiffness[touched][:, None]) if touched.any() else 0.0
     borne = np.where(depth > 0.0, pressed, 0.0) * weight
-    margin, ends = (
-        MARGIN * pick(t.values["depth_m"], i),
-        askew(depth, weight, t.skin.pitch[0]),
-    )
+    margin = MARGIN * pick(t.values["depth_m"], i)
+    ends = askew(depth, weight, t.skin.pitch[0])
     slight = margin * total(ends)
     dips = slight > 0.0
     if dips.any():
@@ -109,7 +109,8 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
 def image(t: Trials, i: Index) -> None:
     """Share the force among the rows by their loads, and within a row as a half
     ellipse: by the root of each column's depth beyond its touch."""
-    depth, reach = pick(t.line_depth, i), pick(t.reach, i)
+    depth = pick(t.line_depth, i)
+    reach = pick(t.reach, i)
     # A touch so slight that it falls between two columns goes to the nearest.
     gaps = pick(t.column_gaps, i)
     gaps = gaps - gaps.min(axis=0)

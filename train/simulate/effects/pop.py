@@ -43,12 +43,15 @@ class Bubbles:
 def lay(t: Trials, i: Index) -> None:
     """Lay four springs in each column: three tangents, and the backing for after the
     burst."""
-    values, skin = {k: pick(v, i) for k, v in t.values.items()}, pick(t.taxel_k, i)
-    k0, height = values["bubble_n_m"], values["bubble_m"]
+    values = {k: pick(v, i) for k, v in t.values.items()}
+    skin = pick(t.taxel_k, i)
+    k0 = values["bubble_n_m"]
+    height = values["bubble_m"]
     slopes = [1.0 / (1.0 / skin + 1.0 / (k0 * s)) for s in SLOPES]
     first = k0 * height * BREAKS[0] / slopes[0]
     second = first + k0 * SLOPES[1] * height * (BREAKS[1] - BREAKS[0]) / slopes[1]
-    gaps, reach = pick(t.column_gaps, i), pick(t.reach, i)
+    gaps = pick(t.column_gaps, i)
+    reach = pick(t.reach, i)
     gaps = np.concatenate([gaps, gaps + first, gaps + second, gaps + height])
     steeper = (slopes[0], slopes[1] - slopes[0], slopes[2] - slopes[1], skin)
     stiffness = np.concatenate([reach * k for k in steeper])
@@ -57,15 +60,18 @@ def lay(t: Trials, i: Index) -> None:
         len(t.gaps),
         *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))],
     )
-    state.gaps[:, i], state.stiffness[:, i] = gaps, stiffness
+    state.gaps[:, i] = gaps
+    state.stiffness[:, i] = stiffness
     state.alive[: -len(reach)] = 1.0
     t.add_springs(i, gaps, stiffness)
 
 
 def law(t: Trials, i: Index) -> None:
     """The law of the springs that are left, for a forearm that does not pivot."""
-    state, trials = t.own["pop"], np.arange(t.n)[i]
-    alive, weight = pick(state.alive, trials), pick(t.weight, trials)
+    state = t.own["pop"]
+    trials = np.arange(t.n)[i]
+    alive = pick(state.alive, trials)
+    weight = pick(t.weight, trials)
     gaps = pick(t.line_gap, trials) + pick(state.gaps, trials)[:, None]
     stiffness = weight * (pick(state.stiffness, trials)[:, None] * alive)
     t.obey(trials, gaps.reshape(-1, len(trials)), stiffness.reshape(-1, len(trials)))
@@ -78,7 +84,8 @@ def stand(t: Trials, i: Index) -> None:
 
 def change(t: Trials, trials: Places) -> None:
     """Give the solver the springs that are left."""
-    state, tilted = t.own["pop"], t.plan.also("tilt", trials)
+    state = t.own["pop"]
+    tilted = t.plan.also("tilt", trials)
     if tilted.any():
         pivots = trials[tilted]
         t.own["tilt"].keep_alive(pivots, state.first, state.alive.take(pivots, -1))
@@ -109,8 +116,10 @@ def pass_on(t: Trials, i: Index) -> None:
     at = np.flatnonzero(burst.any(axis=(0, 1)))
     if not at.size:
         return
-    trials, gone = np.arange(t.n)[i][at], burst.take(at, -1)
+    trials = np.arange(t.n)[i][at]
+    gone = burst.take(at, -1)
     alive = state.alive.take(trials, -1).reshape(SEGMENTS, *gone.shape)
-    alive[:-1][:, gone], alive[-1][gone] = 0.0, 1.0
+    alive[:-1][:, gone] = 0.0
+    alive[-1][gone] = 1.0
     state.alive[:, :, trials] = alive.reshape(-1, *gone.shape[1:])
     change(t, trials)

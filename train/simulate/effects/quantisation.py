@@ -7,10 +7,8 @@ from train.simulate.readings import Readings
 
 def sensor(readings: Readings) -> None:
     """Round to the nearest whole number of steps."""
-    counts, step = (
-        readings.counts,
-        np.float32(readings.scene.setting("quantisation", "counts")),
-    )
+    counts = readings.counts
+    step = np.float32(readings.scene.setting("quantisation", "counts"))
     counts /= step
     np.rint(counts, out=counts)
     counts *= step

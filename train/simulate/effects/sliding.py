@@ -82,11 +82,14 @@ def give_way(t: Trials, i: Index) -> None:
     more compliance, h^2/m, and a shift, so the contact's solver still applies.
     """
     mover: Mover = t.own["sliding"]
-    h, speed, y = pick(t.h, i), pick(mover.speed, i), pick(t.y[0], i)
+    h = pick(t.h, i)
+    speed = pick(mover.speed, i)
+    y = pick(t.y[0], i)
     soft = h / pick(mover.inertia, i) * h
     shifted = y - h * speed + soft * pick(mover.resist, i)
     moving = pick(mover.leans, i) | (speed > 0.0)
-    mover.rest[i], mover.shifted[i] = y, shifted
+    mover.rest[i] = y
+    mover.shifted[i] = shifted
     t.y[0, i] = np.where(moving, shifted, y)
     t.soft[i] = np.where(moving, soft, 0.0)
 
@@ -94,9 +97,14 @@ def give_way(t: Trials, i: Index) -> None:
 def move(t: Trials, i: Index) -> None:
     """Move under the loads, and solve the loads of a few trials again."""
     mover: Mover = t.own["sliding"]
-    h, speed, resist = pick(t.h, i), pick(mover.speed, i), pick(mover.resist, i)
-    slide, leans, lies = pick(mover.slide, i), pick(mover.leans, i), pick(mover.lies, i)
-    gain, force = h / pick(mover.inertia, i), pick(t.loads[0], i)
+    h = pick(t.h, i)
+    speed = pick(mover.speed, i)
+    resist = pick(mover.resist, i)
+    slide = pick(mover.slide, i)
+    leans = pick(mover.leans, i)
+    lies = pick(mover.lies, i)
+    gain = h / pick(mover.inertia, i)
+    force = pick(t.loads[0], i)
     moving = leans | (speed > 0.0)
     after = np.where(moving, speed + gain * (force - resist), 0.0)
     ends = slide + h * after
@@ -107,14 +115,16 @@ def move(t: Trials, i: Index) -> None:
     if again.size:
         # An object that stops is solved again at rest, one that starts is solved again
         # in motion.
-        trials, rests = np.arange(t.n)[i][again], stops[again]
+        trials = np.arange(t.n)[i][again]
+        rests = stops[again]
         y = np.where(rests, mover.rest[trials], mover.shifted[trials])
         soft = np.where(rests, 0.0, (gain * h)[again])
         loads = t.ask(trials, y, t.compliance[0, trials] + soft)
         off = np.where(rests, 0.0, gain[again] * (loads[0] - resist[again]))
         right = rests | (off > 0.0)
         t.loads[:, trials[right]] = loads[:, right]
-        after[again], goes[again] = off, off > 0.0
+        after[again] = off
+        goes[again] = off > 0.0
     after = np.where(goes, after, 0.0)
     step = h * after
     mover.speed[i] = after

@@ -43,7 +43,9 @@ class Stems:
 
 def lay(t: Trials, i: Index) -> None:
     """Lay stems instead of the bed's rows."""
-    trials, scene, values = np.arange(t.n)[i], t.scene, t.values
+    trials = np.arange(t.n)[i]
+    scene = t.scene
+    values = t.values
     counts = values["stem_count"][trials].astype(np.int64)
     shape = (int(counts.max()), t.n)
     depth, along, around, stiffness = np.ones(shape), *np.zeros((3, *shape))
@@ -61,7 +63,8 @@ def lay(t: Trials, i: Index) -> None:
     middle = (t.row_z[0] - t.z) / pitch
     reach = 0.5 * np.minimum(values["width_m"], t.rows * pitch) / pitch
     place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(t.rows - 1.001, 0.0))
-    low, window = np.floor(place), len(t.columns)
+    low = np.floor(place)
+    window = len(t.columns)
     damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])
     t.own["stems"] = Stems(
         depth=depth * values["stem_spread_m"],
@@ -85,7 +88,8 @@ def law(t: Trials, i: Index) -> None:
 
 def let_go(t: Trials, i: Index) -> None:
     """The law of the stems that are still held."""
-    state, order = t.own["stems"], pick(t.own["stems"].order, i)
+    state = t.own["stems"]
+    order = pick(t.own["stems"].order, i)
     gaps, stiffness = (
         np.take_along_axis(pick(a, i), order, 0) for a in (state.depth, state.stiffness)
     )
@@ -96,7 +100,8 @@ def tune(t: Trials, i: Index) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of
     bent ones."""
     state = t.own["stems"]
-    drag, stems = pick(state.drag, i) / pick(t.h, i), len(state.depth)
+    drag = pick(state.drag, i) / pick(t.h, i)
+    stems = len(state.depth)
     t.slopes[:stems, i] = pick(state.slopes, i) + drag
     t.intercepts[:stems, i] = pick(state.intercepts, i) + drag * pick(t.depth[0], i)
 
@@ -108,7 +113,8 @@ def settle(t: Trials, i: Index) -> None:
     slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(state.stiffness, i) > 0.0)
     at = slips.any(axis=0).nonzero()[0]
     if at.size:
-        trials, held = np.arange(t.n)[i][at], ~slips.take(at, -1)
+        trials = np.arange(t.n)[i][at]
+        held = ~slips.take(at, -1)
         state.stiffness[:, trials] *= held
         state.damping[:, trials] *= held
         let_go(t, trials)
@@ -118,8 +124,10 @@ def settle(t: Trials, i: Index) -> None:
 
 def bear(t: Trials, i: Index) -> None:
     """The force on the skin, and how far the first stem is bent."""
-    state, depth = t.own["stems"], pick(t.depth[0], i)
-    held, bent = pick(state.stiffness, i) > 0.0, depth - pick(state.depth, i)
+    state = t.own["stems"]
+    depth = pick(t.depth[0], i)
+    held = pick(state.stiffness, i) > 0.0
+    bent = depth - pick(state.depth, i)
     t.force[i] = pick(t.loads[0], i)
     t.deepest[i] = np.where(held, bent, 0.0).max(axis=0)
     t.inside[i] = np.where(held, bent, FAR_M).max(axis=0)
@@ -127,16 +135,15 @@ def bear(t: Trials, i: Index) -> None:
 
 def image(t: Trials, i: Index) -> None:
     """Put each stem's load on the two rows that it lies between."""
-    state, m = t.own["stems"], len(np.arange(t.n)[i])
+    state = t.own["stems"]
+    m = len(np.arange(t.n)[i])
     bent = np.maximum(pick(t.depth[0], i) - pick(state.depth, i), 0.0)
     loads = bent * pick(state.stiffness, i)
     borne = total(loads)
     loads = loads * (pick(t.force, i) / np.where(borne > 0.0, borne, 1.0))
-    image, part, every = (
-        np.zeros((t.image[..., 0].size, m)),
-        pick(state.part, i),
-        np.arange(m),
-    )
+    image = np.zeros((t.image[..., 0].size, m))
+    part = pick(state.part, i)
+    every = np.arange(m)
     beside = len(t.columns) if t.rows > 1 else 0
     shares = zip(pick(state.taxel, i), loads * (1.0 - part), loads * part, strict=True)
     for taxel, first, second in shares:

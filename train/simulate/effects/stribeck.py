@@ -11,7 +11,8 @@ from train.simulate.trials import Index, Trials, pick
 def drag(t: Trials, i: Index) -> None:
     """Friction at the present speed."""
     mover = t.own["sliding"]
-    static, kinetic = pick(mover.static, i), pick(mover.kinetic, i)
+    static = pick(mover.static, i)
+    kinetic = pick(mover.kinetic, i)
     part = pick(mover.speed, i) / pick(t.values["stribeck_m_s"], i)
     now = kinetic + (static - kinetic) * np.exp(-(part * part))
     mover.resist[i] = now * pick(mover.weight, i)

@@ -61,7 +61,9 @@ def law(t: Trials, i: Index) -> None:
     """Each row's springs, in the order of their depth."""
     order, gaps, stiffness = by_depth(t.gaps, t.stiffness)
     deep = int(np.isfinite(pick(gaps, i)).sum(axis=0).max())
-    order, gaps, stiffness = order[:deep], gaps[:deep], stiffness[:deep]
+    order = order[:deep]
+    gaps = gaps[:deep]
+    stiffness = stiffness[:deep]
     t.keep(
         "tilt",
         Tilt,
@@ -80,17 +82,22 @@ def locate(t: Trials, i: Index) -> None:
     """Find depth and tilt against the object's face at the frame's joint angles, their
     Jacobians, and the part of each row that the face covers, with its lever about the
     middle."""
-    q, normal, face = pick(t.q, i), pick(t.normal, i), pick(t.face, i)
-    along_face, radius = pick(t.along_face, i), t.skin.radius_m
+    q = pick(t.q, i)
+    normal = pick(t.normal, i)
+    face = pick(t.face, i)
+    along_face = pick(t.along_face, i)
+    radius = t.skin.radius_m
     pose = t.kinematics.pose(q)
-    along, away = pose.rotation[2], pose.origin - face
+    along = pose.rotation[2]
+    away = pose.origin - face
     tilt = dot(normal, along)
     z = np.clip(-dot(away, along), t.row_z[-1], t.row_z[0])
     on_face = dot(away, along_face) + t.row_z * dot(along, along_face)
     t.weight[:, i] = covered(on_face, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = curve_gap(on_face, pick(t.values["radius_m"], i))
     t.own["tilt"].lever[:, i] = t.row_z - z
-    point, upright = pose.origin + along * z, np.sqrt(1.0 - tilt * tilt)
+    point = pose.origin + along * z
+    upright = np.sqrt(1.0 - tilt * tilt)
     crossed = cross(normal[:, None], pose.axes)
     turn = dot(along[:, None], crossed)
     push = dot(point[:, None] - pose.origins, crossed) - radius * tilt / upright * turn
@@ -106,7 +113,8 @@ def locate(t: Trials, i: Index) -> None:
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
-    state, viscous = t.own["tilt"], t.own.get("viscous")
+    state = t.own["tilt"]
+    viscous = t.own.get("viscous")
     pivots = Pivots(
         i,
         state.gaps,
@@ -127,7 +135,8 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
 
 def settle(t: Trials, i: Index) -> None:
     """Guess the next loads by extrapolating the last two."""
-    state, loads = t.own["tilt"], pick(t.loads, i)
+    state = t.own["tilt"]
+    loads = pick(t.loads, i)
     state.guess[:, i] = 2.0 * loads - pick(state.settled, i)
     state.settled[:, i] = loads
 

@@ -41,8 +41,10 @@ def stand(t: Trials, i: Index) -> None:
     about the edge is m (base^2 + 4 height^2) / 3, felt at the contact as this divided
     by height^2.
     """
-    mover, mass = t.own["sliding"], t.values["mass_kg"]
-    foot, height = t.values["base_m"], t.values["height_m"]
+    mover = t.own["sliding"]
+    mass = t.values["mass_kg"]
+    foot = t.values["base_m"]
+    height = t.values["height_m"]
     tips = t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height))
     force = mass * GRAVITY * foot / (2.0 * height)
     travel = height * np.arctan2(foot, 2.0 * height)
@@ -54,8 +56,11 @@ def stand(t: Trials, i: Index) -> None:
 
 def drag(t: Trials, i: Index) -> None:
     """Let only the lever of its weight hold an object that tips."""
-    state, mover = t.own["tipping"], t.own["sliding"]
-    tips, force, slide = pick(state.tips, i), pick(state.force, i), pick(mover.slide, i)
+    state = t.own["tipping"]
+    mover = t.own["sliding"]
+    tips = pick(state.tips, i)
+    force = pick(state.force, i)
+    slide = pick(mover.slide, i)
     mover.leans[i] = tips & (slide > 0.0)
     mover.hold[i] = np.where(tips, force, pick(mover.hold, i))
     leaning = force * (1.0 - slide / pick(state.travel, i))

@@ -31,12 +31,11 @@ class Turning:
 
 def stand(t: Trials, i: Index) -> None:
     """Reduce friction and mass to those felt by an off-centre push."""
-    aside, radius = pick(t.values["aside_m"], i), 0.5 * pick(t.values["foot_m"], i)
+    aside = pick(t.values["aside_m"], i)
+    radius = 0.5 * pick(t.values["foot_m"], i)
     lever = LEVER * radius
-    mover, easier = (
-        t.own["sliding"],
-        1.0 / np.sqrt(1.0 + aside * aside / (lever * lever)),
-    )
+    mover = t.own["sliding"]
+    easier = 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
     mover.static[i] = pick(mover.static, i) * easier
     mover.kinetic[i] = pick(mover.kinetic, i) * easier
     # A disc's own moment of inertia is m R^2 / 2.
@@ -59,13 +58,12 @@ def pass_on(t: Trials, i: Index) -> None:
     if not moving.size:
         return
     further = np.floor(columns[moving])
-    part, trials, last = (
-        columns[moving] - further,
-        np.arange(t.n)[i][moving],
-        len(t.columns) - 1,
-    )
+    part = columns[moving] - further
+    trials = np.arange(t.n)[i][moving]
+    last = len(t.columns) - 1
     image = t.image.take(trials, -1)
-    moved, places = np.zeros_like(image), np.arange(len(moving))
+    moved = np.zeros_like(image)
+    places = np.arange(len(moving))
     for beyond, share in ((0, 1.0 - part), (1, part)):
         shared = image * share
         for column in range(last + 1):

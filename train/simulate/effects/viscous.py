@@ -50,17 +50,22 @@ class Viscous:
     def set_step(self, i: Index, h: Array) -> None:
         """Set the terms for a step of this length."""
         ratio = pick(self.ratio, i)
-        damped, part = pick(self.loss_s, i) / h, h / pick(self.relax_s, i)
+        damped = pick(self.loss_s, i) / h
+        part = h / pick(self.relax_s, i)
         relaxes = ratio > 0.0
         kept = np.where(relaxes, np.exp(-part), 0.0)
         rise = np.where(relaxes, ratio * (-np.expm1(-part) / part), 0.0)
-        self.damped[i], self.kept[i], self.gain[i] = damped, kept, 1.0 + rise + damped
-        self.let_go[i], self.late[i] = ratio - rise, rise - kept * ratio
+        self.damped[i] = damped
+        self.kept[i] = kept
+        self.gain[i] = 1.0 + rise + damped
+        self.let_go[i] = ratio - rise
+        self.late[i] = rise - kept * ratio
         self.bear_on(i)
 
     def bear_on(self, i: Index) -> None:
         """Set the load with which each row's next step begins."""
-        given, force = pick(self.given, i), pick(self.force, i)
+        given = pick(self.given, i)
+        force = pick(self.force, i)
         late = pick(self.late, i) + pick(self.damped, i)
         self.load[:, i] = -(pick(self.kept, i) * given + late * force)
 
