@@ -166,7 +166,8 @@ def test_the_ros_node_publishes_each_decision_with_its_time(monkeypatch):
     ros = Ros(model=str(demo.MODEL), fake=str(PILLOW), frame_id="arm_skin")
     ros.run(monkeypatch)
     (mobility,) = ros.topics["~/mobility"]
-    assert (mobility.header.stamp, mobility.header.frame_id) == ("now", "arm_skin")
+    assert mobility.header.stamp == "now"
+    assert mobility.header.frame_id == "arm_skin"
     (answer,) = mobility.results
     assert answer.class_id == "movable"
     assert 0.9 < answer.score < 1.0
@@ -234,7 +235,8 @@ def test_the_ros_node_tells_whether_its_chips_are_read(monkeypatch):
     assert ros.run(monkeypatch) == 0
     (told,) = ros.topics["/diagnostics"]
     (status,) = told.status
-    assert (status.level, status.message) == ("ok", "all chips are read")
+    assert status.level == "ok"
+    assert status.message == "all chips are read"
     values = {pair.key: pair.value for pair in status.values}
     tasks = len(edge.Model(demo.MODEL).info.tasks)
     assert values == {"chips": "32", "decisions": str(tasks)}

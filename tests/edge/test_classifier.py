@@ -71,12 +71,12 @@ def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_
     assert list(Classifier(model).classify(quiet)) == []
     model.info.tasks["object"] = replace(model.info.tasks["object"], no_contact="none")
     (said,) = Classifier(model).classify(quiet)
-    assert (said.task, said.label, said.confidence) == ("object", "none", 1.0)
-    assert (said.window_s, said.onset_s, said.flags) == (
-        0.0,
-        quiet.t[-1],
-        ("no_contact",),
-    )
+    assert said.task == "object"
+    assert said.label == "none"
+    assert said.confidence == 1.0
+    assert said.window_s == 0.0
+    assert said.onset_s == quiet.t[-1]
+    assert said.flags == ("no_contact",)
     lacking = replace(quiet, valid=np.arange(384).reshape(16, 24) > 0)
     (said,) = Classifier(model).classify(lacking)
     assert said.flags == ("no_contact", "missing_taxels")

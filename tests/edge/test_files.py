@@ -85,10 +85,12 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
     with pytest.raises(ZeroDivisionError), write_whole(path) as file:  # noqa: PT012
         file.write(b"half")
         raise ZeroDivisionError
-    assert (path.read_text(), os.listdir(tmp_path)) == ("before", ["a"])
+    assert path.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a"]
     with write_whole(path) as file:
         file.write(b"after")
-    assert (path.read_text(), os.listdir(tmp_path)) == ("after", ["a"])
+    assert path.read_text() == "after"
+    assert os.listdir(tmp_path) == ["a"]
 
 
 def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
@@ -99,7 +101,8 @@ def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
     ):
         f.write(b"mine")
         path.write_text("theirs")
-    assert (path.read_text(), os.listdir(tmp_path)) == ("theirs", ["a"])
+    assert path.read_text() == "theirs"
+    assert os.listdir(tmp_path) == ["a"]
 
 
 def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none(
@@ -113,7 +116,8 @@ def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none
         file.write(b"first")
     with pytest.raises(NameTaken), write_whole(tmp_path / "a", overwrite=False) as file:
         file.write(b"second")
-    assert ((tmp_path / "a").read_bytes(), os.listdir(tmp_path)) == (b"first", ["a"])
+    assert (tmp_path / "a").read_bytes() == b"first"
+    assert os.listdir(tmp_path) == ["a"]
 
 
 def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
@@ -130,7 +134,8 @@ def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeyp
     order.clear()
     with write_whole(tmp_path / "a", lasting=False) as file:
         file.write(b"y")
-    assert (order, (tmp_path / "a").read_bytes()) == (["name"], b"y")
+    assert order == ["name"]
+    assert (tmp_path / "a").read_bytes() == b"y"
 
 
 def test_the_longest_name_can_be_written(tmp_path):

@@ -85,11 +85,16 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
         *PAPER,
     )
     info = Model(tmp_path / "model.onnx").info
-    assert (info.name, list(info.tasks)) == ("pads", ["object"])
+    assert info.name == "pads"
+    assert list(info.tasks) == ["object"]
     task = info.tasks["object"]
-    assert (task.scaling, task.components, task.k) == ("II", 3, 2)
-    assert (task.projection, task.features) == ("pca", info.features)
-    assert (info.window_s, info.layout.threshold_counts) == (0.8, 120)
+    assert task.scaling == "II"
+    assert task.components == 3
+    assert task.k == 2
+    assert task.projection == "pca"
+    assert task.features == info.features
+    assert info.window_s == 0.8
+    assert info.layout.threshold_counts == 120
 
 
 @pytest.mark.parametrize(

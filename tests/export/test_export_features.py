@@ -31,10 +31,12 @@ def six(recordings, tmp_path_factory):
 def test_the_model_says_what_it_measures_and_in_which_units(six):
     info = Model(six / "model.onnx").info
     assert info.features == tuple(SIX)
-    assert (info.samples, info.width) == (20, 5 * 20 + 10)
+    assert info.samples == 20
+    assert info.width == 5 * 20 + 10
     assert info.units["skin_force"] == "newton"
     assert info.units["contact_area_rate@10"] == "taxel/s"
-    assert (info.chain, info.motion_frame) == (None, "skin")
+    assert info.chain is None
+    assert info.motion_frame == "skin"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -120,7 +120,8 @@ def test_the_digest_follows_the_data(folder, tmp_path):
 def test_one_threshold_for_all(folder):
     low = load_trials([folder])
     high = load_trials([folder], threshold=400)
-    assert (high.layout.threshold_counts, high.layout.onset_counts) == (400, 600)
+    assert high.layout.threshold_counts == 400
+    assert high.layout.onset_counts == 600
     area = slice(40, 80)
     assert high.features()[:, area].sum() < low.features()[:, area].sum()
     own = load_trials([folder], threshold=400, onset=500)
@@ -166,7 +167,9 @@ def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path
     for i in range(3):
         save(tmp_path / f"{i}.npz", make_touch(seed=i, arm=i == 0))
     data = load_trials([tmp_path])
-    assert (data.chain, len(data.trials), data.left_out) == (None, 3, {})
+    assert data.chain is None
+    assert len(data.trials) == 3
+    assert data.left_out == {}
 
 
 def test_a_label_that_a_few_lack_stays_a_task_without_them(folder, make_touch):
@@ -195,10 +198,12 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(
 ):
     save(tmp_path / "two.npz", two)
     data = load_trials([tmp_path])
-    assert (len(data.trials), [path.name for path in data.unused]) == (1, ["two.npz"])
+    assert len(data.trials) == 1
+    assert [path.name for path in data.unused] == ["two.npz"]
     save(tmp_path / "two.npz", described(two, contacts="alike"))
     data = load_trials([tmp_path])
-    assert (len(data.trials), data.unused) == (2, ())
+    assert len(data.trials) == 2
+    assert data.unused == ()
     assert data.trials[1].onset_s == data.trials[0].onset_s + 1.3
     assert data.trials[1].labels == data.trials[0].labels
     save(

@@ -49,7 +49,8 @@ def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_on
     assert len(fitted.dataset.trials) == 29
     assert set(fitted.chosen) == {"category", "softness"}
     for chosen in fitted.chosen.values():
-        assert (chosen.accuracy.right, chosen.accuracy.total) == (5, 5)
+        assert chosen.accuracy.right == 5
+        assert chosen.accuracy.total == 5
         assert chosen.accuracy.interval == chosen.by_trial.interval == wilson(2.0, 2.0)
         assert chosen.choice.weights == (1, 1)
     assert "5 of your own trials beside 24 simulated ones" in fitted.notes[0]

@@ -18,8 +18,10 @@ def test_a_contact_comes_once_all_of_its_tasks_are_decided(tmp_path):
         HEAD + PLACED + '"task": "mobility", "label": null, "confidence": 0.5}\n'
     )
     (touch,) = TouchMap(path)
-    assert (touch.position, touch.onset_s) == ((0.1, 0.2, 0.3), 0.5)
-    assert (touch.labels, touch.confidence) == ({"mobility": None}, {"mobility": 0.5})
+    assert touch.position == (0.1, 0.2, 0.3)
+    assert touch.onset_s == 0.5
+    assert touch.labels == {"mobility": None}
+    assert touch.confidence == {"mobility": 0.5}
 
 
 @pytest.mark.parametrize(

@@ -35,8 +35,10 @@ def test_values_of_the_file_replace_the_defaults():
     file = parse(
         mpr121(skin="threshold_counts = 20", signal="sign = 1\ndead_band_counts = 1")
     )
-    assert (file.chips[0].sign, file.signal.dead_band_counts) == (1, 1)
-    assert (file.layout.threshold_counts, file.layout.onset) == (20, 20)
+    assert file.chips[0].sign == 1
+    assert file.signal.dead_band_counts == 1
+    assert file.layout.threshold_counts == 20
+    assert file.layout.onset == 20
 
 
 def test_chips_of_two_kinds_have_each_its_own_sign_and_only_defaults_that_hold_for_any():
@@ -120,7 +122,8 @@ def test_a_further_chip_is_one_entry_of_the_list(toy, tmp_path, edge):
     """The file, the skin, the fake, `scan` and `calibrate` know it from its
     descriptor."""
     file = parse(TOY_SKIN)
-    assert (file.layout.threshold_counts, file.layout.onset) == (20, 30)
+    assert file.layout.threshold_counts == 20
+    assert file.layout.onset == 30
     picture = np.arange(8, dtype=np.uint16).reshape(2, 4) * 10
     with fake_skin(file, lambda t: picture) as skin:
         np.testing.assert_array_equal(skin.read().counts, picture)

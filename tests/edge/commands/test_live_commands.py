@@ -31,15 +31,15 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     saving.save(rest, still(skinfile.load(skin), 2.0))
     fake = ("--skin", skin, "--fake", rest, "--noise", 0)
     status, (chip,), err = edge("scan", *fake)
-    assert (status, chip["state"], chip["invalid"]) == (1, "running", 100)
+    assert status == 1
+    assert chip["state"] == "running"
+    assert chip["invalid"] == 100
     assert err.count("|" + "." * 10 + "|") == 10
     assert err.endswith("0 of 1 chips answer; taxels without a valid value: 100\n")
     more = ("--label", "object=box", "--out", tmp_path / "trials")
     status, events, err = edge("record", *fake, *more)
-    assert (status, [(e["event"], e["invalid"]) for e in events]) == (
-        1,
-        [("taxels", 100)],
-    )
+    assert status == 1
+    assert [(e["event"], e["invalid"]) for e in events] == [("taxels", 100)]
     assert "no contact was saved; taxels without a valid value: 100" in err
 
 
@@ -50,7 +50,8 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings):
     for name in ("hard_0", "soft_3"):
         path = recordings / f"{name}.npz"
         status, live, err = edge("run", "--model", model, "--fake", path)
-        assert (status, err) == (0, "")
+        assert status == 0
+        assert err == ""
         _, played, _ = edge("replay", "--model", model, path)
         keys = ("event", "task", "label", "confidence", "flags", "window_s")
         # The wires' clock shifts times by less than a microsecond, which may tell them
@@ -159,7 +160,8 @@ def test_a_bad_option_is_one_sentence(
     }
     given = [files.get(a, a) for a in arguments]
     status, events, err = edge("run", "--model", exported / "model.onnx", *given)
-    assert (status, events) == (2, [])
+    assert status == 2
+    assert events == []
     assert err.startswith("edge-classify: ")
     assert said in err
     assert err.count("\n") == 1

@@ -35,7 +35,8 @@ def answer(adapter, *request, **more):
     """Status, length done and data of the reply to a request."""
     reply = adapter.reply(submit(*request, **more))
     command, number, *_, status, done = struct.unpack_from(">5Iii", reply)
-    assert (command, number) == (3, 7)
+    assert command == 3
+    assert number == 7
     return status, done, reply[48:]
 
 
@@ -55,7 +56,9 @@ def acknowledged(adapter):
 
 def test_the_descriptors_name_the_device_that_the_driver_looks_for():
     status, done, device = answer(adapter(), 0x80, 6, 0x0100, length=18)
-    assert (status, done, device[8:12]) == (0, 18, bytes.fromhex("030431c6"))
+    assert status == 0
+    assert done == 18
+    assert device[8:12] == bytes.fromhex("030431c6")
     assert answer(adapter(), 0x80, 6, 0x0200, length=9)[2][:4] == bytes([9, 2, 18, 0])
     assert len(answer(adapter(), 0x80, 6, 0x0200, length=18)[2]) == 18
 
@@ -69,11 +72,13 @@ def test_it_carries_plain_i2c_and_smbus():
 def test_a_call_is_a_single_transaction_and_what_was_written_is_read_back():
     usb = adapter()
     assert message_out(usb, b"\x04") == (0, 1, b"")
-    assert (acknowledged(usb), usb.bus.transactions) == (True, 1)
+    assert acknowledged(usb)
+    assert usb.bus.transactions == 1
     assert message_out(usb, b"\x04", FIRST) == (0, 1, b"")
     assert usb.bus.transactions == 1
     assert message_in(usb, 2, LAST) == (0, 2, b"\x04\x04")
-    assert (acknowledged(usb), usb.bus.transactions) == (True, 2)
+    assert acknowledged(usb)
+    assert usb.bus.transactions == 2
 
 
 def test_an_absent_chip_is_not_acknowledged_and_a_message_without_data_finds_one():

@@ -40,7 +40,9 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     assert list(info.tasks) == ["category", "object"]
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
     assert info.layout == forearm
-    assert (info.window_s, info.samples, info.rows) == (1.2, 40, 16)
+    assert info.window_s == 1.2
+    assert info.samples == 40
+    assert info.rows == 16
     assert info.units == {
         "max_force": "newton",
         "contact_area": "taxel",
@@ -339,4 +341,5 @@ def test_a_tie_is_of_two_labels_or_more_with_the_most_votes(
     outputs |= {"object_scores": np.array([shares]), "object_label": label}
     monkeypatch.setattr(model, "run", lambda *arguments: outputs)
     decision = model.decide(vector)["object"]
-    assert (decision.tie, decision.votes) == (tie, max(shares))
+    assert decision.tie == tie
+    assert decision.votes == max(shares)

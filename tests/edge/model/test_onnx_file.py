@@ -100,10 +100,8 @@ def test_what_no_exported_model_has_is_refused(proto, sentence):
 @pytest.mark.parametrize("value", [0.5, 3, "text", [0.5, 1.5], [1, 2]], ids=str)
 def test_an_attribute_may_be_numbers_or_a_text(value):
     contents = check(model([add(own=value)]).SerializeToString(), "m.onnx")
-    assert (contents.foreign, [node.operator for node in contents.nodes]) == (
-        [],
-        ["Add"],
-    )
+    assert contents.foreign == []
+    assert [node.operator for node in contents.nodes] == ["Add"]
 
 
 OTHER_ATTRIBUTES = {

@@ -61,7 +61,8 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
         while b"STOPPING=1" not in said:
             said.add(manager.recv(4096))
     assert said <= {b"WATCHDOG=1", b"STOPPING=1"}
-    assert (process.returncode, err) == (0, "")
+    assert process.returncode == 0
+    assert err == ""
     assert out.endswith("\n")
     lines = [json.loads(line) for line in out.splitlines()]
     assert lines[-1]["event"] == "end"
@@ -93,15 +94,14 @@ def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_tak
     unit,
 ):
     program, *words = shlex.split(unit["Service"]["ExecStart"])
-    assert (Path(program).name, words.pop()) == ("edge-classify", "$ARGUMENTS")
+    assert Path(program).name == "edge-classify"
+    assert words.pop() == "$ARGUMENTS"
     without, arm = (
         parser().parse_args([*words, *shlex.split(*shlex.split(e))]) for e in examples()
     )
-    assert (without.udp, without.joints, arm.joints) == (
-        "127.0.0.1:47400",
-        None,
-        "udp:47401",
-    )
+    assert without.udp == "127.0.0.1:47400"
+    assert without.joints is None
+    assert arm.joints == "udp:47401"
     assert arm.map == f"/var/lib/{unit['Service']['StateDirectory']}/map.jsonl"
 
 
@@ -111,7 +111,8 @@ def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):
     `make service-test` starts it under a real systemd.
     """
     service = unit["Service"]
-    assert (service["Restart"], service["RestartPreventExitStatus"]) == ("always", "2")
+    assert service["Restart"] == "always"
+    assert service["RestartPreventExitStatus"] == "2"
     assert (
         int(service["WatchdogSec"]) > 2
     )  # a stuck adapter's time-out of 1 s is no dead loop

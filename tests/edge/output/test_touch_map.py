@@ -252,7 +252,8 @@ def test_a_full_disk_costs_lines_and_not_decisions():
         writer.put({})
         writer.put({})
         writer.close()
-    assert (writer.lost, writer.problem) == (2, "No space left on device")
+    assert writer.lost == 2
+    assert writer.problem == "No space left on device"
 
 
 def test_only_the_head_of_a_long_map_is_read_before_a_run(tmp_path):

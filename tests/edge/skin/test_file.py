@@ -151,10 +151,8 @@ def test_saving_a_calibration_keeps_the_old_file_and_leaves_a_wrong_one_alone(tm
     path.write_text(wrong)
     with pytest.raises(InputError):
         save_calibration(path, calibration())
-    assert ([p.name for p in tmp_path.iterdir()], path.read_text()) == (
-        ["skin.toml"],
-        wrong,
-    )
+    assert [p.name for p in tmp_path.iterdir()] == ["skin.toml"]
+    assert path.read_text() == wrong
     path.write_text(SMALL)
     backup = save_calibration(path, calibration(3))
     assert backup.read_text() == SMALL

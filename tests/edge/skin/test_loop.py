@@ -61,7 +61,8 @@ def test_garbage_collection_leaves_out_the_objects_made_before_the_loop():
         frozen = [
             gc.get_freeze_count() > 10_000 for _ in Loop(skin, lasts_s=0.02).frames()
         ]
-    assert (frozen, gc.get_freeze_count()) == ([True, True], 0)
+    assert frozen == [True, True]
+    assert gc.get_freeze_count() == 0
 
 
 def test_a_signal_asks_once_and_is_itself_again_afterwards(interruptible):

@@ -12,12 +12,10 @@ from tests.edge.skin.small import SMALL, mistake, one_chip
 def test_first_and_block_number_the_stages_row_by_row():
     chip = skinfile.parse(SMALL).buses[0].chips[1]
     assert chip.taxels == (3, 4, 5, 9, 10, 11, 15, 16, 17, 21, 22, 23)
-    assert (chip.kind.name, chip.mux, chip.channel, chip.address) == (
-        "ad7147",
-        0x70,
-        0,
-        0x2D,
-    )
+    assert chip.kind.name == "ad7147"
+    assert chip.mux == 0x70
+    assert chip.channel == 0
+    assert chip.address == 0x2D
 
 
 def test_taxels_name_each_stage_and_an_empty_one_is_none():
@@ -108,14 +106,19 @@ SERIAL = one_chip(2, 3, bus='serial = "/dev/ttyACM0"', at="")
 def test_a_bus_is_named_by_its_number(number):
     text = SERIAL.replace('serial = "/dev/ttyACM0"', f"device = {number}")
     (bus,) = skinfile.parse(text.replace("{ first", "{ address = 8, first")).buses
-    assert (bus.device, bus.serial) == (f"/dev/i2c-{number}", False)
+    assert bus.device == f"/dev/i2c-{number}"
+    assert not bus.serial
 
 
 def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel():
     (bus,) = skinfile.parse(SERIAL.replace("[2, 3] }", "[1, 1] }")).buses
-    assert (bus.device, bus.serial, bus.clock_hz) == ("/dev/ttyACM0", True, 115_200)
+    assert bus.device == "/dev/ttyACM0"
+    assert bus.serial
+    assert bus.clock_hz == 115_200
     (chip,) = bus.chips
-    assert (chip.kind.name, chip.address, chip.taxels) == ("block", 0, (0,))
+    assert chip.kind.name == "block"
+    assert chip.address == 0
+    assert chip.taxels == (0,)
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,8 @@ no label."""
 def test_a_change_is_found_where_a_trial_was_outvoted(outvoted):
     space = VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]]))
     why = explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
-    assert (why.rival.row, why.rival.distance) == (0, -outvoted)
+    assert why.rival.row == 0
+    assert why.rival.distance == -outvoted
     # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
     assert why.changes == (Change("force", 1, pytest.approx(0.6), pytest.approx(-0.6)),)
 

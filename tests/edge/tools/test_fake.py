@@ -38,7 +38,8 @@ def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeyp
 
     monkeypatch.setattr(fake, "plugged", pretended)
     status, (event,), _ = edge("fake", "--skin", skinfile.shipped("mpr121"), "--plug")
-    assert (status, event.pop("event")) == (0, "plugged")
+    assert status == 0
+    assert event.pop("event") == "plugged"
     assert event == {"bus": "/dev/i2c-1", "device": "/dev/i2c-7"}
     assert plugged == []
 
@@ -47,7 +48,9 @@ def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(edge, tmp_pa
     skin = tmp_path / "serial.toml"
     skin.write_text(one_chip(1, 2, bus='serial = "/dev/ttyACM0"', at=""))
     status, _, err = edge("fake", "--skin", skin, "--plug")
-    assert (status, "/dev/ttyACM0 is a serial port" in err) == (2, True)
+    assert status == 2
+    assert "/dev/ttyACM0 is a serial port" in err
     given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
     status, _, err = edge("fake", *given)
-    assert (status, "name its own skin file" in err) == (2, True)
+    assert status == 2
+    assert "name its own skin file" in err

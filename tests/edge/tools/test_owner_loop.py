@@ -56,7 +56,8 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
             1.3,
             *given,
         )
-        assert (status, event["complete"]) == (0, True)
+        assert status == 0
+        assert event["complete"]
     assert len(list(trials.iterdir())) == len(shown)
 
     export(tmp_path / "build", "--data", trials, *PAPER)

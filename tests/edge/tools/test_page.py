@@ -56,7 +56,9 @@ def test_a_picture_has_the_skin_and_the_contact_since_onset(page, pictures):
         page.push(frame)
 
     picture = pictures[-1]
-    assert (picture["rows"], picture["cols"], picture["dead"]) == (4, 6, (5,))
+    assert picture["rows"] == 4
+    assert picture["cols"] == 6
+    assert picture["dead"] == (5,)
     assert (
         np.flatnonzero(picture["counts"]).tolist()
         == [8, 9]
@@ -121,7 +123,8 @@ def test_labels_and_recording_are_set_from_the_page(page):
     page._act({"do": "labels", "labels": {" object ": "box "}})
     page._act({"do": "record", "on": True})
 
-    assert (page.labels, page.recording) == ({"object": "box"}, True)
+    assert page.labels == {"object": "box"}
+    assert page.recording
 
 
 @pytest.mark.parametrize(
@@ -368,7 +371,8 @@ class TestInABrowser:
             until(lambda: browser.find_elements("css selector", pressed))
             assert browser.find_element("css selector", pressed).text == "1 soft"
             accept, correct, _ = rows()[0].find_elements("css selector", "button")
-            assert (accept.text, correct.text) == ("Accept", "Correct")
+            assert accept.text == "Accept"
+            assert correct.text == "Correct"
             browser.execute_script("arguments[0].click()", correct)
             until(lambda: labels() == {"softness": "soft"})
             until(lambda: browser.find_element("id", "undo").is_displayed())

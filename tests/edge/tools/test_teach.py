@@ -49,12 +49,14 @@ def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     assert "its accuracy is not measured, and no error rate is certified" in messages
     before = Model(exported / "model.onnx")
     after = Model(tmp_path / "taught" / "model.onnx")
-    assert (after.info.rows, after.info.taught) == (17, 1)
+    assert after.info.rows == 17
+    assert after.info.taught == 1
     assert after.info.trials[-1:] == ("cup",)
     _, series = first_series(load(tmp_path / "cup.npz"), after)
     vector = after.info.vector(series)
     decision = after.decide(vector)["category"]
-    assert (decision.neighbours[0], decision.distances[0]) == (16, 0.0)
+    assert decision.neighbours[0] == 16
+    assert decision.distances[0] == 0.0
     # No label of its object is known, so the answers about objects are what they were.
     assert (
         after.decide(vector)["object"].distances
@@ -82,7 +84,8 @@ def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
         touch = make_touch(seed=70 + seed)
         save(path, labelled(replace(touch, frames=touch.frames // 3 * 4), **labels))
     status, lines, messages = teach("--new-labels", *recordings[:3])
-    assert (status, shares_of(lines)) == (0, {"category": 3, "object": 3})
+    assert status == 0
+    assert shares_of(lines) == {"category": 3, "object": 3}
     new = {"category": {"soft-movable": 3}, "object": {"cup": 3}}
     assert shares_of(lines, "new_labels") == new
     assert "object: 3 trials of the new label 'cup'\n" in messages
@@ -96,7 +99,8 @@ def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
     for path in recordings[:3]:
         _, series = first_series(load(path), after)
         decision = after.decide(after.info.vector(series))["object"]
-        assert (decision.label, len(decision.scores)) == ("cup", 5)
+        assert decision.label == "cup"
+        assert len(decision.scores) == 5
     again = tmp_path / "again"
     given = ["--model", model, "--out", again, "--new-labels", recordings[3]]
     assert edge("teach", *given)[0] == 0

@@ -36,7 +36,8 @@ def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
 def test_the_tables_of_labels_name_the_trials_of_each():
     tables = label_tables(np.array([1, -1, 0, 1]), 2)
     assert tables["members"].tolist() == [[2, 4], [0, 3]]
-    assert (tables["counts"].tolist(), tables["most"].tolist()) == ([1.0, 2.0], [2])
+    assert tables["counts"].tolist() == [1.0, 2.0]
+    assert tables["most"].tolist() == [2]
     assert tables["taken"].tolist() == [[True, False], [True, True]]
 
 

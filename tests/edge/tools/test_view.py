@@ -12,7 +12,8 @@ def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
     path = recordings / "hard_0.npz"
     given = ("--fake", path, "--model", exported / "model.onnx")
     status, text, err = edge("view", *given, text=True)
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert err == ""
     pictures = text.split("\x1b[H")[1:]
     assert len(pictures) == 18  # 1.8 s at ten a second
     assert "category: rigid-fixed" in pictures[-1]

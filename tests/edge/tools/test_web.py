@@ -67,7 +67,8 @@ def test_without_the_token_nothing_is_served_and_no_action_taken(server, taken, 
         401
     ] * 2
     assert post(server, {"do": "record"}, token=token)[0] == 401
-    assert (taken, server.watched) == ([], False)
+    assert taken == []
+    assert not server.watched
 
 
 def test_the_link_has_the_token_and_each_start_one_of_its_own(server):
@@ -97,7 +98,8 @@ def test_an_action_that_fails_says_why():
     with closing(WebServer("127.0.0.1:0", refuse)) as server:
         status, _, body = post(server, {"do": "relabel"})
 
-    assert (status, body) == (400, b"relabel is not possible")
+    assert status == 400
+    assert body == b"relabel is not possible"
 
 
 def test_every_browser_gets_the_latest_picture(server):

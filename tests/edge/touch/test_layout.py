@@ -50,12 +50,11 @@ def test_a_flat_skin_lies_in_the_plane():
 
 
 def test_units_say_what_is_known():
-    assert (SkinLayout(1, 1).force_unit, SkinLayout(1, 1).length_unit) == (
-        "count",
-        "taxel",
-    )
+    assert SkinLayout(1, 1).force_unit == "count"
+    assert SkinLayout(1, 1).length_unit == "taxel"
     scaled = SkinLayout(1, 1, pitch_m=0.01, counts_per_newton=1000.0)
-    assert (scaled.force_unit, scaled.length_unit) == ("newton", "metre")
+    assert scaled.force_unit == "newton"
+    assert scaled.length_unit == "metre"
 
 
 def test_metadata_round_trip():

@@ -320,7 +320,8 @@ def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(
     shape, side, count
 ):
     cells = Cells(SkinLayout(*shape))
-    assert (cells.side, cells.count) == (side, count)
+    assert cells.side == side
+    assert cells.count == count
     assert count <= MOST_CELLS
 
 

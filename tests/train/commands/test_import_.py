@@ -45,7 +45,8 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
         "a" in (capsys.readouterr().out)
     )
     layout = load(tmp_path / "out" / "trial0.npz").layout
-    assert (layout.threshold_counts, layout.onset) == (80, 120)
+    assert layout.threshold_counts == 80
+    assert layout.onset == 120
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
     assert main([*given, str(tmp_path / "own")]) == 0
     assert "noise" not in capsys.readouterr().out

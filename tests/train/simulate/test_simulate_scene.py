@@ -52,7 +52,8 @@ def test_the_shipped_scenes_are_good(path):
 def test_values_ranges_and_defaults():
     scene = from_dict(GOOD)
     box = scene.objects[0]
-    assert (box.values["mass_kg"].low, box.values["mass_kg"].high) == (1.0, 2.0)
+    assert box.values["mass_kg"].low == 1.0
+    assert box.values["mass_kg"].high == 2.0
     assert scene.settings == {"noise": {"counts": 4.0}}
     assert scene.arm.dof == 5
     assert scene.skin.shape == (16, 24)
@@ -190,10 +191,12 @@ def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
     other.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
     first = scenes.load(tmp_path / "one.toml")
     second = scenes.load(other)
-    assert (first.trials["count"], second.trials["count"]) == (3, 4)
+    assert first.trials["count"] == 3
+    assert second.trials["count"] == 4
     assert second.name == "other"
     assert second.trials["after_s"] == 1.5
-    assert (second.spread, second.objects) == (first.spread, first.objects)
+    assert second.spread == first.spread
+    assert second.objects == first.objects
     (tmp_path / "third.toml").write_text('like = "other.toml"\n')
     with pytest.raises(InputError, match="itself like another scene"):
         scenes.load(tmp_path / "third.toml")

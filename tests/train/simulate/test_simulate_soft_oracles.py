@@ -208,14 +208,10 @@ class TestAskew:
             return lateral.askew(depth[:, None], weight[:, None], 0.5)[:, 0].tolist()
 
         assert askew(rising, covered) == askew(falling, covered) == [0.0] * 4
-        assert (askew(rising, begins), askew(falling, begins)) == (
-            [0.0] * 4,
-            [0.0, 2.0, 0.0, 0.0],
-        )
-        assert (askew(rising, ends), askew(falling, ends)) == (
-            [0.0, 0.0, 2.0, 0.0],
-            [0.0] * 4,
-        )
+        assert askew(rising, begins) == [0.0] * 4
+        assert askew(falling, begins) == [0.0, 2.0, 0.0, 0.0]
+        assert askew(rising, ends) == [0.0, 0.0, 2.0, 0.0]
+        assert askew(falling, ends) == [0.0] * 4
 
     @pytest.mark.parametrize(
         ("degrees", "force", "depth_mm", "peak", "rows"),

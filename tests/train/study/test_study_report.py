@@ -84,11 +84,10 @@ def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
     # Mobility is within 6 points in Table II, category within 21.
     assert below["II", "mobility"] > 5.0 > 0.1 >= below["II", "category"]
     (backwards, *_) = comparison([against], 140).tables[1].rows
-    assert (backwards["table"], backwards["task"]) == ("I", "category")
-    assert (backwards["rank correlation"], backwards["positive in data sets"]) == (
-        -1.0,
-        "0 of 1",
-    )
+    assert backwards["table"] == "I"
+    assert backwards["task"] == "category"
+    assert backwards["rank correlation"] == -1.0
+    assert backwards["positive in data sets"] == "0 of 1"
     # Equal settings are ordered by chance alone; ties count as no order.
     assert 40.0 < negative_by_chance([80.0] * 6, 1120) < 50.0
 

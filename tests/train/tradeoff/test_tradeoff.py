@@ -122,12 +122,10 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     info = Model(tmp_path / "model.onnx").info
     task = info.tasks["category"]
     assert info.window_s == 0.4
-    assert (task.features, task.scaling, task.k, task.projection) == (
-        choice.choice.features,
-        choice.choice.scaling,
-        choice.choice.k,
-        choice.choice.projection,
-    )
+    assert task.features == choice.choice.features
+    assert task.scaling == choice.choice.scaling
+    assert task.k == choice.choice.k
+    assert task.projection == choice.choice.projection
     assert task.accuracy == choice.accuracy.accuracy
 
 
@@ -276,14 +274,14 @@ class TestEarly:
         unknown = np.array([[False] * 4, [True, False, False, False]])
         course = Course([np.full((2, 4), 0.5)], [wrong], unknown, withheld=True)
         decisions = early._certified(0.1, [(course, rule)], (0.6, 1.2))
-        assert (decisions.folds, decisions.result.right, decisions.result.total) == (
-            1,
-            3,
-            4,
-        )
+        assert decisions.folds == 1
+        assert decisions.result.right == 3
+        assert decisions.result.total == 4
         # At the full window one more is right and one names nothing.
         assert decisions.gain[0] == 0.0
-        assert (decisions.mean_s, decisions.early, decisions.unknown) == (0.6, 1.0, 0.0)
+        assert decisions.mean_s == 0.6
+        assert decisions.early == 1.0
+        assert decisions.unknown == 0.0
 
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
         dataset = followed(read([save_touches(tmp_path, 20)]))
@@ -292,7 +290,9 @@ class TestEarly:
         rule = next(
             certified for certified in compared.certified if certified.asked == 0.15
         )
-        assert (rule.folds, rule.wrong, rule.mean_s) == (early.FOLDS, 0.0, 0.6)
+        assert rule.folds == early.FOLDS
+        assert rule.wrong == 0.0
+        assert rule.mean_s == 0.6
         # Forty trials certify no rate as low as the smallest one.
         assert (
             min(certified.asked for certified in compared.certified) > early.ERRORS[0]
