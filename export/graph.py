@@ -10,6 +10,7 @@ finite with label -1.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,12 +63,25 @@ def _squares(
     return build.node("Gemm", [z, columns, lengths]), length
 
 
+@dataclass(frozen=True)
+class _Voters:
+    """The training trials of a task, which vote.
+
+    Attributes:
+        labels: (n,) of the trials; -1 where one has none.
+        classes: how many labels there are.
+        k: how many neighbours vote.
+    """
+
+    labels: NDArray[np.int64]
+    classes: int
+    k: int
+
+
 def _decide(
     build: Builder,
     task: str,
-    labels: NDArray[np.int64],
-    classes: int,
-    k: int,
+    voting: _Voters,
     nearest: tuple[str, str, str],
     units: Sequence[float],
     off: str,
@@ -77,18 +91,18 @@ def _decide(
     Args:
         build: takes the nodes.
         task: its name.
-        labels: of the training trials; -1 where one has none.
-        classes: how many labels there are.
-        k: how many neighbours vote.
+        voting: its training trials.
         nearest: names of the neighbours' squared distances (n, k) less a length, of
             their rows (n, k), and of that length (n, 1).
         units: of the distances, for each decision point.
         off: name of the excess over the limits (n, 1).
     """
     squares, rows, length = nearest
+    classes = voting.classes
+    k = voting.k
     roots = build.node("Sqrt", [build.node("Add", [squares, length])])
     build.node("Mul", [roots, build.by_decision_point(units)], f"{task}_distances")
-    known = build.constant(labels, np.int64, f"labels of {task}")
+    known = build.constant(voting.labels, np.int64, f"labels of {task}")
     voters = build.node("Gather", [known, rows])
     # A vector that is not finite has no votes: class -1, whose row of the votes (the
     # last) is 0.
@@ -186,7 +200,7 @@ def _task(
     near = ["", names[f"{task}_neighbours"]]
     values, places = build.nodes("TopK", [squares, voters], near, largest=0, sorted=1)
     nearest = values, places, length
-    _decide(build, output, labels, classes, k, nearest, units, off)
+    _decide(build, output, _Voters(labels, classes, k), nearest, units, off)
     if f"{task}_label_distances" in names:
         all_squares = build.node("Add", [squares, length])
         slopes = [point.slopes_[task] for point in points]

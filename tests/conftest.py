@@ -44,7 +44,7 @@ FOREARM = SkinLayout(
 )
 
 
-def touch(
+def touch(  # noqa: PLR0913 - independent properties of a touch
     *,
     kind: str = "hard",
     seed: int = 0,

@@ -97,35 +97,43 @@ class FaultyBus(FakeBus):
         number = self.transactions - self._first
         fault = self._due(route, number) if self.is_open else Fault("none")
         if fault.kind == "error":
-            self.transactions += 1
-            self.spend(NACK_BITS if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
-            if fault.code == errno.ETIMEDOUT and self.timed:
-                self.hand.advance(self.timeout_s)
-            self.stop()
-            raise bus_error(fault.code, self.name, first.address)
+            self._fail(fault, first)
         if fault.kind == "foreign":
             for mux in self._muxes():
                 mux.write(_another(mux.read(1, 0.0)), 0.0)
                 mux.stop()
-        for chip in self.chips_at(first.address) if fault.kind == "reset" else ():
-            chip.reset()
+        if fault.kind == "reset":
+            for chip in self.chips_at(first.address):
+                chip.reset()
         to_mux = isinstance(self.chips.get(first.address), FakeTCA9548A)
         if fault.kind == "misroute" and to_mux and not first.read:
             first = write(first.address, _another(first.buffer.tobytes()))
             prepared = Transfer((first, *prepared.messages[1:]))
         super().transfer(prepared)
-        if not into.read:
-            return
-        n = len(into.buffer)
+        if into.read:
+            self._spoil(fault, route, into.buffer)
+
+    def _fail(self, fault, message):
+        """Raise the fault's error, which takes its time."""
+        self.transactions += 1
+        self.spend(NACK_BITS if fault.code in (errno.EREMOTEIO, errno.ENXIO) else 0)
+        if fault.code == errno.ETIMEDOUT and self.timed:
+            self.hand.advance(self.timeout_s)
+        self.stop()
+        raise bus_error(fault.code, self.name, message.address)
+
+    def _spoil(self, fault, route, data):
+        """Change the bytes that were read, or bring those of the last reading."""
+        n = len(data)
         if fault.kind == "flip":
             bit = self.random.randrange(8 * n)
-            into.buffer[bit // 8] ^= 1 << bit % 8
+            data[bit // 8] ^= 1 << bit % 8
         elif fault.kind == "break":
-            into.buffer[self.random.randrange(n) :] = 0xFF
+            data[self.random.randrange(n) :] = 0xFF
         if fault.kind == "hold":
-            into.buffer[:] = self._held.get((route, n), into.buffer)
+            data[:] = self._held.get((route, n), data)
         elif n > 2:
-            self._held[route, n] = into.buffer.copy()
+            self._held[route, n] = data.copy()
 
     def _due(self, route, number):
         """The first fault that matches a transaction, or one that does nothing."""

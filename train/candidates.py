@@ -96,7 +96,7 @@ def known_products(y: Labels) -> dict[str, tuple[str, str]]:
     }
 
 
-def candidates(
+def candidates(  # noqa: PLR0913 - each option of `export` that fixes a choice
     y: Labels,
     features: Sequence[str] | None = None,
     projection: str | None = None,

@@ -133,7 +133,7 @@ class Choosing:
         progress: show progress bars on stderr.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the data, and how to choose
         self,
         dataset: DataSet,
         y: Labels,

@@ -256,7 +256,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 
-def load_trials(
+def load_trials(  # noqa: PLR0913 - independent options, all with defaults
     data: Recordings | Sequence[str | Path],
     *,
     threshold: int | None = None,

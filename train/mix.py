@@ -221,7 +221,7 @@ Settings = Callable[[DataSet, Labels], dict[str, Chosen]]
 """Chooses the settings of tasks on some of the trials."""
 
 
-def mix(
+def mix(  # noqa: PLR0913 - the fields of `Mixing`
     dataset: DataSet,
     y: Labels,
     own: NDArray[np.bool_],

@@ -26,7 +26,7 @@ from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
 from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
-from train.vectors import Labels
+from train.vectors import Vectors
 
 QUARTERS = 4
 """The learning curve has a point for each of these parts of the training trials."""
@@ -70,11 +70,7 @@ class Exported:
 
 
 def _left_out(
-    X: NDArray[np.float64],
-    y: Labels,
-    features: Sequence[str],
-    widths: Sequence[int],
-    own: NDArray[np.bool_] | None,
+    vectors: Vectors,
     task: str,
     choices: Mapping[str, Choice],
     test: NDArray[np.int64],
@@ -83,28 +79,27 @@ def _left_out(
     them.
 
     Args:
-        X: (n, p) feature vectors of all trials.
-        y: {task: (n,) labels}.
-        features: names of the feature types in X.
-        widths: columns of each.
-        own: (n,) whether a trial is the owner's; None where all, or none, are
-            simulated.
+        vectors: (n, p) of all trials.
         task: the task to answer.
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
     """
+    X = vectors.X
+    y = vectors.y
+    features = vectors.features
+    widths = vectors.columns
     classes, index = np.unique(y[task], return_inverse=True)
-    counting = choices[task].counts(y[task], own) > 0
+    counting = choices[task].counts(y[task], vectors.own) > 0
     counting[test] = False
     others = np.flatnonzero(counting)
     quarter_of = stratified_folds(y[task][others], QUARTERS)
     answers = []
     for quarter in range(QUARTERS):
         train = others[quarter_of <= quarter]
-        owned = None if own is None else own[train]
-        known = {name: labels[train] for name, labels in y.items()}
-        fewer = fittable(choices, known, owned)
-        model = ContactClassifier(fewer, features, widths).fit(X[train], known, owned)
+        known = vectors.part(train)
+        fewer = fittable(choices, known.y, known.own)
+        model = ContactClassifier(fewer, features, widths)
+        model.fit(known.X, known.y, known.own)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]
     key = model.spaces_[task]
@@ -166,7 +161,8 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
                 cases.append((task, by_task, test))
     X = dataset.features(fitted.window_s, fitted.samples)
     widths = dataset.widths(fitted.samples)
-    left_out = partial(_left_out, X, y, dataset.names, widths, dataset.own)
+    vectors = Vectors(X, y, dataset.names, widths, dataset.own)
+    left_out = partial(_left_out, vectors)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
     for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
         answers[task].answers[:, test] = answered

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +38,8 @@ class Vectors:
         """Columns of each feature type."""
         return widths_of(self.X.shape[-1], self.features, self.widths)
 
-    def part(self, trials: NDArray[np.bool_]) -> Self:
-        """Some of the trials (n,)."""
+    def part(self, trials: NDArray[Any]) -> Self:
+        """Some of the trials, by a mask (n,) or by their numbers."""
         return replace(
             self,
             X=self.X[..., trials, :],

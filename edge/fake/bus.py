@@ -28,7 +28,7 @@ class FakeBus:
     b'\\x04'
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - independent properties of a wire
         self,
         name: str = "fake",
         chips: Mapping[int, FakeChip] | None = None,

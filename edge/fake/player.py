@@ -115,7 +115,7 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     return replace(file, calibration=calibration)
 
 
-def fake_buses(
+def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
     file: SkinFile,
     scene: Scene,
     clock: VirtualClock,

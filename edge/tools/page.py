@@ -39,7 +39,7 @@ class Page:
         recording: whether contacts are to be saved.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - independent parts of the page
         self,
         address: str,
         layout: SkinLayout,

@@ -55,7 +55,7 @@ class ContactTracker:
         region: the last frame's largest region.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - independent options, most with defaults
         self,
         layout: SkinLayout,
         debounce: int = DEBOUNCE,

@@ -8,7 +8,7 @@ trials near a jolt take finer steps, and trials of different steps share one loo
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,23 +177,7 @@ def run_physics(
     """
     t = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
-    joints = np.empty((t.n, frames, len(t.q)))
-    force = np.zeros((t.n, frames))
-    sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
-    for effect in t.plan.calls:
-        for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
-            sources[name] = t.own[effect], attribute
-    traces = {name: np.zeros((t.n, frames)) for name in sources}
-    window = np.zeros(
-        (t.n, frames if images else 0, *t.image.shape[:2]), dtype=np.float32
-    )
-    joints[:, 0] = t.q.T
-    further = images_of(t) if images else {}
-    more = {
-        effect: np.zeros((*window.shape, len(names)), dtype=np.float32)
-        for effect, names in further.items()
-    }
-    scale = scene.skin.counts_per_newton
+    log = _Log.of(t, frames, images=images)
     active = np.arange(t.n)
     while active.size:
         starts = active[t.left[active] == 0]
@@ -209,32 +193,82 @@ def run_physics(
         # A frame ends at its own time: sums of steps would drift from it.
         t.t[ends] = k / t.rate_hz
         t.plan.run(SAMPLE, t, ends)
-        joints[ends, k] = t.q.T[ends]
-        force[ends, k] = t.force[ends]
-        for name, (owner, field) in sources.items():
-            traces[name][ends, k] = getattr(owner, field)[ends]
-        if images:
-            touched = t.force[ends] > 0.0
-            counts = t.image.take(ends[touched], -1) * scale
-            window[ends[touched], k[touched]] = np.moveaxis(
-                np.minimum(counts, FULL), -1, 0
-            )
-        for effect, names in further.items():
-            for place, name in enumerate(names):
-                loads = getattr(t.own[effect], name).take(ends, -1)
-                more[effect][ends, k, ..., place] = np.moveaxis(loads * scale, -1, 0)
+        log.take(t, ends, k)
         if (k == frames - 1).any():
             active = active[t.frame[active] < frames - 1]
     if t.lost.any():
         raise EdgeError(
             f"{scene.name}: the forearm's tilt was not found in "
-            f"{np.count_nonzero(t.lost)} "
-            "trials; give skin.taxel_n_m, the object's stiffness or [step_s] less "
-            "extreme values"
+            f"{np.count_nonzero(t.lost)} trials; give skin.taxel_n_m, the object's "
+            "stiffness or [step_s] less extreme values"
         )
     times = np.arange(frames) / scene.trials["rate_hz"]
-    check_energy(t, joints, times)
-    return PhysicsRun(times, joints, force, traces, window, more, t)
+    check_energy(t, log.joints, times)
+    return PhysicsRun(
+        times, log.joints, log.force, log.traces, log.window, log.images, t
+    )
+
+
+@dataclass(frozen=True)
+class _Log:
+    """What a run keeps of its frames; see `PhysicsRun`.
+
+    Attributes:
+        joints, force, traces, window, images: of `PhysicsRun`.
+        sources: {trace: the object that holds its value, and the attribute}.
+        further: {effect: the attributes of its images}.
+        images_wanted: whether any images are kept.
+    """
+
+    joints: Array
+    force: Array
+    traces: dict[str, Array]
+    window: NDArray[np.float32]
+    images: dict[str, NDArray[np.float32]]
+    sources: dict[str, tuple[Any, str]]
+    further: dict[str, tuple[str, ...]]
+    images_wanted: bool
+
+    @classmethod
+    def of(cls, t: Trials, frames: int, *, images: bool) -> Self:
+        """An empty log, with the joints at the start."""
+        sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
+        for effect in t.plan.calls:
+            for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
+                sources[name] = t.own[effect], attribute
+        shape = t.n, frames if images else 0, *t.image.shape[:2]
+        further = images_of(t) if images else {}
+        log = cls(
+            joints=np.empty((t.n, frames, len(t.q))),
+            force=np.zeros((t.n, frames)),
+            traces={name: np.zeros((t.n, frames)) for name in sources},
+            window=np.zeros(shape, dtype=np.float32),
+            images={
+                effect: np.zeros((*shape, len(names)), dtype=np.float32)
+                for effect, names in further.items()
+            },
+            sources=sources,
+            further=further,
+            images_wanted=images,
+        )
+        log.joints[:, 0] = t.q.T
+        return log
+
+    def take(self, t: Trials, ends: Places, k: NDArray[np.int64]) -> None:
+        """Take in the frames k of the trials that end one."""
+        self.joints[ends, k] = t.q.T[ends]
+        self.force[ends, k] = t.force[ends]
+        for name, (owner, attribute) in self.sources.items():
+            self.traces[name][ends, k] = getattr(owner, attribute)[ends]
+        scale = t.skin.counts_per_newton
+        if self.images_wanted:
+            touched = t.force[ends] > 0.0
+            counts = np.minimum(t.image.take(ends[touched], -1) * scale, FULL)
+            self.window[ends[touched], k[touched]] = np.moveaxis(counts, -1, 0)
+        for effect, names in self.further.items():
+            for place, name in enumerate(names):
+                loads = getattr(t.own[effect], name).take(ends, -1) * scale
+                self.images[effect][ends, k, ..., place] = np.moveaxis(loads, -1, 0)
 
 
 def images_of(t: Trials) -> dict[str, tuple[str, ...]]:

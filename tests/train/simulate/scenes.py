@@ -77,7 +77,7 @@ class Rig:
     not given.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the physics of one test each
         self,
         *,
         h,
