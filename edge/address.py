@@ -12,8 +12,8 @@ def parse_address(
         InputError: the text is not of that form; the message names the option and an
             example.
     """
-    given, _, port = text.rpartition(":")
-    host = given.strip("[]") or host
+    host_text, _, port = text.rpartition(":")
+    host = host_text.strip("[]") or host
     if not (host and port.isascii() and port.isdecimal() and int(port[:6]) in ports):
         raise InputError(f"{option}{text}: give HOST:PORT, for example {example}")
     return host, int(port)

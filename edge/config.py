@@ -182,9 +182,9 @@ class ConfigTable:
         if type(value) is not int or value not in allowed:
             if not isinstance(allowed, range):
                 raise self.fail(key, f"one of {', '.join(map(str, allowed))}")
-            wanted = f"{allowed[0]:{form}} to {allowed[-1]:{form}}"
+            limits = f"{allowed[0]:{form}} to {allowed[-1]:{form}}"
             raise self.fail(
-                key, wanted if form != "d" else f"a whole number from {wanted}"
+                key, limits if form != "d" else f"a whole number from {limits}"
             )
         return value
 

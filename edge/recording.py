@@ -336,13 +336,13 @@ def load_arrays(
             for info in archive.infolist()
             if info.filename.endswith(".npy")
         }
-        wanted = [key for key in members if keys is None or key in keys]
-        if sum(members[key].file_size for key in wanted) > LARGEST_BYTES:
+        members_read = [key for key in members if keys is None or key in keys]
+        if sum(members[key].file_size for key in members_read) > LARGEST_BYTES:
             raise InputError(
                 f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
             )
         arrays = {}
-        for key in wanted:
+        for key in members_read:
             with archive.open(members[key]) as stream:
                 arrays[key] = np.asarray(
                     np.lib.format.read_array(stream, allow_pickle=False)

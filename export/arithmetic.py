@@ -46,11 +46,11 @@ def _round_to_float32(tensor: onnx.TensorProto) -> None:
 def _without(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> None:
     """Remove nodes of one input and one output: their input takes the place of their
     output."""
-    given = {node.output[0]: node.input[0] for node in nodes}
+    source_of = {node.output[0]: node.input[0] for node in nodes}
     for node in nodes:
         graph.node.remove(node)
     for node in graph.node:
-        node.input[:] = [given.get(name, name) for name in node.input]
+        node.input[:] = [source_of.get(name, name) for name in node.input]
 
 
 def unrounded(model: onnx.ModelProto) -> onnx.ModelProto:

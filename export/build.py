@@ -37,18 +37,18 @@ class Builder:
         array = np.asarray(value, dtype=dtype)
         key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self._constants:
-            own = name or self._scope.get_unique_variable_name("constant")
+            stored_name = name or self._scope.get_unique_variable_name("constant")
             tensor = numpy_helper.from_array(
-                np.ascontiguousarray(array).reshape(array.shape), own
+                np.ascontiguousarray(array).reshape(array.shape), stored_name
             )
             # the container's method stores equal constants once, whatever their names
             if name:
                 self._container.initializers.append(tensor)
             else:
                 self._container.add_initializer(
-                    own, tensor.data_type, list(array.shape), tensor
+                    stored_name, tensor.data_type, list(array.shape), tensor
                 )
-            self._constants[key] = own
+            self._constants[key] = stored_name
         return self._constants[key]
 
     def ints(self, *values: int) -> str:

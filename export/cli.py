@@ -215,10 +215,10 @@ def _of_front(
     arguments: argparse.Namespace,
 ) -> tuple[fronts.ParetoFront, fronts.OperatingPoint]:
     """The front of `make tradeoff`, and the operating point that was asked for."""
-    given = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
-    if given:
+    fixed = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
+    if fixed:
         raise InputError(
-            f"--front makes the model that was measured; leave out {', '.join(given)}"
+            f"--front makes the model that was measured; leave out {', '.join(fixed)}"
         )
     front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
     point = front.pick(arguments.front)

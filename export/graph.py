@@ -123,8 +123,8 @@ def _decide(
     if k == 2:
         return
     # The first neighbour whose class has the most votes is the nearest of the tied.
-    own = build.node("GatherElements", [votes, voters], axis=1)
-    winner = build.node("ArgMax", [own], axis=1, keepdims=1)
+    votes_of_voters = build.node("GatherElements", [votes, voters], axis=1)
+    winner = build.node("ArgMax", [votes_of_voters], axis=1, keepdims=1)
     build.node("GatherND", [voters, winner], f"{task}_label", batch_dims=1)
 
 
@@ -267,8 +267,10 @@ def _label_distances(
         for name, table in tables.items()
     )
     wider = build.node("Pad", [squares, build.ints(0, 0, 0, 1), build.constant(np.inf)])
-    own = build.node("Gather", [wider, rows], axis=1)
-    nearest, _ = build.nodes("TopK", [own, most], ["", ""], axis=2, largest=0, sorted=1)
+    squares_of_label = build.node("Gather", [wider, rows], axis=1)
+    nearest, _ = build.nodes(
+        "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0, sorted=1
+    )
     roots = build.node("Round", [build.node("Sqrt", [nearest])])
     kept = build.node("Where", [taken, roots, build.constant(0.0)])
     total = build.node("ReduceSum", [kept, build.ints(2)], keepdims=0)
@@ -304,8 +306,8 @@ def _parse(
     custom_parsers: Any = None,
 ) -> list[Any]:
     operator = scope.declare_local_operator(type(model).__name__, model)
-    for given in inputs:
-        operator.inputs.append(given)
+    for variable in inputs:
+        operator.inputs.append(variable)
     for name, kind in _outputs(model):
         operator.outputs.append(scope.declare_local_variable(name, kind))
     return list(operator.outputs)

@@ -421,7 +421,7 @@ def decided_together(
             accuracy=counted(task, settings.left_out, settings.accuracy),
             by_trial=counted(task, TRIAL, settings.by_trial),
             by_fold=tuple(
-                {each: by_task[each] for each in family_of.get(task, (task,))}
+                {member: by_task[member] for member in family_of.get(task, (task,))}
                 for by_task in plans[settings.left_out][1]
             ),
         )
@@ -454,7 +454,10 @@ def without_folds(
         answers = table.held_out(task)
         folds = range(int(trials.folds.max()) + 1)
         others = (answers[:, trials.folds != fold] for fold in folds)
-        places = [choose(each, prices, margin=margin) for each in others]
+        places = [
+            choose(answers_of_others, prices, margin=margin)
+            for answers_of_others in others
+        ]
     return [table.choices[task][place] for place in places]
 
 

@@ -49,7 +49,7 @@ class Recordings:
     digest: str
 
     @property
-    def own(self) -> tuple[Recording, ...]:
+    def of_owner(self) -> tuple[Recording, ...]:
         """Those that are not simulated; all where all are."""
         return (
             tuple(r for r in self.recordings if "simulation" not in r.meta)
@@ -59,20 +59,20 @@ class Recordings:
     @property
     def mixed(self) -> bool:
         """Whether some are simulated, and some are not."""
-        return len(self.own) < len(self.recordings)
+        return len(self.of_owner) < len(self.recordings)
 
     @property
     def joints(self) -> bool:
         """Whether most of the owner's have joint angles."""
-        return 2 * sum(recording.joints is not None for recording in self.own) > len(
-            self.own
-        )
+        return 2 * sum(
+            recording.joints is not None for recording in self.of_owner
+        ) > len(self.of_owner)
 
     @property
     def shear(self) -> bool:
         """Whether most of the owner's have shear."""
-        sheared = sum(recording.shear is not None for recording in self.own)
-        return 2 * sheared > len(self.own)
+        sheared = sum(recording.shear is not None for recording in self.of_owner)
+        return 2 * sheared > len(self.of_owner)
 
 
 @dataclass(frozen=True)
@@ -122,13 +122,13 @@ class DataSet:
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
 
     @property
-    def own(self) -> NDArray[np.bool_] | None:
+    def is_own(self) -> NDArray[np.bool_] | None:
         """(n,) whether a trial is the owner's; None where all, or none, are
         simulated."""
-        own = np.array(
+        is_own = np.array(
             ["simulation" not in trial.recording.meta for trial in self.trials]
         )
-        return own if own.any() and not own.all() else None
+        return is_own if is_own.any() and not is_own.all() else None
 
     def part(self, trials: NDArray[np.bool_]) -> DataSet:
         """Some of the trials (n,)."""
@@ -297,7 +297,7 @@ def load_trials(  # noqa: PLR0913 - independent options, all with defaults
     """
     types = measures.features(tuple(features))
     recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
-    layout = with_thresholds(recordings.own[0].layout, threshold, onset)
+    layout = with_thresholds(recordings.of_owner[0].layout, threshold, onset)
     layout = replace(layout, dead=_dead(recordings.recordings), axes=axes(types))
     recordings, without_shear = with_shear(recordings, layout)
     posed = with_poses(recordings, types, arm)
@@ -506,7 +506,9 @@ def complete(touched: Touched, *, partial: bool) -> Labelled:
     tasks = shared_tasks(labels, partial=partial)
     lacking: dict[str, tuple[Path, ...]] = {}
     for task in tasks:
-        without = [p for p, own in zip(paths, labels, strict=True) if task not in own]
+        without = [
+            p for p, is_own in zip(paths, labels, strict=True) if task not in is_own
+        ]
         lacking[f"a label for {task}"] = tuple(dict.fromkeys(without))
     enough = any if partial else all
     trials: list[Trial] = []

@@ -134,7 +134,9 @@ class _Fit:
         for task, labels in self.classes.items():
             if not grid.tasks or task in grid.tasks:
                 names = np.where(labels < 0, "", "labelled")
-                counts = grid.choices(1)[0].counts(names, self.vectors.own)[self.train]
+                counts = grid.choices(1)[0].counts(names, self.vectors.is_own)[
+                    self.train
+                ]
                 by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
         return list(by_counts.values())
 
@@ -246,8 +248,8 @@ class AnswerTable:
         that fold."""
         hits = np.zeros(len(self.folds), dtype=bool)
         for fold, candidate in enumerate(picked):
-            own = self.folds == fold
-            hits[own] = self.right[task][fold][candidate, own]
+            in_fold = self.folds == fold
+            hits[in_fold] = self.right[task][fold][candidate, in_fold]
         hits = hits[self.tested.get(task, self.folds >= 0)]
         usual = self.choices[task][int(np.bincount(picked).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)

@@ -240,7 +240,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(felt)]
     _check_size(len(loaded.dataset.trials), fixed.k)
     settings = choose(loaded, y, fixed)
-    if loaded.dataset.own is not None:
+    if loaded.dataset.is_own is not None:
         y = {task: y[task] for task in settings.chosen}
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
@@ -255,7 +255,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     else:
         widths = dataset.widths(fixed.samples)
         classifier = ContactClassifier(settings.choices, dataset.names, widths)
-        classifier.fit(X, y, dataset.own)
+        classifier.fit(X, y, dataset.is_own)
     return Fitted(
         dataset=dataset,
         measured=measured,
@@ -323,9 +323,9 @@ def _with_thresholds(
     threshold = options.threshold
     onset = options.onset
     fixed = threshold is not None or onset is not None
-    skin = recordings.own[0].meta.get("skin", {})
+    skin = recordings.of_owner[0].meta.get("skin", {})
     if not fixed and "threshold_counts" not in skin:
-        proposal = thresholds.proposed(recordings.own)
+        proposal = thresholds.proposed(recordings.of_owner)
         threshold = proposal.threshold
         onset = proposal.onset
         notes.append(
@@ -337,7 +337,7 @@ def _with_thresholds(
     except Untouched:
         if fixed:
             raise
-        proposal = thresholds.proposed(recordings.own)
+        proposal = thresholds.proposed(recordings.of_owner)
         dataset = by(proposal.threshold, proposal.onset)
         notes.append(
             "warning: no recording has a contact at its own thresholds; a threshold of "
@@ -379,8 +379,8 @@ def _check_size(trials: int, k: int | None) -> None:
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     """The settings of each task, and the window."""
     dataset = loaded.dataset
-    if dataset.own is not None:
-        return _choose_mixed(loaded, y, dataset.own, options)
+    if dataset.is_own is not None:
+        return _choose_mixed(loaded, y, dataset.is_own, options)
     choosing = options.choosing(dataset, y, drawn=_are_drawn(dataset))
     windows = loaded.windows
     if len(windows) > 1:
@@ -393,7 +393,7 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
 
 
 def _choose_mixed(
-    loaded: Loaded, y: Labels, own: NDArray[np.bool_], options: FitOptions
+    loaded: Loaded, y: Labels, is_own: NDArray[np.bool_], options: FitOptions
 ) -> Settings:
     """The settings where simulated trials stand beside the owner's."""
     dataset = loaded.dataset
@@ -406,7 +406,7 @@ def _choose_mixed(
     mixed = mix(
         dataset,
         y,
-        own,
+        is_own,
         settings,
         X,
         options.samples,
@@ -447,20 +447,22 @@ def calibrate(
         jobs=options.processes,
         widths=dataset.widths(options.samples),
     )
-    return classifier.fit(at_points, y, settings.folds, settings.without, measured.own)
+    return classifier.fit(
+        at_points, y, settings.folds, settings.without, measured.is_own
+    )
 
 
 def _is_usual(dataset: DataSet, task: str) -> bool:
     """Whether most trials have a label for a task, of those that no other task gives."""
     labels = dataset.labels(task)
-    if dataset.own is not None:
+    if dataset.is_own is not None:
         return True
     return 2 * int((labels != "").sum()) > len(labels)
 
 
-def _lacking(dataset: DataSet, wanted: Sequence[str] | None) -> list[str]:
+def _lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
     """A sentence for each task that most trials lack, and that is not named."""
-    if wanted is not None:
+    if tasks is not None:
         return []
     sentences = []
     for task in dataset.tasks:
@@ -473,16 +475,16 @@ def _lacking(dataset: DataSet, wanted: Sequence[str] | None) -> list[str]:
     return sentences
 
 
-def _tasks(dataset: DataSet, wanted: Sequence[str] | None) -> tuple[str, ...]:
-    if wanted is None:
+def _tasks(dataset: DataSet, tasks: Sequence[str] | None) -> tuple[str, ...]:
+    if tasks is None:
         return tuple(task for task in dataset.tasks if _is_usual(dataset, task))
-    missing = [task for task in wanted if task not in dataset.tasks]
+    missing = [task for task in tasks if task not in dataset.tasks]
     if missing:
         raise InputError(
             f"not every recording has a label {missing[0]!r}; all have "
             f"{', '.join(dataset.tasks)}"
         )
-    return tuple(wanted)
+    return tuple(tasks)
 
 
 def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
@@ -504,10 +506,10 @@ def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
 
 def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:
     """`_leaks` of the trials that the owner has felt."""
-    if dataset.own is None:
+    if dataset.is_own is None:
         return _leaks(dataset, y)
-    felt = {task: labels[dataset.own] for task, labels in y.items()}
-    return _leaks(dataset.part(dataset.own), felt)
+    felt = {task: labels[dataset.is_own] for task, labels in y.items()}
+    return _leaks(dataset.part(dataset.is_own), felt)
 
 
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:

@@ -18,25 +18,26 @@ weight."""
 
 def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
     """The labels of those of a recording's `count` contacts that are trials."""
-    each = recording.meta.get("contacts")
-    if each is None:
+    contacts = recording.meta.get("contacts")
+    if contacts is None:
         return [recording.labels]
-    if each == ALIKE:
+    if contacts == ALIKE:
         return [recording.labels] * count
-    if not isinstance(each, list) or not all(
-        isinstance(labels, dict) for labels in each
+    if not isinstance(contacts, list) or not all(
+        isinstance(labels, dict) for labels in contacts
     ):
         raise InputError(
             f'meta.contacts must be "{ALIKE}" or a list of labels, one a contact'
         )
-    if len(each) != count:
+    if len(contacts) != count:
         raise InputError(
-            f"meta.contacts labels {len(each)} contacts, {count} are found; correct "
+            f"meta.contacts labels {len(contacts)} contacts, {count} are found; correct "
             "the labels or "
             "the threshold"
         )
     return [
-        {**recording.labels, **{str(k): str(v) for k, v in own.items()}} for own in each
+        {**recording.labels, **{str(k): str(v) for k, v in own.items()}}
+        for own in contacts
     ]
 
 
@@ -79,7 +80,9 @@ def shared_tasks(
     Raises:
         InputError: there is none.
     """
-    counts = {task: sum(task in own for own in trials) for task in set().union(*trials)}
+    counts = {
+        task: sum(task in labels for labels in trials) for task in set().union(*trials)
+    }
     tasks = sorted(
         task
         for task, count in counts.items()

@@ -68,7 +68,7 @@ class Mixing:
     Attributes:
         dataset: all trials.
         y: {task: (n,) labels} of the tasks that are fitted.
-        own: (n,) whether a trial is the owner's.
+        is_own: (n,) whether a trial is the owner's.
         features: (n, p) of the data set's, at the full window.
         samples: values of a feature.
         leave_out: label whose groups are left out where the owner's trials have several
@@ -79,7 +79,7 @@ class Mixing:
 
     dataset: DataSet
     y: Labels
-    own: NDArray[np.bool_]
+    is_own: NDArray[np.bool_]
     features: NDArray[np.float64]
     samples: int
     leave_out: str
@@ -91,7 +91,9 @@ class Mixing:
         """The tasks of which simulated trials and the owner's have a common label."""
         tasks = []
         for task, labels in self.y.items():
-            common = set(labels[self.own].tolist()) & set(labels[~self.own].tolist())
+            common = set(labels[self.is_own].tolist()) & set(
+                labels[~self.is_own].tolist()
+            )
             if common - {""}:
                 tasks.append(task)
         return tasks
@@ -99,18 +101,18 @@ class Mixing:
     @property
     def half(self) -> int:
         """How often the owner's trials count for half of the weight."""
-        return max(round(float((~self.own).sum() / self.own.sum())), 1)
+        return max(round(float((~self.is_own).sum() / self.is_own.sum())), 1)
 
     def labelled(self, task: str) -> int:
         """Number of the owner's trials that have a label for a task."""
-        return int((self.y[task][self.own] != "").sum())
+        return int((self.y[task][self.is_own] != "").sum())
 
     def settings(self, choose: Settings) -> dict[str, Chosen]:
         """The settings of each task, on the simulated trials where they share it."""
         shared = self.shared
         rest = [task for task in self.y if task not in shared]
         chosen: dict[str, Chosen] = {}
-        for tasks, trials in ((shared, ~self.own), (rest, self.own)):
+        for tasks, trials in ((shared, ~self.is_own), (rest, self.is_own)):
             if tasks:
                 y = {task: self.y[task][trials] for task in tasks}
                 chosen |= choose(self.dataset.part(trials), y)
@@ -131,24 +133,24 @@ class Mixing:
     def vectors(self) -> Vectors:
         """All trials."""
         widths = self.dataset.widths(self.samples)
-        return Vectors(self.features, self.y, self.dataset.names, widths, self.own)
+        return Vectors(self.features, self.y, self.dataset.names, widths, self.is_own)
 
     def answers(
         self, grids: Sequence[SearchGrid], folds: NDArray[np.int64]
     ) -> AnswerTable:
         """The answers to the owner's trials, each without its fold (owner's trials,)."""
-        everyone = np.full(len(self.own), -1)
-        everyone[self.own] = folds
+        everyone = np.full(len(self.is_own), -1)
+        everyone[self.is_own] = folds
         return evaluate(self.vectors, everyone, grids, jobs=self.jobs)
 
     def scores(self, grids: Sequence[SearchGrid]) -> Scores:
         """The answers with single trials, and with entire groups, left out."""
-        labels = {task: y[self.own] for task, y in self.y.items()}
-        count = fold_count(int(self.own.sum()), self.quick)
+        labels = {task: y[self.is_own] for task, y in self.y.items()}
+        count = fold_count(int(self.is_own.sum()), self.quick)
         by_trial = self.answers(grids, stratified_folds(labels[finest(labels)], count))
         groups = None
         if self.leave_out != TRIAL:
-            groups = self.dataset.part(self.own).groups(self.leave_out)
+            groups = self.dataset.part(self.is_own).groups(self.leave_out)
         number = 0 if groups is None else len(set(groups.tolist()))
         if groups is None or number < FEWEST_GROUPS:
             return Scores(by_trial, by_trial, 0)
@@ -224,7 +226,7 @@ Settings = Callable[[DataSet, Labels], dict[str, Chosen]]
 def mix(  # noqa: PLR0913 - the fields of `Mixing`
     dataset: DataSet,
     y: Labels,
-    own: NDArray[np.bool_],
+    is_own: NDArray[np.bool_],
     choose: Settings,
     features: NDArray[np.float64],
     samples: int,
@@ -238,14 +240,14 @@ def mix(  # noqa: PLR0913 - the fields of `Mixing`
     Raises:
         InputError: the owner's trials are too few, or have no label.
     """
-    few = [task for task in y if int((y[task][own] != "").sum()) < FEWEST_OWN]
+    few = [task for task in y if int((y[task][is_own] != "").sum()) < FEWEST_OWN]
     fitted = {task: labels for task, labels in y.items() if task not in few}
     if not fitted:
         raise InputError(
-            f"{int(own.sum())} of the trials are no simulated ones; record at least "
+            f"{int(is_own.sum())} of the trials are no simulated ones; record at least "
             f"{FEWEST_OWN} with a label, or export the simulated ones alone"
         )
-    mixing = Mixing(dataset, fitted, own, features, samples, leave_out, quick, jobs)
+    mixing = Mixing(dataset, fitted, is_own, features, samples, leave_out, quick, jobs)
     settled = mixing.settings(choose)
     scores = mixing.scores(mixing.grids(settled))
     plans: dict[str, Plan] = {}
@@ -253,7 +255,7 @@ def mix(  # noqa: PLR0913 - the fields of `Mixing`
         folds = int(table.folds.max()) + 1
         plans[left_out] = table.folds, [{} for _ in range(folds)]
     notes = [
-        f"{int(own.sum())} of your own trials beside {int((~own).sum())} simulated "
+        f"{int(is_own.sum())} of your own trials beside {int((~is_own).sum())} simulated "
         "ones, on which the settings are chosen (the table); the other accuracies are "
         "those on your own"
     ]
@@ -285,7 +287,9 @@ def _sentences(task: str, best: Choice, scores: Scores, mixing: Mixing) -> list[
     return sentences
 
 
-def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> SearchGrid:
+def _grid(
+    task: str, choice: Choice, weights: tuple[int, int], labelled: int
+) -> SearchGrid:
     """The one candidate of a task with some weights."""
     return SearchGrid(
         choice.scaling,
@@ -294,7 +298,7 @@ def _grid(task: str, choice: Choice, weights: tuple[int, int], own: int) -> Sear
         (choice.components,),
         choice.components,
         (choice.shrinkage,),
-        (min(choice.k, max(own // 2, 1)) if weights == ALONE else choice.k,),
+        (min(choice.k, max(labelled // 2, 1)) if weights == ALONE else choice.k,),
         choice.targets,
         (task,),
         weights,

@@ -89,7 +89,7 @@ def _left_out(
     features = vectors.features
     widths = vectors.columns
     classes, index = np.unique(y[task], return_inverse=True)
-    counting = choices[task].counts(y[task], vectors.own) > 0
+    counting = choices[task].counts(y[task], vectors.is_own) > 0
     counting[test] = False
     others = np.flatnonzero(counting)
     quarter_of = stratified_folds(y[task][others], QUARTERS)
@@ -97,9 +97,9 @@ def _left_out(
     for quarter in range(QUARTERS):
         train = others[quarter_of <= quarter]
         known = vectors.part(train)
-        fewer = fittable(choices, known.y, known.own)
+        fewer = fittable(choices, known.y, known.is_own)
         model = ContactClassifier(fewer, features, widths)
-        model.fit(known.X, known.y, known.own)
+        model.fit(known.X, known.y, known.is_own)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]
     key = model.spaces_[task]
@@ -161,7 +161,7 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
                 cases.append((task, by_task, test))
     X = dataset.features(fitted.window_s, fitted.samples)
     widths = dataset.widths(fitted.samples)
-    vectors = Vectors(X, y, dataset.names, widths, dataset.own)
+    vectors = Vectors(X, y, dataset.names, widths, dataset.is_own)
     left_out = partial(_left_out, vectors)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
     for (task, _, test), (answered, explained) in zip(cases, results, strict=True):

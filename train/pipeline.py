@@ -60,8 +60,8 @@ def label_distances(
     counts = nearest_of_label(np.bincount(labels, minlength=classes))
     out = np.empty((len(squares), classes))
     for label, count in enumerate(counts):
-        own = np.sort(squares[:, labels == label], axis=1)[:, :count]
-        wholes = np.rint(np.sqrt(own) / unit)
+        nearest = np.sort(squares[:, labels == label], axis=1)[:, :count]
+        wholes = np.rint(np.sqrt(nearest) / unit)
         out[:, label] = wholes.sum(axis=1) / count * unit
     return out
 
@@ -152,31 +152,31 @@ class Choice:
         )
 
     def counts(
-        self, labels: NDArray[np.str_], own: NDArray[np.bool_] | None = None
+        self, labels: NDArray[np.str_], is_own: NDArray[np.bool_] | None = None
     ) -> NDArray[np.int64]:
         """(n,) how often each trial counts: 0 without a label, else by the weights.
 
         Args:
             labels: (n,) of the task; empty where a trial has none.
-            own: (n,) whether a trial is the owner's; None where no weights are needed.
+            is_own: (n,) whether a trial is the owner's; None where no weights are needed.
         """
         counts = np.ones(len(labels), dtype=np.int64)
-        if own is not None:
-            counts = np.where(own, self.weights[1], self.weights[0])
+        if is_own is not None:
+            counts = np.where(is_own, self.weights[1], self.weights[0])
         return np.where(labels == "", 0, counts)
 
 
 def fittable(
-    choices: Mapping[str, Choice], y: Labels, own: NDArray[np.bool_] | None
+    choices: Mapping[str, Choice], y: Labels, is_own: NDArray[np.bool_] | None
 ) -> dict[str, Choice]:
     """The choices of the tasks that y has labels for, with k at most the number of
     their trials.
 
     Args:
-        choices, y, own: see `ContactClassifier.fit`.
+        choices, y, is_own: see `ContactClassifier.fit`.
     """
     counts = {
-        task: int((c.counts(y[task], own) > 0).sum()) for task, c in choices.items()
+        task: int((c.counts(y[task], is_own) > 0).sum()) for task, c in choices.items()
     }
     return {
         t: replace(c, k=min(c.k, counts[t])) for t, c in choices.items() if counts[t]
@@ -234,7 +234,7 @@ class ContactClassifier:
         self,
         X: NDArray[np.float64],
         y: Labels,
-        own: NDArray[np.bool_] | None = None,
+        is_own: NDArray[np.bool_] | None = None,
         complete: bool = True,
     ) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
@@ -242,7 +242,7 @@ class ContactClassifier:
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
-            own: (n,) whether a trial is the owner's, see `Choice.counts`.
+            is_own: (n,) whether a trial is the owner's, see `Choice.counts`.
             complete: whether to set `slopes_` and `products_`, which `decide` needs.
         """
         X = finite(X)
@@ -250,7 +250,7 @@ class ContactClassifier:
         self.spaces_: dict[str, Space] = {}
         counts: dict[Space, NDArray[np.int64]] = {}
         for task, choice in self.choices.items():
-            each = choice.counts(y[task], own)
+            each = choice.counts(y[task], is_own)
             space = (*choice.space(task), () if (each == 1).all() else each.tobytes())
             self.spaces_[task] = space
             counts[space] = each
@@ -292,11 +292,11 @@ class ContactClassifier:
                 for t, space in self.spaces_.items()
             }
             self.products_ = factors_of(used)
-            self.slopes_ = self._slopes(X, y, own)
+            self.slopes_ = self._slopes(X, y, is_own)
         return self
 
     def _slopes(
-        self, X: NDArray[np.float64], y: Labels, own: NDArray[np.bool_] | None
+        self, X: NDArray[np.float64], y: Labels, is_own: NDArray[np.bool_] | None
     ) -> dict[str, float]:
         """`slopes_`, from the distances of trials by fits without their fold.
 
@@ -309,18 +309,18 @@ class ContactClassifier:
         ]
         X = X[measured]
         y = {task: labels[measured] for task, labels in y.items()}
-        own = None if own is None else own[measured]
+        is_own = None if is_own is None else is_own[measured]
         folds = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
             new = folds == fold
             others = {task: labels[~new] for task, labels in y.items()}
-            owned = None if own is None else own[~new]
+            owned = None if is_own is None else is_own[~new]
             choices = fittable(self.choices, others, owned)
             model = ContactClassifier(choices, self.features, self.widths)
             model.fit(X[~new], others, owned, complete=False)
             for task, classes in model.classes_.items():
-                used = self.choices[task].counts(y[task], own) > 0
+                used = self.choices[task].counts(y[task], is_own) > 0
                 met = new & used & np.isin(y[task], classes)
                 if len(classes) > 1:
                     squares = model.squares(task, X[met])
@@ -331,7 +331,7 @@ class ContactClassifier:
                     right = np.take_along_axis(distances, labels, axis=1)[:, 0]
                     np.put_along_axis(distances, labels, np.inf, axis=1)
                     gaps[task] += (distances.min(axis=1) - right).tolist()
-        return {task: slope(np.array(each)) for task, each in gaps.items()}
+        return {task: slope(np.array(task_gaps)) for task, task_gaps in gaps.items()}
 
     def _projection(
         self,
@@ -343,7 +343,9 @@ class ContactClassifier:
     ) -> Projection:
         """The projection of a space, fitted on some trials, of which one may be there
         often."""
-        tasks = [task for task, own in self.spaces_.items() if own == space]
+        tasks = [
+            task for task, task_space in self.spaces_.items() if task_space == space
+        ]
         choice = self.choices[tasks[0]]
         names, own_widths = types_of(choice.features, self.features, widths)
         return Projection(
@@ -410,22 +412,20 @@ class ContactClassifier:
 
 
 def columns_of(
-    wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
+    names: Sequence[str], features: Sequence[str], widths: Sequence[int]
 ) -> NDArray[np.int64]:
-    """The columns of vectors of `features` that hold the `wanted` ones, rising; all if
+    """The columns of vectors of `features` that hold the `names` ones, rising; all if
     empty."""
-    taken = [not wanted or name in wanted for name in features]
+    taken = [not names or name in names for name in features]
     return np.flatnonzero(np.repeat(taken, widths))
 
 
 def types_of(
-    wanted: Sequence[str], features: Sequence[str], widths: Sequence[int]
+    names: Sequence[str], features: Sequence[str], widths: Sequence[int]
 ) -> tuple[list[str], list[int]]:
-    """Names and widths of the `wanted` among the features, in their order; all if
+    """Names and widths of the `names` among the features, in their order; all if
     empty."""
     taken = [
-        (f, w)
-        for f, w in zip(features, widths, strict=True)
-        if not wanted or f in wanted
+        (f, w) for f, w in zip(features, widths, strict=True) if not names or f in names
     ]
     return [name for name, _ in taken], [width for _, width in taken]

@@ -94,7 +94,9 @@ class Course:
         every = np.arange(self.unknown.shape[1])
         at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
         last = np.max(at, axis=0)
-        by_part = [wrong[own, every] for wrong, own in zip(self.wrong, at, strict=True)]
+        by_part = [
+            wrong[part, every] for wrong, part in zip(self.wrong, at, strict=True)
+        ]
         return last, np.any(
             [*by_part, self.unknown[last, every] & self.withheld], axis=0
         )

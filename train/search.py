@@ -160,13 +160,13 @@ class Decomposition:
             )
         places = []
         for shrinkage in grid.shrinkages:
-            each = [
+            parts = [
                 self._discriminants(target, shrinkage)
                 for target in grid.targets or (task,)
             ]
             coordinates = (
                 np.hstack(some)[:, : grid.most_directions]
-                for some in zip(*each, strict=True)
+                for some in zip(*parts, strict=True)
             )
             places.append(_nearest(*_rounded(*coordinates), k))
         return np.stack(places)

@@ -119,7 +119,7 @@ def _fold(
     form = others.features, others.widths
     with single_thread():
         models = [
-            ContactClassifier(choices, *form).fit(x, others.y, others.own)
+            ContactClassifier(choices, *form).fit(x, others.y, others.is_own)
             for x in others.X
         ]
         return answers(models, vectors.X[:, left_out])
@@ -284,7 +284,7 @@ class SequentialClassifier:
         y: Mapping[str, NDArray[np.str_]],
         folds: NDArray[np.int64],
         fold_choices: Sequence[Mapping[str, Choice]],
-        own: NDArray[np.bool_] | None = None,
+        is_own: NDArray[np.bool_] | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
 
@@ -293,7 +293,7 @@ class SequentialClassifier:
             y: {task: (n,) labels}; empty where a trial has none.
             folds: (n,) from 0, or -1 for trials that calibrate nothing.
             fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
-            own: see `ContactClassifier.fit`.
+            is_own: see `ContactClassifier.fit`.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
@@ -304,10 +304,10 @@ class SequentialClassifier:
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
                 "export without decision points"
             )
-        self._fit_points(X, y, own)
+        self._fit_points(X, y, is_own)
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(X, y, folds)
-        chosen_without = self._held_out(X, y, folds, fold_choices, own)
+        chosen_without = self._held_out(X, y, folds, fold_choices, is_own)
         self.right_ = chosen_without.right
         rules = self._certify(chosen_without, folds, tested)
         # Margins are on the scale of the settings. Curves that the exported model uses
@@ -318,7 +318,7 @@ class SequentialClassifier:
             curves = chosen_without
         else:
             same = [self.choices] * len(fold_choices)
-            curves = self._held_out(X, y, folds, same, own)
+            curves = self._held_out(X, y, folds, same, is_own)
         self._calibrate(curves, tested, rules)
         return self
 
@@ -328,10 +328,10 @@ class SequentialClassifier:
         y: Mapping[str, NDArray[np.str_]],
         folds: NDArray[np.int64],
         fold_choices: Sequence[Mapping[str, Choice]],
-        own: NDArray[np.bool_] | None,
+        is_own: NDArray[np.bool_] | None,
     ) -> HeldOut:
         """Answers to each trial by models with some settings, without its fold."""
-        vectors = Vectors(X, y, self.features, self.widths, own)
+        vectors = Vectors(X, y, self.features, self.widths, is_own)
         by_fold = held_out(vectors, folds, fold_choices, self.jobs)
         right = {}
         margins = {}
@@ -348,7 +348,7 @@ class SequentialClassifier:
         self,
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
-        own: NDArray[np.bool_] | None,
+        is_own: NDArray[np.bool_] | None,
     ) -> None:
         """Fit the classifier of each decision point."""
         kept = _taken(self.choices.values(), self.features)
@@ -360,7 +360,7 @@ class SequentialClassifier:
         with single_thread():
             for x in X[..., self.columns_]:
                 classifier = ContactClassifier(self.choices, *self.types_)
-                self.decision_points_.append(classifier.fit(x, y, own))
+                self.decision_points_.append(classifier.fit(x, y, is_own))
 
     def _fit_novelty(
         self,
@@ -493,11 +493,11 @@ class SequentialClassifier:
         courses = {}
         for task in self.choices:
             deciding = tuple(self.products_.get(task, (task,)))
-            own = np.all([tested[t] for t in (task, *deciding)], axis=0)
-            sure = [scores[part][:, own] for part in deciding]
-            wrong = [~right[part][:, own] for part in deciding]
+            decided = np.all([tested[t] for t in (task, *deciding)], axis=0)
+            sure = [scores[part][:, decided] for part in deciding]
+            wrong = [~right[part][:, decided] for part in deciding]
             courses[task] = Course(
-                sure, wrong, unknown[:, own], task == self.novelty_.task
+                sure, wrong, unknown[:, decided], task == self.novelty_.task
             )
         return courses
 

@@ -154,13 +154,13 @@ def chosen(
         accuracy: of decisions on a data set, where missed touches count as wrong.
     """
     unfelt = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
-    own = dataset.layout.threshold_counts, dataset.layout.onset
+    present = dataset.layout.threshold_counts, dataset.layout.onset
     levels = dict.fromkeys(
-        (round(part * own[0]), round(part * own[1])) for part in LOWER
+        (round(part * present[0]), round(part * present[1])) for part in LOWER
     )
-    if not unfelt or own[1] == 0:
+    if not unfelt or present[1] == 0:
         return dataset, []
-    tried = [dataset, *(load(*level) for level in levels if level != own)]
+    tried = [dataset, *(load(*level) for level in levels if level != present)]
     shares = [accuracy(candidate) for candidate in tried]
     best = int(np.argmax(shares))
     n = len(dataset.trials) + len(dataset.untouched)
@@ -171,7 +171,7 @@ def chosen(
     return tried[best], [
         f"the threshold is {layout.threshold_counts} and the onset {layout.onset} "
         "counts: at "
-        f"{own[0]} and {own[1]} counts, {unfelt} recordings show no contact; in "
+        f"{present[0]} and {present[1]} counts, {unfelt} recordings show no contact; in "
         "cross-validation "
         f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
     ]

@@ -23,7 +23,7 @@ class Vectors:
         y: {task: (n,) labels}.
         features: names of the feature types, in the order of X.
         widths: columns of each; equal where None.
-        own: (n,) whether a trial is the owner's, where simulated ones are among them;
+        is_own: (n,) whether a trial is the owner's, where simulated ones are among them;
             see `train.pipeline.Choice.counts`.
     """
 
@@ -31,7 +31,7 @@ class Vectors:
     y: Labels = field(repr=False)
     features: Sequence[str] = FEATURES
     widths: Sequence[int] | None = None
-    own: NDArray[np.bool_] | None = field(default=None, repr=False)
+    is_own: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -44,5 +44,5 @@ class Vectors:
             self,
             X=self.X[..., trials, :],
             y={task: labels[trials] for task, labels in self.y.items()},
-            own=None if self.own is None else self.own[trials],
+            is_own=None if self.is_own is None else self.is_own[trials],
         )

@@ -145,8 +145,8 @@ class UsbAdapter:
         if standard or not FUNCTIONS <= request < TRANSFER + 4:
             raise bus_error(errno.EOPNOTSUPP, self.bus.name)
         if request < TRANSFER:
-            own = {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}
-            return own[request]
+            answers = {FUNCTIONS: CARRIES, DELAY: b"", STATUS: bytes([self._status])}
+            return answers[request]
         return self._transfer(request, value, index, length, data)
 
     def _transfer(

@@ -86,8 +86,8 @@ def _kinds(
 
 def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigTable:
     """A chip's table with the keys that its bus gives for all chips."""
-    given = {key: bus.raw[key] for key in keys if key in bus.raw}
-    return ConfigTable({**given, **chip.raw}, chip.where, chip.prefix)
+    shared = {key: bus.raw[key] for key in keys if key in bus.raw}
+    return ConfigTable({**shared, **chip.raw}, chip.where, chip.prefix)
 
 
 def _port(table: ConfigTable) -> tuple[str, int]:

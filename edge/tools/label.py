@@ -136,8 +136,8 @@ def _relabel(
     for path, recording in chosen:
         meta = recording.meta
         labels = review.accepted(meta) if arguments.accept else {}
-        wanted = replace(change, labels={**labels, **change.labels})
-        after = changed(str(path), meta, wanted)
+        relabelled = replace(change, labels={**labels, **change.labels})
+        after = changed(str(path), meta, relabelled)
         if recording.labels != after.get("labels", {}):
             differing.append((path, after))
     if not differing:
@@ -227,9 +227,9 @@ def _relabelled(journal: Path) -> list[Path]:
     """
     entries = parse_json(read_text(journal), str(journal))
     with parsing(str(journal), "a list of files and labels", "; delete it"):
-        wanted = [(Path(name), dict(labels)) for name, labels in entries]
+        changes = [(Path(name), dict(labels)) for name, labels in entries]
     relabelled = []
-    for path, labels in wanted:
+    for path, labels in changes:
         if path.is_file():
             recording = load(path)
             if recording.labels != labels:

@@ -70,15 +70,15 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     """
     labels = meta.get("labels", {})
     decided = decisions(meta)
-    found = set()
+    names = set()
     if not labels or any(task not in labels for task in decided):
-        found.add("unlabelled")
+        names.add("unlabelled")
     for task, answer in decided.items():
         if _is_unsure(answer):
-            found.add("unsure")
+            names.add("unsure")
         if task in labels and labels[task] != answer["label"]:
-            found.add("wrong")
-    return [kind for kind in KINDS if kind in found]
+            names.add("wrong")
+    return [kind for kind in KINDS if kind in names]
 
 
 def _is_unsure(answer: Mapping[str, Any]) -> bool:

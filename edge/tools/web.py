@@ -230,8 +230,8 @@ class WebServer:
             self._drop(browser)
             return
         browser.taken += piece
-        request, found, rest = browser.taken.partition(b"\r\n")
-        if found:
+        request, line_end, rest = browser.taken.partition(b"\r\n")
+        if line_end:
             self._take_request(browser, request, rest)
         elif len(browser.taken) > LARGEST_HEAD:
             self._answer(browser, HTTPStatus.REQUEST_URI_TOO_LONG)
@@ -247,8 +247,8 @@ class WebServer:
             self._answer(browser, HTTPStatus.UNAUTHORIZED, WRONG_TOKEN, kind)
             return
         # A head without fields ends with the first line.
-        head, found, body = (b"\r\n" + rest).partition(b"\r\n\r\n")
-        if not found:
+        head, head_end, body = (b"\r\n" + rest).partition(b"\r\n\r\n")
+        if not head_end:
             if len(browser.taken) > LARGEST_HEAD:
                 status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
                 self._answer(browser, status)
@@ -275,9 +275,9 @@ class WebServer:
         host = fields.get("host")
         if host is None:
             return True  # HTTP 1.0 names none
-        own = str(browser.socket.getsockname()[0])
+        address = str(browser.socket.getsockname()[0])
         name = host.rpartition(":")[0] if not host.endswith("]") else host
-        known = self._names | {own, f"[{own}]"}
+        known = self._names | {address, f"[{address}]"}
         origin = fields.get("origin")
         from_here = origin is None or origin == f"http://{host}"
         return from_here and (name or host).removesuffix(".local") in known

@@ -171,13 +171,13 @@ class Chain:
         joints = []
         for j in self.joints:
             optional = {key: getattr(j, key) for key in (*STEPS, "limits")}
-            given = {
+            fields = {
                 k: list(value)
                 for k, value in optional.items()
                 if value not in (ZERO, None)
             }
             joints.append(
-                {"name": j.name, "axis": list(j.axis), "type": j.kind, **given}
+                {"name": j.name, "axis": list(j.axis), "type": j.kind, **fields}
             )
         return {"base": self.base, "tip": self.tip, "joint": joints}
 

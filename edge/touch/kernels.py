@@ -92,8 +92,8 @@ class KernelTable:
 def convolution_of_bias(biases: int) -> NDArray[np.int64]:
     """(biases,) the convolution that each bias belongs to, from the number of
     biases."""
-    each = np.repeat(BIASES[biases], len(KERNELS))
-    return np.repeat(np.arange(CONVOLUTIONS), each)
+    repeats = np.repeat(BIASES[biases], len(KERNELS))
+    return np.repeat(np.arange(CONVOLUTIONS), repeats)
 
 
 @lru_cache

@@ -254,13 +254,16 @@ def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
             f"a newton is {device.counts_per_newton:g} counts, and "
             f"{model.counts_per_newton:g} in training; forces are converted"
         )
-    for name, own, trained in (
+    for name, device_value, trained in (
         ("threshold", device.threshold_counts, used.threshold_counts),
         ("onset", device.onset, used.onset),
     ):
-        if own and abs(own - trained) > THRESHOLD_SHARE * own:
+        if (
+            device_value
+            and abs(device_value - trained) > THRESHOLD_SHARE * device_value
+        ):
             sentences.append(
-                f"the skin's {name} is {own} counts, but the model's of {trained} is "
+                f"the skin's {name} is {device_value} counts, but the model's of {trained} is "
                 "used"
             )
     if device.axes and not model.axes:

@@ -207,18 +207,18 @@ def _no_feature(name: str, base: str) -> InputError:
     )
 
 
-def features(wanted: Sequence[str]) -> tuple[Feature, ...]:
+def features(names: Sequence[str]) -> tuple[Feature, ...]:
     """The feature types of several names.
 
     Raises:
         InputError: no name is given, one of them does not exist, or one is given twice.
     """
-    if not wanted:
+    if not names:
         raise InputError(f"no feature named; the paper's are {', '.join(PAPER)}")
-    twice = {name for name in wanted if wanted.count(name) > 1}
+    twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise InputError(f"the feature {min(twice)} is named twice; leave one out")
-    return tuple(feature(name) for name in wanted)
+    return tuple(feature(name) for name in names)
 
 
 def not_measured(feature: Feature) -> InputError:
@@ -278,9 +278,9 @@ class Measurer:
     """
 
     def __init__(
-        self, layout: SkinLayout, wanted: Sequence[str], joints: int = 0
+        self, layout: SkinLayout, names: Sequence[str], joints: int = 0
     ) -> None:
-        types = features(wanted)
+        types = features(names)
         quantities = {f.quantity for f in types}
         self.layout = layout
         self.motion = "motion" in quantities

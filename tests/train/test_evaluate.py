@@ -38,10 +38,10 @@ def trials(n=36, seed=0):
     return X, y
 
 
-def told_right(choice, X, y, train, test, own=None):
+def told_right(choice, X, y, train, test, is_own=None):
     """Whether the classifier that is exported tells the tests."""
-    own = None if own is None else own[train]
-    model = ContactClassifier({"t": choice}, TWO).fit(X[train], {"t": y[train]}, own)
+    is_own = None if is_own is None else is_own[train]
+    model = ContactClassifier({"t": choice}, TWO).fit(X[train], {"t": y[train]}, is_own)
     return model.classes_["t"][model.decide(X[test])["t"].labels] == y[test]
 
 
@@ -81,11 +81,11 @@ def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
 def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_of_the_estimators():
     X, y = trials()
     y[::5] = ""
-    own = np.arange(len(y)) % 2 == 0
-    folds = np.where(own, np.arange(len(y)) // 2 % 3, -1)
+    is_own = np.arange(len(y)) % 2 == 0
+    folds = np.where(is_own, np.arange(len(y)) // 2 % 3, -1)
     grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
-    table = evaluate(Vectors(X, {"t": y}, TWO, own=own), folds, grids)
-    tested = own & (y != "")
+    table = evaluate(Vectors(X, {"t": y}, TWO, is_own=is_own), folds, grids)
+    tested = is_own & (y != "")
     assert (table.tested["t"] == tested).all()
     for fold in range(3):
         train = folds != fold
@@ -93,7 +93,7 @@ def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_o
         for choice, right in zip(
             table.choices["t"], table.right["t"][fold], strict=True
         ):
-            assert (right[test] == told_right(choice, X, y, train, test, own)).all()
+            assert (right[test] == told_right(choice, X, y, train, test, is_own)).all()
     assert table.nested("t").total == tested.sum()
 
 
@@ -179,7 +179,7 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
         most or sum(len(set(labels[task])) - 1 for task in labels)
     )
     model = ContactClassifier({"t": choice}, TWO)
-    model.fit(X[train], {task: own[train] for task, own in labels.items()})
+    model.fit(X[train], {task: is_own[train] for task, is_own in labels.items()})
     said = model.classes_["t"][model.decide(X[test])["t"].labels]
     assert (table.right["t"][0][0, test] == (said == y[test])).all()
 

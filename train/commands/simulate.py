@@ -45,9 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
         from train.progress import bar
         from train.simulate.run import total_trials, write
 
-        given = {name: getattr(arguments, name) for name in ("jobs", "address")}
+        options = {name: getattr(arguments, name) for name in ("jobs", "address")}
         with bar(total=total_trials(scene), unit="trial", desc=scene.name) as shown:
-            written = write(scene, arguments.out, **given, progress=shown.update)
+            written = write(scene, arguments.out, **options, progress=shown.update)
         lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]
         if written.redrawn:
             lines.append(

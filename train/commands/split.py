@@ -61,7 +61,7 @@ def split(recording: Recording) -> list[Recording]:
     meta = {key: value for key, value in recording.meta.items() if key != "contacts"}
     contacts = []
     previous_end_s = -np.inf
-    for (contact, end_s), own in zip(ends_s.items(), labels, strict=True):
+    for (contact, end_s), contact_labels in zip(ends_s.items(), labels, strict=True):
         start_s = max(contact.onset_s - LEAD_S, previous_end_s)
         span = slice(*np.searchsorted(t, (start_s, end_s), side="right"))
         contacts.append(
@@ -70,7 +70,7 @@ def split(recording: Recording) -> list[Recording]:
                 frames=recording.frames[span],
                 joints=None if joints is None else joints[span],
                 valid=valid[span] if valid is not None and valid.ndim == 3 else valid,
-                meta={**meta, "labels": own},
+                meta={**meta, "labels": contact_labels},
                 shear=None if recording.shear is None else recording.shear[span],
             )
         )

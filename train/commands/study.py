@@ -54,8 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_writable(arguments.out)  # before the work
 
-    given = {
+    options = {
         name: getattr(arguments, name) for name in ("scene", "jobs", "address", "seeds")
     }
-    print(study(arguments.data, arguments.out, **given))
+    print(study(arguments.data, arguments.out, **options))
     return 0

@@ -108,7 +108,7 @@ def angles_at(
     """
     whole = np.unwrap(angles, axis=0)
     columns = [np.interp(t, joints_t, column) for column in whole.T]
-    found = np.stack(columns, axis=1)
+    times = np.stack(columns, axis=1)
     gap_s = release_s
     if len(joints_t) > 1:
         gap_s = max(release_s, GAP_STEPS * float(np.median(np.diff(joints_t))))
@@ -118,5 +118,5 @@ def angles_at(
     outside_s = np.maximum(joints_t[0] - t, t - joints_t[-1])
     # A clock counts in steps of its own; a gap is longer by more than rounding.
     unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
-    found[unknown] = np.nan
-    return np.asarray(found)
+    times[unknown] = np.nan
+    return np.asarray(times)

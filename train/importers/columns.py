@@ -101,24 +101,24 @@ class Wishes:
     rate: float | None = None
 
 
-def columns(table: Table, names: Sequence[str], wanted: str) -> list[str]:
+def columns(table: Table, names: Sequence[str], terms: str) -> list[str]:
     """The names in a list of names, numbers and ranges.
 
     Args:
         table: whose columns they are.
         names: of its columns as they stand in the file.
-        wanted: such as `s1-s16,force`, or `3-5` for places counted from 1; `q` also
+        terms: such as `s1-s16,force`, or `3-5` for places counted from 1; `q` also
             stands for q.1, q.2, ...
 
     Raises:
         InputError: the table has no such column.
     """
     chosen: list[str] = []
-    for term in wanted.split(","):
+    for term in terms.split(","):
         chosen += _term(table, names, term.strip())
     twice = next((name for name in chosen if chosen.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"{table.path}: column {twice} is named twice in {wanted}")
+        raise InputError(f"{table.path}: column {twice} is named twice in {terms}")
     return chosen
 
 

@@ -312,11 +312,11 @@ def _called(place: Path, task: str) -> tuple[str, dict[str, str], str]:
     """The name and label of the trial at a place in the folder, and where the label
     comes from."""
     folders = [part for part in place.parts[:-1] if not NUMBERED.fullmatch(part)]
-    own = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
+    stem = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
     name = "_".join(place.parts)
     if folders:
         return name, {task: folders[-1]}, "the folder's name"
-    return name, {task: own}, "the file's name"
+    return name, {task: stem}, "the file's name"
 
 
 def _labels(

@@ -30,9 +30,11 @@ def trials(
         parsing(str(path), "a readable bag", "; copy it again"),
         AnyReader([path], default_typestore=types) as reader,
     ):
-        wanted = [c for c in reader.connections if log.takes(c.topic, c.msgtype)]
+        connections = [c for c in reader.connections if log.takes(c.topic, c.msgtype)]
         # With an empty list, AnyReader would give every message of the bag.
-        for connection, logged_ns, raw in reader.messages(wanted) if wanted else ():
+        for connection, logged_ns, raw in (
+            reader.messages(connections) if connections else ()
+        ):
             message = reader.deserialize(raw, connection.msgtype)
             log.ros(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
     yield path.stem, log.recording()

@@ -365,18 +365,18 @@ class Log:
         """Angles (n, dof) at the frames' times, and the joints' names if the log has
         them."""
         logged = tuple(joints)
-        wanted = self._wanted(topic, logged)
+        field = self._wanted(topic, logged)
         release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
         columns = []
-        for name in wanted:
+        for name in field:
             stream = joints[name]
             at = np.array(stream.logged if by_logging else stream.stamps)
             order = clock.order(at, f"{self.path}: {topic}", "message")
             angles = np.array(stream.values)[order.kept, None]
             columns.append(clock.angles_at(t, at[order.kept], angles, release_s)[:, 0])
-        found = np.stack(columns, axis=1)
-        unknown = ~np.isfinite(found).all(axis=1)
-        found[unknown] = np.nan
+        values = np.stack(columns, axis=1)
+        unknown = ~np.isfinite(values).all(axis=1)
+        values[unknown] = np.nan
         if unknown.all():
             raise InputError(
                 f"{self.path}: {topic} has no joint angle at the time of any frame; "
@@ -388,7 +388,7 @@ class Log:
                 f"{len(t)} frames, where they are unknown"
             )
         named = logged != tuple(map(str, range(len(logged))))
-        return found, wanted if named else None
+        return values, field if named else None
 
     def _wanted(self, topic: str, logged: Sequence[str]) -> tuple[str, ...]:
         """The joints whose angles are taken, in their order."""
@@ -473,11 +473,11 @@ def field_values(message: Any, name: str) -> NDArray[np.float64]:
     Raises:
         Unusable: the message has no such field, or no numbers in it.
     """
-    found: Any = message
+    value: Any = message
     for part in name.split("."):
-        found = _part(found, part)
+        value = _part(value, part)
     try:
-        values = np.asarray(found, dtype=np.float64)
+        values = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise Unusable(f"has no numbers in {name}") from None
     return values if values.ndim else values[None]

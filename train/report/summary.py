@@ -74,12 +74,12 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
     price."""
     rows: list[Row] = []
     for i, candidate in enumerate(fitted.candidates):
-        own = {(grid.features, grid.projection) for grid in candidate.grids}
+        pairs = {(grid.features, grid.projection) for grid in candidate.grids}
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
             star = (
                 "*"
-                if (chosen.choice.features, chosen.choice.projection) in own
+                if (chosen.choice.features, chosen.choice.projection) in pairs
                 else " "
             )
             result = chosen.candidates[i]

@@ -40,8 +40,8 @@ class Stopwatch:
             begun = time.perf_counter()
             answer = call.function(*arguments)
             took = time.perf_counter() - begun
-            own = took - self._inner.pop()
-            self.seconds[call.owner] = self.seconds.get(call.owner, 0.0) + own
+            alone = took - self._inner.pop()
+            self.seconds[call.owner] = self.seconds.get(call.owner, 0.0) + alone
             self._inner[-1] += took
             return answer
 
@@ -100,9 +100,9 @@ def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
             reading.frames()
     seconds = time.perf_counter() - begun
     of_effects = {name: watch.seconds.get(name, 0.0) for name in callers}
-    each = {name: of_effects[name] / callers[name] for name in callers}
-    each[BASE] = (seconds - sum(of_effects.values())) / len(specs)
-    return Costs(len(specs), seconds, each)
+    a_trial = {name: of_effects[name] / callers[name] for name in callers}
+    a_trial[BASE] = (seconds - sum(of_effects.values())) / len(specs)
+    return Costs(len(specs), seconds, a_trial)
 
 
 def duration(scene: Scene) -> str:

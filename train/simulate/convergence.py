@@ -78,12 +78,12 @@ def kinds(
     for item in scene.objects:
         for condition in item.conditions:
             effects = tuple(required_effects(scene, item, condition))
-            given = [
+            steps = [
                 scene.step_s[name]
                 for name in ("base", *effects)
                 if name in scene.step_s
             ]
-            step_s = min(given, default=1.0 / scene.trials["rate_hz"])
+            step_s = min(steps, default=1.0 / scene.trials["rate_hz"])
             if convergences and effects in convergences:
                 step_s = convergences[effects].step_s
             trials = out.setdefault(effects, [])
@@ -246,8 +246,8 @@ def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
     specs = tuple(spec for kind in kinds for spec in kind.specs)
     t = begin(scene, specs)
     stiffness = total(t.weight) * total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
-    if "stems" in t.own:
-        stems = total(t.own["stems"].stiffness)
+    if "stems" in t.states:
+        stems = total(t.states["stems"].stiffness)
         stiffness = np.where(stems > 0.0, stems, stiffness)
     steps = SWING_PART * np.sqrt(
         t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness

@@ -59,7 +59,7 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     streamed = [(trial.key, trial.attempt) for trial in specs]
     out: dict[str, Array] = {}
     for group in dict.fromkeys(streamed):
-        members = [i for i, own in enumerate(streamed) if own == group]
+        members = [i for i, stream in enumerate(streamed) if stream == group]
         for name, drawn in _values(scene, [specs[i] for i in members]).items():
             out.setdefault(name, np.full(len(specs), np.nan))[members] = drawn
     return out
@@ -235,7 +235,7 @@ class _Log:
         sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
         for effect in t.plan.calls:
             for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
-                sources[name] = t.own[effect], attribute
+                sources[name] = t.states[effect], attribute
         shape = t.n, frames if images else 0, *t.image.shape[:2]
         further = images_of(t) if images else {}
         log = cls(
@@ -267,7 +267,7 @@ class _Log:
             self.window[ends[touched], k[touched]] = np.moveaxis(counts, -1, 0)
         for effect, names in self.further.items():
             for place, name in enumerate(names):
-                loads = getattr(t.own[effect], name).take(ends, -1) * scale
+                loads = getattr(t.states[effect], name).take(ends, -1) * scale
                 self.images[effect][ends, k, ..., place] = np.moveaxis(loads, -1, 0)
 
 

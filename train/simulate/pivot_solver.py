@@ -154,12 +154,12 @@ class Pivots:
 
     def slope(self, y: Array, loads: Loads, p: Array) -> Array:
         """(n,) the slope of the energy at y along -p."""
-        given, invertible = self.arm(y)
+        inverse, invertible = self.arm(y)
         single = (
             p[0] * ((y[0] - self.free[0]) / self.c[0] + loads.force)
             + p[1] * loads.moment
         )
-        double = p[0] * (loads.force - given[0]) + p[1] * (loads.moment - given[1])
+        double = p[0] * (loads.force - inverse[0]) + p[1] * (loads.moment - inverse[1])
         return np.asarray(np.where(invertible, -double, -single))
 
     def agreed(self, y: Array, loads: Loads) -> Array:
@@ -168,13 +168,13 @@ class Pivots:
         The depth of a stiff bed is mostly rounding error; the way of the arm is not.
         """
         c00, c01, _ = self.c
-        given, invertible = self.arm(y)
+        inverse, invertible = self.arm(y)
         single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(
             c00 > 0.0, c00, 1.0
         )
         stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
-        force = np.where(stiff, np.where(invertible, given[0], single), loads.force)
-        moment = np.where(stiff & invertible, given[1], loads.moment)
+        force = np.where(stiff, np.where(invertible, inverse[0], single), loads.force)
+        moment = np.where(stiff & invertible, inverse[1], loads.moment)
         return np.where(force > 0.0, np.array([force, moment]), 0.0)
 
 

@@ -132,8 +132,8 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     """The plan of trials, given the effects of each."""
     calls: dict[str, Mask] = {}
     for name in (*SHARED, *EFFECTS):
-        wanted = {name, *SHARED.get(name, ())}
-        mask = np.array([not wanted.isdisjoint(called) for called in effects])
+        callers = {name, *SHARED.get(name, ())}
+        mask = np.array([not callers.isdisjoint(called) for called in effects])
         if mask.any():
             calls[name] = mask
     everyone = np.ones(len(effects), dtype=bool)

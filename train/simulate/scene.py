@@ -239,26 +239,29 @@ def _last_row_m(skin: Cylinder) -> float:
 
 
 def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
-    given = {key: table.get(key, default) for key, default in CODY_SKIN.items()}
+    settings = {key: table.get(key, default) for key, default in CODY_SKIN.items()}
     # Fewer than three columns around the forearm may all face away from an object.
     cols = table.whole("cols", CODY_SKIN["cols"], range(3, 1001))
     if not table.has("column_angles_deg") and cols != CODY_SKIN["cols"]:
         # Columns lie evenly around the forearm where the file gives only their number.
         angles = [360.0 * (column + 0.5) / cols for column in range(cols)]
-        given["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
+        settings["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
         if not table.has("pitch_m"):
             radius = table.number(
                 "radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True
             )
-            given["pitch_m"] = [CODY_SKIN["pitch_m"][0], 2.0 * math.pi * radius / cols]
+            settings["pitch_m"] = [
+                CODY_SKIN["pitch_m"][0],
+                2.0 * math.pi * radius / cols,
+            ]
     table.number(
         "counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True
     )
     taxel = table.value("taxel_n_m", schema.TAXEL)
     if table.has("axes"):
-        given["axes"] = table.whole("axes", 1, (1, 3))
+        settings["axes"] = table.whole("axes", 1, (1, 3))
     table.done()
-    skin = Cylinder.from_dict(given, where=table.where)
+    skin = Cylinder.from_dict(settings, where=table.where)
     if not skin.wraps:
         raise table.fail("wraps", "true: the skin is a cylinder")
     return skin, taxel
@@ -373,14 +376,16 @@ def draw_family(
     count = table.whole("count", allowed=range(1, 1001))
     part = table.value("kinetic_part", PART, [0.8, 0.95])
     push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
-    given = [
+    drawn_keys = [
         key
         for key in schema.keys_of(family)
         if key != "friction_kinetic" and table.has(key)
     ]
     table.done()
     # The draws follow the order of the keys in the file.
-    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in given}
+    ranges = {
+        key: table.value(key, OBJECT[key]) for key in table.raw if key in drawn_keys
+    }
     movable = "movable" in conditions
     shared = {"family": family, "conditions": list(conditions)}
     usual = {

@@ -44,8 +44,8 @@ class SceneTable(ConfigTable):
 
     def value(self, key: str, field: Field, default: object = None) -> Value:
         """A field's number, or its range [low, high]."""
-        given = self.get(key, field.default if default is None else default)
-        ends = given if isinstance(given, list) else [given, given]
+        value = self.get(key, field.default if default is None else default)
+        ends = value if isinstance(value, list) else [value, value]
         if len(ends) != 2:
             raise self.fail(key, "one number or a range [low, high]")
         low, high = (

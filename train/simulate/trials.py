@@ -26,14 +26,14 @@ def pick(values: NDArray[Any], i: Index) -> NDArray[Any]:
 class Trials:
     """n trials of a scene, from the setup to their last step.
 
-    These attributes belong to all trials. An effect keeps its own state in `own`, as a
+    These attributes belong to all trials. An effect keeps its own state in `states`, as a
     small dataclass whose arrays also end in the trial axis; without the effect it does
     not exist.
 
     Attributes:
         values: {name: (n,)} the values drawn for each trial.
         plan: the hooks to run.
-        own: {effect: its state}.
+        states: {effect: its state}.
         usual, steps, left: (n,) the number of steps in a frame away from jolts, in the
             present frame, and still to come in it.
         frame, t, h: (n,) number of frames ended, seconds now, and seconds of a step.
@@ -81,7 +81,7 @@ class Trials:
     specs: tuple[TrialSpec, ...]
     values: dict[str, Array]
     plan: Plan
-    own: dict[str, Any] = field(default_factory=dict)
+    states: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Fill the attributes above with zeros."""
@@ -141,8 +141,8 @@ class Trials:
         """Keep an effect's state, a dataclass; an array that is not given is (n,)
         zeros."""
         empty = {field.name: np.zeros(self.n) for field in fields(state)}
-        self.own[effect] = state(**{**empty, **given})
-        return self.own[effect]
+        self.states[effect] = state(**{**empty, **given})
+        return self.states[effect]
 
     def equilibrium(self, t: Any, i: Index = ALL) -> Array:
         """(dof, n) equilibrium angles of some trials at their times (n,)."""

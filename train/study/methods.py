@@ -53,12 +53,12 @@ def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> 
 def taxels(context: Context) -> NDArray[np.float64]:
     """(n, times * taxels) counts at evenly spaced times; the last frame stays until the
     end."""
-    wanted = np.linspace(0.0, WINDOW_S, TIMES)
+    times = np.linspace(0.0, WINDOW_S, TIMES)
     alive = context.dataset.layout.alive.reshape(-1)
     rows = []
     for trial in context.dataset.trials:
         t = trial.recording.t - trial.onset_s
-        at = np.clip(np.searchsorted(t, wanted, side="right") - 1, 0, len(t) - 1)
+        at = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
         rows.append(trial.recording.frames[at].reshape(TIMES, -1)[:, alive].ravel())
     return np.stack(rows).astype(np.float64)
 

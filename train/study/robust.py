@@ -55,8 +55,8 @@ def attempt_of(trial: Trial) -> int:
     Raises:
         InputError: `meta.simulation` is damaged; the sentence names the file.
     """
-    given = trial.recording.meta.get("simulation", {})
-    table = ConfigTable(given, str(trial.path), "meta.simulation.")
+    simulation = trial.recording.meta.get("simulation", {})
+    table = ConfigTable(simulation, str(trial.path), "meta.simulation.")
     return table.whole("redrawn", 0, range(REDRAWS))
 
 

@@ -32,12 +32,12 @@ class Commands:
         line = f"make export{self._facts}"
         return f"{line} EXPORT='{' '.join(words)}'" if words else line
 
-    def front(self, wanted: str) -> str:
+    def front(self, point: str) -> str:
         """The command that exports a measured model."""
         if not self._by_make:
             file = shlex.quote(str(self.out / "front.json"))
-            return f"{self._export} --front {wanted} --fronts {file}"
-        return f"make export{self._facts} FRONT={wanted}"
+            return f"{self._export} --front {point} --fronts {file}"
+        return f"make export{self._facts} FRONT={point}"
 
     def tradeoff(self, options: str) -> str:
         """The command that makes this report with other options."""

@@ -150,8 +150,11 @@ def _held_out(
 ) -> tuple[Any, ...]:
     """The model that was fitted without a fold, and its answers to the fold's trials
     (`judged`)."""
-    given: dict[str, Any] = {"leave_out": TRIAL, "decision_points_s": decision_points_s}
-    fitted = fit(dataset.part(~test), quick=quick, jobs=1, **given)
+    options: dict[str, Any] = {
+        "leave_out": TRIAL,
+        "decision_points_s": decision_points_s,
+    }
+    fitted = fit(dataset.part(~test), quick=quick, jobs=1, **options)
     model = fitted.sequential
     others = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None

@@ -125,7 +125,7 @@ class Rig:
         still = np.zeros(self.trials.n)
         for _ in range(steps):
             t.plan.run(STEP, t)
-            mover = t.own.get("sliding", SimpleNamespace(slide=still, speed=still))
+            mover = t.states.get("sliding", SimpleNamespace(slide=still, speed=still))
             now = (t.t, t.loads[0], t.q[0], t.equilibrium(t.t)[0])
             seen.append(np.array([*now, mover.slide, mover.speed, t.depth[0]]))
         return Trace(*np.moveaxis(seen, 1, 0))

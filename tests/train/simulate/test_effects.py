@@ -47,9 +47,9 @@ def test_an_object_calls_for_it_by_its_key():
     hard = {**one_object()[0], "name": "other"}
     batch = run(make([soft, hard]))
     alone = run(make([hard]))
-    crept = batch.trials.own["sponge"].crept
+    crept = batch.trials.states["sponge"].crept
     assert (crept[:2] > 0.01).all()
     assert (crept[2:] == 0.0).all()
     assert batch.force[2:].tobytes() == alone.force.tobytes()
     assert (batch.force[0].max() < batch.force[2].max()).all()
-    assert "sponge" not in alone.trials.own
+    assert "sponge" not in alone.trials.states

@@ -113,14 +113,14 @@ def test_3_only_the_called_effects_state_exists():
     for i in range(len(kinds(trial_scene))):
         batch, effects = batch_of(trial_scene, i)
         expected = STATE & {*effects, "viscous"}
-        assert set(batch.trials.own) == expected, effects
+        assert set(batch.trials.states) == expected, effects
         traces = {"sliding": "slide_m", "turning": "turn_rad"}
         kept = {name for effect, name in traces.items() if effect in effects}
         assert set(batch.traces) == {"depth_m", *kept}
         assert batch.seen[0].kept is not None
         assert batch.seen[0].valid is not None
     bare = batch_of(scene(), 0)[0]
-    assert bare.trials.own == {}
+    assert bare.trials.states == {}
     assert set(bare.traces) == {"depth_m"}
     assert bare.seen[0].times is bare.seen[0].kept is bare.seen[0].valid is None
 

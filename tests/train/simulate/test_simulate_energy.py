@@ -102,10 +102,10 @@ class Ledger:
         self.q = t.q.copy()
         self.v = v
         idle = load == 0.0
-        if "viscous" in t.own:
-            idle = idle & (np.abs(t.own["viscous"].load).max(axis=0) < 1e-6)
-        if "sliding" in t.own:
-            mover = t.own["sliding"]
+        if "viscous" in t.states:
+            idle = idle & (np.abs(t.states["viscous"].load).max(axis=0) < 1e-6)
+        if "sliding" in t.states:
+            mover = t.states["sliding"]
             way = mover.slide - self.slide
             self.slide = mover.slide.copy()
             self.pushed.append(load * way)
@@ -137,9 +137,9 @@ class Ledger:
 def lean(t, mover):
     """The energy stored in the lean of a thing that tips; beyond the balance it gives
     it back."""
-    if "tipping" not in t.own:
+    if "tipping" not in t.states:
         return 0.0
-    own = t.own["tipping"]
+    own = t.states["tipping"]
     stored = own.force * (mover.slide - mover.slide**2 / (2.0 * own.travel))
     return np.where(own.tips, stored, 0.0)
 

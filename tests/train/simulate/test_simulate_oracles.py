@@ -134,7 +134,7 @@ class TestSliding:
         for mu, tips in ((0.30, False), (0.60, True)):
             keys = {"base_m": 0.36, "height_m": height, "width_m": 0.05}
             batch = run(make(movable(1.0, mu, mu * 0.9, **keys)))
-            assert bool(batch.trials.own["tipping"].tips[0]) is tips
+            assert bool(batch.trials.states["tipping"].tips[0]) is tips
             start = int(np.argmax(batch.traces["slide_m"][0] > 0.0))
             hold = min(mu, 0.36 / (2 * height)) * GRAVITY
             assert batch.force[0, start - 1] <= hold
@@ -257,7 +257,7 @@ class TestFriction:
         mu = 0.4
         plain = run(make(one_object(width_m=0.05)))
         held = run(make(one_object(width_m=0.05, skin_friction=mu)))
-        shear = held.trials.own["friction"]
+        shear = held.trials.states["friction"]
         force = held.force[0, -1]
         assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
         c_nn = held.trials.compliance[0, 0]
@@ -278,21 +278,21 @@ class TestFriction:
                 pose = t.kinematics.pose(t.q_frame + turned * np.eye(5)[j][:, None])
                 point = pose.origin + np.einsum("kin,kn->in", pose.rotation, local)
                 moved.append((point * t.along_face).sum(axis=0))
-            want = t.own["friction"].jacobian[j]
+            want = t.states["friction"].jacobian[j]
             np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
 
     def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(
         self,
     ):
         stuck = make(one_object(width_m=0.05, skin_friction=5.0), "tilt", after_s=4.0)
-        shear = run(replace(stuck, travel_s=0.6)).trials.own["friction"]
+        shear = run(replace(stuck, travel_s=0.6)).trials.states["friction"]
         assert (np.abs(shear.pull) > 0.5).all()
         np.testing.assert_allclose(1e4 * shear.stretch, shear.pull, rtol=1e-3)
 
     def test_a_smooth_soft_object_presses_along_the_forearms_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
         t = run(make(foam, "tilt")).trials
-        push = t.loads[0] * t.normal + t.own["friction"].pull * t.along_face
+        push = t.loads[0] * t.normal + t.states["friction"].pull * t.along_face
         forearm = t.kinematics.pose(t.q_frame).rotation[2]
         askew = (t.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
@@ -303,7 +303,7 @@ class TestFriction:
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
         t = batch.trials
-        push = t.loads[0] * t.normal + t.own["friction"].pull * t.along_face
+        push = t.loads[0] * t.normal + t.states["friction"].pull * t.along_face
         forearm = t.kinematics.pose(t.q).rotation[2]
         own = t.normal - forearm * (t.normal * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
@@ -313,8 +313,8 @@ class TestFriction:
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         held = run(make(movable(0.05, 0.5, 0.5, skin_friction=0.5, width_m=0.2)))
-        shear = held.trials.own["friction"]
-        mover = held.trials.own["sliding"]
+        shear = held.trials.states["friction"]
+        mover = held.trials.states["sliding"]
         shear.pull = 5.0 / held.trials.along_face[2]
         friction.drag(held.trials, ALL)
         assert mover.weight.tolist() == [0.0, 0.0]
@@ -325,8 +325,8 @@ class TestFriction:
             for more in ({}, {"skin_friction": 0.5})
         )
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
-        shear = held.trials.own["friction"]
-        mover = held.trials.own["sliding"]
+        shear = held.trials.states["friction"]
+        mover = held.trials.states["sliding"]
         assert mover.weight[0] == pytest.approx(
             GRAVITY - shear.pull[0] * held.trials.along_face[2, 0], rel=0.01
         )
@@ -339,14 +339,14 @@ class TestTilt:
         tilt.locate(t, ALL)
         before = t.y_frame.copy()
         jacobian = t.jacobian.copy()
-        middle = t.own["tilt"].lever[0].copy()
+        middle = t.states["tilt"].lever[0].copy()
         for j in range(4):
             t.q[j] += 1e-6
             tilt.locate(t, ALL)
             # The point of the forearm that is looked at moves along it; the Jacobian's
             # does not.
             moved = t.y_frame - before
-            moved[0] -= before[1] * (middle - t.own["tilt"].lever[0])
+            moved[0] -= before[1] * (middle - t.states["tilt"].lever[0])
             np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
             t.q[j] -= 1e-6
 
@@ -354,7 +354,7 @@ class TestTilt:
         batch = run(
             make(movable(0.3, 0.3, 0.25, width_m=2.0, skin_friction=0.3), "tilt")
         )
-        lever = batch.trials.own["tilt"].lever
+        lever = batch.trials.states["tilt"].lever
         assert (batch.traces["slide_m"][:, -1] > 0.2).all()
         assert (lever[0] == 0.0).all()  # as near to it as a row is
 

@@ -59,7 +59,9 @@ class TestTurning:
         radius = 0.12
         felt = 1.0 / (1.0 / MASS + aside**2 / (0.5 * MASS * radius**2))
         batch = push(aside_m=aside, foot_m=2.0 * radius)
-        assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.trials.states["sliding"].inertia[0] == pytest.approx(
+            felt, rel=1e-12
+        )
 
     def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
         assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
@@ -83,7 +85,7 @@ class TestSlope:
 
     def test_friction_falls_with_the_square_of_the_speed(self):
         t = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).trials
-        mover = t.own["sliding"]
+        mover = t.states["sliding"]
         mover.speed[:] = 0.1
         stribeck.drag(t, ALL)
         friction = 0.2 + 0.4 * math.exp(-4.0)
@@ -98,7 +100,9 @@ class TestToppling:
     def test_it_turns_about_its_edge_as_a_box_does_then_lies_and_stays(self, batch):
         # m (b^2 + (2 h)^2) / 3 about an edge, felt at the height h.
         felt = 0.8 * (0.08**2 + 0.8**2) / 3.0 / 0.4**2
-        assert batch.trials.own["sliding"].inertia[0] == pytest.approx(felt, rel=1e-12)
+        assert batch.trials.states["sliding"].inertia[0] == pytest.approx(
+            felt, rel=1e-12
+        )
         slide = batch.traces["slide_m"][0]
         lies = 0.5 * math.pi * 0.4
         fallen = slide >= lies - 1e-12
@@ -108,8 +112,8 @@ class TestToppling:
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
         # it is.
-        own = batch.trials.own["tipping"]
-        mover = batch.trials.own["sliding"]
+        own = batch.trials.states["tipping"]
+        mover = batch.trials.states["sliding"]
         travel = own.travel[0]
         lies = mover.lies[0]
         slide = batch.traces["slide_m"][0]
@@ -125,7 +129,7 @@ class TestToppling:
 
     def test_let_go_it_falls_back_onto_its_foot(self, batch):
         t = batch.trials
-        mover = t.own["sliding"]
+        mover = t.states["sliding"]
         mover.slide[:] = 1e-6
         mover.speed[:] = 0.0
         t.y[:] = -0.1

@@ -63,29 +63,29 @@ def test_a_pull_beyond_all_limits_is_shared_by_them():
 @pytest.mark.parametrize("add", [(), ("tilt",)])
 def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
     batch = run(scene(box(mu), effects={"add": list(add)}, **SETTINGS, **THREE))
-    along = batch.trials.own["shear"].along.sum(axis=(0, 1))
-    pull = batch.trials.own["friction"].pull
+    along = batch.trials.states["shear"].along.sum(axis=(0, 1))
+    pull = batch.trials.states["friction"].pull
     assert (np.abs(pull) > 0.01).all()
     np.testing.assert_allclose(along, pull, rtol=1e-9)
 
 
 def test_the_skin_is_drawn_against_its_own_motion():
     t = run(scene(box(0.4), **SETTINGS, **THREE)).trials
-    stretch = t.own["friction"].stretch
+    stretch = t.states["friction"].stretch
     assert (stretch < 0.0).all()  # the skin has moved against the face's direction
     forearm = t.kinematics.pose(t.q).rotation[2]
     towards_wrist = -(t.along_face * forearm).sum(axis=0)
     moved = np.sign(stretch * towards_wrist)
-    pulled = np.sign(t.own["shear"].along.sum(axis=(0, 1)))
+    pulled = np.sign(t.states["shear"].along.sum(axis=(0, 1)))
     assert (moved == -pulled).all()
 
 
 def test_taxels_that_all_stick_bear_alike():
     t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
-    along = t.own["shear"].along
+    along = t.states["shear"].along
     loaded = t.image > 0.0
     assert loaded.sum() > 10
-    alike = t.own["friction"].pull / loaded.sum(axis=(0, 1))
+    alike = t.states["friction"].pull / loaded.sum(axis=(0, 1))
     expected = np.where(loaded, alike, 0.0)
     np.testing.assert_allclose(along, expected, rtol=1e-12)
 
@@ -93,7 +93,7 @@ def test_taxels_that_all_stick_bear_alike():
 def test_taxels_that_all_slip_bear_friction_times_their_load():
     slow = {"trials": {"count": 2, "after_s": 4.0}}
     t = run(scene(box(0.05), **slow, **THREE)).trials
-    along = np.abs(t.own["shear"].along)
+    along = np.abs(t.states["shear"].along)
     assert (t.force > 10.0).all()
     # The pull obeys the load of the step before, which is less by its growth.
     np.testing.assert_allclose(along, 0.05 * t.image, rtol=5e-3)
@@ -102,14 +102,14 @@ def test_taxels_that_all_slip_bear_friction_times_their_load():
 def test_no_taxel_leaves_its_cone():
     batch = run(scene(box(0.4), effects={"add": ["tilt"]}, **SETTINGS, **THREE))
     t = batch.trials
-    size = np.hypot(t.own["shear"].along, t.own["shear"].around)
-    slack = np.maximum(np.abs(t.own["friction"].pull) / (0.4 * t.force), 1.0)
+    size = np.hypot(t.states["shear"].along, t.states["shear"].around)
+    slack = np.maximum(np.abs(t.states["friction"].pull) / (0.4 * t.force), 1.0)
     assert (size <= 0.4 * t.image * slack * (1.0 + 1e-12)).all()
 
 
 def test_around_the_forearm_a_load_acts_along_the_faces_normal():
     t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
-    around = t.own["shear"].around
+    around = t.states["shear"].around
     assert (t.image.any(axis=0).sum(axis=0) > 1).all()
     expected = t.image * np.sin(t.column_angle)
     np.testing.assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
@@ -122,21 +122,21 @@ def test_a_face_that_turns_takes_the_normal_with_it():
     foam = {"family": "foam", "skin_friction": 1.0, "width_m": 0.2}
     thing = movable(0.3, 0.2, 0.2, aside_m=0.05, foot_m=0.1, **foam)
     t = run(scene(thing, **SETTINGS, **THREE)).trials
-    turned = t.own["turning"].turned
+    turned = t.states["turning"].turned
     assert (turned > 0.1).all()
-    t.own["friction"].pull[:] = 0.0
+    t.states["friction"].pull[:] = 0.0
     shear.traction(t, ALL)
-    around = t.own["shear"].around
+    around = t.states["shear"].around
     expected = t.image * np.sin(t.column_angle - turned)
     assert np.count_nonzero(expected) > 20
     np.testing.assert_allclose(around, expected, rtol=1e-12)
-    assert not t.own["shear"].along.any()
+    assert not t.states["shear"].along.any()
 
 
 def test_without_skin_friction_there_is_no_shear():
     t = run(scene(one_object(), **SETTINGS, **THREE)).trials
-    assert not t.own["shear"].along.any()
-    assert not t.own["shear"].around.any()
+    assert not t.states["shear"].along.any()
+    assert not t.states["shear"].around.any()
 
 
 def test_nothing_but_the_shear_differs_from_the_scene_without_it():

@@ -309,7 +309,7 @@ class TestBubbles:
     def test_they_stiffen_by_the_gas_law(self, part):
         # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
         t = self.wrap(pop_n=1e6).trials
-        bed = t.own["pop"]
+        bed = t.states["pop"]
         columns = len(t.reach)
         middle = slice(columns // 2, None, columns)
         touched = bed.gaps[middle, 0][:3]
@@ -321,7 +321,7 @@ class TestBubbles:
 
     def test_burst_ones_leave_their_backing(self):
         batch = self.wrap(pop_n=0.5)
-        alive = batch.trials.own["pop"].alive
+        alive = batch.trials.states["pop"].alive
         alive = alive.reshape(4, -1, *alive.shape[1:])
         burst = alive[3] == 1.0
         assert burst.any()
@@ -333,7 +333,7 @@ class TestBubbles:
 
     def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
         t = self.wrap(pop_n=0.5, width_m=0.05).trials
-        bubbles = t.own["pop"]
+        bubbles = t.states["pop"]
         weight = t.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
         left = weight * bubbles.alive[..., 0] * bubbles.stiffness[:, :1]
@@ -346,7 +346,7 @@ class TestBubbles:
 def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
     batch = run(make(one_object(family="foliage", **keys)))
-    stems = batch.trials.own["stems"]
+    stems = batch.trials.states["stems"]
     bent = np.maximum(batch.trials.depth[0] - stems.depth, 0.0)
     assert (bent > 0.03).any()
     assert (stems.stiffness[bent > 0.03] == 0.0).all()
@@ -365,7 +365,7 @@ def test_stems_that_have_slipped_off_damp_no_more():
     keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
     batch = run(make(one_object(family="foliage", **keys)))
     assert (batch.force.max(axis=1) > 0.5).all()
-    assert (batch.trials.own["stems"].stiffness == 0.0).all()
+    assert (batch.trials.states["stems"].stiffness == 0.0).all()
     assert (batch.force[:, -1] == 0.0).all()
 
 
@@ -382,7 +382,7 @@ def test_no_row_that_the_face_does_not_cover_is_the_deepest():
 def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
     t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
-    viscous = t.own["viscous"]
+    viscous = t.states["viscous"]
     elastic = contact.spring_loads(t.line_depth, t.gaps, t.stiffness, t.weight).sum(
         axis=0
     )
@@ -396,7 +396,7 @@ def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
         one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0
     )
     t = run(replace(wrap, travel_s=0.6)).trials
-    bubbles = t.own["pop"]
+    bubbles = t.states["pop"]
     assert (np.ptp(bubbles.alive.sum(axis=0), axis=0) > 0.0).all()
     loads = contact.spring_loads(
         t.line_depth, bubbles.gaps, bubbles.stiffness, t.weight

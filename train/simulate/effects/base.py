@@ -183,9 +183,9 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     never pulls.
     """
     law = pick(t.law_gaps, i), pick(t.slopes, i), pick(t.intercepts, i)
-    if "viscous" in t.own:
-        load = pick(t.own["viscous"].load[0], i)
-        gain = pick(t.own["viscous"].gain, i)
+    if "viscous" in t.states:
+        load = pick(t.states["viscous"].load[0], i)
+        gain = pick(t.states["viscous"].gain, i)
         elastic = closed_form(*law, y - c * load, c * gain)
         force = gain * elastic + load
         force = np.where((elastic > 0.0) & (force > 0.0), force, 0.0)

@@ -60,7 +60,7 @@ def stand(t: Trials, i: Index) -> None:
 def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
     """The lower and the upper limit of the pull under the present load."""
     force = pick(t.loads[0], i)
-    fits = pick(t.own["friction"].fits, i)
+    fits = pick(t.states["friction"].fits, i)
     limit = pick(t.values["skin_friction"], i) * force
     tilt = pick(t.y_frame[1], i)
     normal = np.where(fits, -force * tilt / np.sqrt(1.0 - tilt * tilt), 0.0)
@@ -69,18 +69,18 @@ def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
 
 def reach_along(t: Trials, i: Index) -> None:
     """Find how the joints move the skin along the face."""
-    state = t.own["friction"]
+    state = t.states["friction"]
     skin = pick(t.point, i) + t.skin.radius_m * pick(t.normal, i)
     turned = cross(pick(t.along_face, i)[:, None], pick(t.axes, i))
     lever = dot(skin[:, None] - pick(t.origins, i), turned)
-    given = pick(t.give, i) * lever
-    state.jacobian[:, i], state.give[i] = lever, total(lever * given)
-    state.coupled[:, i] = total(pick(t.jacobian, i) * given[:, None])
+    compliance = pick(t.give, i) * lever
+    state.jacobian[:, i], state.give[i] = lever, total(lever * compliance)
+    state.coupled[:, i] = total(pick(t.jacobian, i) * compliance[:, None])
 
 
 def predict(t: Trials, i: Index) -> None:
     """Choose the pull of this step, and let arm and contact give way to it."""
-    state = t.own["friction"]
+    state = t.states["friction"]
     q = pick(t.q, i)
     q_free = pick(t.q_free, i)
     loads = pick(t.loads, i)
@@ -102,14 +102,14 @@ def drag(t: Trials, i: Index) -> None:
     """Add the shear to the weight of an object that slides."""
     i = np.arange(t.n)[i][t.plan.also("sliding", i)]
     if i.size:
-        lifts = pick(t.own["friction"].pull, i) * pick(t.along_face[2], i)
+        lifts = pick(t.states["friction"].pull, i) * pick(t.along_face[2], i)
         weight = pick(t.values["mass_kg"], i) * GRAVITY
-        t.own["sliding"].weight[i] = np.maximum(weight - lifts, 0.0)
+        t.states["sliding"].weight[i] = np.maximum(weight - lifts, 0.0)
 
 
 def settle(t: Trials, i: Index) -> None:
     """Update the stretch; the skin slips where friction cannot hold it."""
-    state = t.own["friction"]
+    state = t.states["friction"]
     moved = total(pick(state.jacobian, i) * (pick(t.q, i) - pick(state.before, i)))
     low, high = bounds(t, i)
     stretch = pick(state.stretch, i) + moved
@@ -120,6 +120,6 @@ def lean(t: Trials, i: Index) -> None:
     """Add the shear's component along the normal of skin that lies askew."""
     i = np.arange(t.n)[i][t.plan.also("tilt", i)]
     force = pick(t.force, i)
-    pull = pick(t.own["friction"].pull, i)
+    pull = pick(t.states["friction"].pull, i)
     leant = np.maximum(force - pull * pick(t.depth[1], i), 0.0)
     t.force[i] = np.where(force > 0.0, leant, 0.0)

@@ -66,12 +66,12 @@ def swing(t: Trials, i: Index) -> None:
 
 def stand(t: Trials, i: Index) -> None:
     """Add the dashpot beside the skin's springs."""
-    t.own["viscous"].loss_s[i] = t.scene.setting("inertia", "loss_s")
+    t.states["viscous"].loss_s[i] = t.scene.setting("inertia", "loss_s")
 
 
 def pace(t: Trials, i: Index) -> None:
     """Shorten the steps when a touch is near, and for a while after a jolt."""
-    state = t.own["inertia"]
+    state = t.states["inertia"]
     depth = pick(t.inside, i)
     force = pick(t.force, i)
     closing = np.maximum(depth - pick(state.depth, i), 0.0)
@@ -90,7 +90,7 @@ def pace(t: Trials, i: Index) -> None:
 
 def tune(t: Trials, i: Index) -> None:
     """Add inertia to the joint's stiffness within a step."""
-    state = t.own["inertia"]
+    state = t.states["inertia"]
     h = pick(t.h, i)
     weight = state.inertia / h
     held = pick(t.held, i) + weight / h
@@ -101,7 +101,7 @@ def tune(t: Trials, i: Index) -> None:
 
 def predict(t: Trials, i: Index) -> None:
     """Add the joints' speed to their position without load."""
-    state = t.own["inertia"]
+    state = t.states["inertia"]
     further = pick(state.weight, i) * pick(state.speed, i) * pick(t.give, i)
     state.before[:, i] = pick(t.q, i)
     t.q_free[:, i] = pick(t.q_free, i) + further
@@ -110,5 +110,5 @@ def predict(t: Trials, i: Index) -> None:
 
 def settle(t: Trials, i: Index) -> None:
     """Update the speed at the end of the step."""
-    state = t.own["inertia"]
+    state = t.states["inertia"]
     state.speed[:, i] = (pick(t.q, i) - pick(state.before, i)) / pick(t.h, i)

@@ -56,7 +56,7 @@ def lay(t: Trials, i: Index) -> None:
     steeper = (slopes[0], slopes[1] - slopes[0], slopes[2] - slopes[1], skin)
     stiffness = np.concatenate([reach * k for k in steeper])
     base.lay_rows(t, i)
-    state = t.own["pop"] = Bubbles(
+    state = t.states["pop"] = Bubbles(
         len(t.gaps),
         *[*np.zeros((2, len(gaps), t.n)), np.zeros((len(gaps), t.rows, t.n))],
     )
@@ -68,7 +68,7 @@ def lay(t: Trials, i: Index) -> None:
 
 def law(t: Trials, i: Index) -> None:
     """The law of the springs that are left, for a forearm that does not pivot."""
-    state = t.own["pop"]
+    state = t.states["pop"]
     trials = np.arange(t.n)[i]
     alive = pick(state.alive, trials)
     weight = pick(t.weight, trials)
@@ -84,18 +84,18 @@ def stand(t: Trials, i: Index) -> None:
 
 def change(t: Trials, trials: Places) -> None:
     """Give the solver the springs that are left."""
-    state = t.own["pop"]
+    state = t.states["pop"]
     tilted = t.plan.also("tilt", trials)
     if tilted.any():
         pivots = trials[tilted]
-        t.own["tilt"].keep_alive(pivots, state.first, state.alive.take(pivots, -1))
+        t.states["tilt"].keep_alive(pivots, state.first, state.alive.take(pivots, -1))
     if not tilted.all():
         law(t, trials[~tilted])
 
 
 def image(t: Trials, i: Index) -> None:
     """Share the force among the springs, then add up the four of each taxel."""
-    state = t.own["pop"]
+    state = t.states["pop"]
     loads = spring_loads(
         pick(t.line_depth, i),
         pick(state.gaps, i),
@@ -111,7 +111,7 @@ def image(t: Trials, i: Index) -> None:
 def pass_on(t: Trials, i: Index) -> None:
     """Burst the overloaded bubbles, which leaves their backing from the next frame
     on."""
-    state = t.own["pop"]
+    state = t.states["pop"]
     burst = (pick(t.image, i) > pick(t.values["pop_n"], i)).swapaxes(0, 1)
     at = np.flatnonzero(burst.any(axis=(0, 1)))
     if not at.size:

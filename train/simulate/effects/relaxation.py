@@ -7,6 +7,6 @@ from train.simulate.trials import Index, Trials, pick
 
 def stand(t: Trials, i: Index) -> None:
     """Make the second spring and its dashpot the contact's Maxwell element."""
-    viscous = t.own["viscous"]
+    viscous = t.states["viscous"]
     viscous.ratio[i] = pick(t.values["relax_ratio"], i)
     viscous.relax_s[i] = pick(t.values["relax_s"], i)

@@ -71,7 +71,7 @@ def shared(pull: Array, limits: Array) -> Array:
 
 def traction(t: Trials, i: Index) -> None:
     """Find the tangential load of each taxel from its normal load."""
-    state: Traction = t.own["shear"]
+    state: Traction = t.states["shear"]
     image = pick(t.image, i)
     rubs = t.plan.also("friction", i)
     friction = np.where(rubs, pick(t.values.get("skin_friction", t.force), i), 0.0)
@@ -80,13 +80,13 @@ def traction(t: Trials, i: Index) -> None:
     if rubs.any():
         # The face draws the skin against the skin's own motion, and the rows run
         # against the direction along the face.
-        pull = np.where(rubs, pick(t.own["friction"].pull, i), 0.0)
+        pull = np.where(rubs, pick(t.states["friction"].pull, i), 0.0)
         pull = np.where(total(total(image)) > 0.0, pull, 0.0)
     flat = limits.reshape(-1, limits.shape[-1])
     along = np.sign(pull) * shared(np.abs(pull), flat).reshape(limits.shape)
     angle = pick(t.column_angle, i)
-    if "turning" in t.own:
-        angle = angle - pick(t.own["turning"].turned, i)
+    if "turning" in t.states:
+        angle = angle - pick(t.states["turning"].turned, i)
     room = np.sqrt(np.maximum(limits * limits - along * along, 0.0))
     state.along[:, :, i] = along
     state.around[:, :, i] = np.clip(image * np.sin(angle), -room, room)

@@ -64,12 +64,12 @@ def stand(t: Trials, i: Index) -> None:
 
 def predict(t: Trials, i: Index) -> None:
     """Take the object's way from the depth."""
-    t.y[0, i] = pick(t.y[0], i) - pick(t.own["sliding"].slide, i)
+    t.y[0, i] = pick(t.y[0], i) - pick(t.states["sliding"].slide, i)
 
 
 def drag(t: Trials, i: Index) -> None:
     """Coulomb's law of friction."""
-    mover = t.own["sliding"]
+    mover = t.states["sliding"]
     weight = pick(mover.weight, i)
     mover.hold[i] = pick(mover.static, i) * weight
     mover.resist[i] = pick(mover.kinetic, i) * weight
@@ -81,7 +81,7 @@ def give_way(t: Trials, i: Index) -> None:
     Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is one
     more compliance, h^2/m, and a shift, so the contact's solver still applies.
     """
-    mover: Mover = t.own["sliding"]
+    mover: Mover = t.states["sliding"]
     h = pick(t.h, i)
     speed = pick(mover.speed, i)
     y = pick(t.y[0], i)
@@ -96,7 +96,7 @@ def give_way(t: Trials, i: Index) -> None:
 
 def move(t: Trials, i: Index) -> None:
     """Move under the loads, and solve the loads of a few trials again."""
-    mover: Mover = t.own["sliding"]
+    mover: Mover = t.states["sliding"]
     h = pick(t.h, i)
     speed = pick(mover.speed, i)
     resist = pick(mover.resist, i)

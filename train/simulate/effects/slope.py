@@ -11,7 +11,7 @@ from train.simulate.trials import Index, Trials, pick
 
 def stand(t: Trials, i: Index) -> None:
     """Change the coefficients of friction by the slope; no object starts by itself."""
-    mover = t.own["sliding"]
+    mover = t.states["sliding"]
     angle = np.radians(pick(t.values["slope_deg"], i))
     for friction in (mover.static, mover.kinetic):
         friction[i] = np.maximum(pick(friction, i) * np.cos(angle) + np.sin(angle), 0.0)

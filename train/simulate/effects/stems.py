@@ -66,7 +66,7 @@ def lay(t: Trials, i: Index) -> None:
     low = np.floor(place)
     window = len(t.columns)
     damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])
-    t.own["stems"] = Stems(
+    t.states["stems"] = Stems(
         depth=depth * values["stem_spread_m"],
         stiffness=stiffness,
         damping=np.where(stiffness > 0.0, damping, 0.0),
@@ -81,15 +81,15 @@ def lay(t: Trials, i: Index) -> None:
 
 def law(t: Trials, i: Index) -> None:
     """The law of the stems by depth."""
-    state = t.own["stems"]
+    state = t.states["stems"]
     state.order[:, i] = t.obey(i, pick(state.depth, i), pick(state.stiffness, i))
     let_go(t, i)
 
 
 def let_go(t: Trials, i: Index) -> None:
     """The law of the stems that are still held."""
-    state = t.own["stems"]
-    order = pick(t.own["stems"].order, i)
+    state = t.states["stems"]
+    order = pick(t.states["stems"].order, i)
     gaps, stiffness = (
         np.take_along_axis(pick(a, i), order, 0) for a in (state.depth, state.stiffness)
     )
@@ -99,7 +99,7 @@ def let_go(t: Trials, i: Index) -> None:
 def tune(t: Trials, i: Index) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of
     bent ones."""
-    state = t.own["stems"]
+    state = t.states["stems"]
     drag = pick(state.drag, i) / pick(t.h, i)
     stems = len(state.depth)
     t.slopes[:stems, i] = pick(state.slopes, i) + drag
@@ -108,7 +108,7 @@ def tune(t: Trials, i: Index) -> None:
 
 def settle(t: Trials, i: Index) -> None:
     """Let stems slip off that are bent too far; the others damp the next step."""
-    state = t.own["stems"]
+    state = t.states["stems"]
     bent = pick(t.depth[0], i) - pick(state.depth, i)
     slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(state.stiffness, i) > 0.0)
     at = slips.any(axis=0).nonzero()[0]
@@ -124,7 +124,7 @@ def settle(t: Trials, i: Index) -> None:
 
 def bear(t: Trials, i: Index) -> None:
     """The force on the skin, and how far the first stem is bent."""
-    state = t.own["stems"]
+    state = t.states["stems"]
     depth = pick(t.depth[0], i)
     held = pick(state.stiffness, i) > 0.0
     bent = depth - pick(state.depth, i)
@@ -135,7 +135,7 @@ def bear(t: Trials, i: Index) -> None:
 
 def image(t: Trials, i: Index) -> None:
     """Put each stem's load on the two rows that it lies between."""
-    state = t.own["stems"]
+    state = t.states["stems"]
     m = len(np.arange(t.n)[i])
     bent = np.maximum(pick(t.depth[0], i) - pick(state.depth, i), 0.0)
     loads = bent * pick(state.stiffness, i)

@@ -10,7 +10,7 @@ from train.simulate.trials import Index, Trials, pick
 
 def drag(t: Trials, i: Index) -> None:
     """Friction at the present speed."""
-    mover = t.own["sliding"]
+    mover = t.states["sliding"]
     static = pick(mover.static, i)
     kinetic = pick(mover.kinetic, i)
     part = pick(mover.speed, i) / pick(t.values["stribeck_m_s"], i)

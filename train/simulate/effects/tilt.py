@@ -95,17 +95,17 @@ def locate(t: Trials, i: Index) -> None:
     on_face = dot(away, along_face) + t.row_z * dot(along, along_face)
     t.weight[:, i] = covered(on_face, pick(t.values["width_m"], i), t.skin.pitch[0])
     t.line_gap[:, i] = curve_gap(on_face, pick(t.values["radius_m"], i))
-    t.own["tilt"].lever[:, i] = t.row_z - z
+    t.states["tilt"].lever[:, i] = t.row_z - z
     point = pose.origin + along * z
     upright = np.sqrt(1.0 - tilt * tilt)
     crossed = cross(normal[:, None], pose.axes)
     turn = dot(along[:, None], crossed)
     push = dot(point[:, None] - pose.origins, crossed) - radius * tilt / upright * turn
     jacobian = np.stack([push, turn], axis=1)
-    given = jacobian * pick(t.give, i)[:, None]
+    compliance = jacobian * pick(t.give, i)[:, None]
     t.jacobian[:, :, i] = jacobian
-    t.compliance[:2, i] = total(push[:, None] * given)
-    t.compliance[2, i] = total(turn * given[:, 1])
+    t.compliance[:2, i] = total(push[:, None] * compliance)
+    t.compliance[2, i] = total(turn * compliance[:, 1])
     t.y_frame[0, i] = dot(point - face, normal) + radius * upright
     t.y_frame[1, i] = tilt
     base.keep_pose(t, i, q, point, pose)
@@ -113,8 +113,8 @@ def locate(t: Trials, i: Index) -> None:
 
 def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
-    state = t.own["tilt"]
-    viscous = t.own.get("viscous")
+    state = t.states["tilt"]
+    viscous = t.states.get("viscous")
     pivots = Pivots(
         i,
         state.gaps,
@@ -135,7 +135,7 @@ def answer(t: Trials, i: Index, y: Array, c: Array) -> Array:
 
 def settle(t: Trials, i: Index) -> None:
     """Guess the next loads by extrapolating the last two."""
-    state = t.own["tilt"]
+    state = t.states["tilt"]
     loads = pick(t.loads, i)
     state.guess[:, i] = 2.0 * loads - pick(state.settled, i)
     state.settled[:, i] = loads
@@ -147,6 +147,8 @@ def bear(t: Trials, i: Index) -> None:
     tilt = pick(t.depth[1], i)
     t.force[i] = pick(t.loads[0], i) * np.sqrt(np.maximum(1.0 - tilt * tilt, 0.0))
     depth = (
-        pick(t.depth[0], i) + pick(t.own["tilt"].lever, i) * tilt - pick(t.line_gap, i)
+        pick(t.depth[0], i)
+        + pick(t.states["tilt"].lever, i) * tilt
+        - pick(t.line_gap, i)
     )
     base.keep_depth(t, i, depth, pick(t.weight, i))

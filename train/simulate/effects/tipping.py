@@ -41,7 +41,7 @@ def stand(t: Trials, i: Index) -> None:
     about the edge is m (base^2 + 4 height^2) / 3, felt at the contact as this divided
     by height^2.
     """
-    mover = t.own["sliding"]
+    mover = t.states["sliding"]
     mass = t.values["mass_kg"]
     foot = t.values["base_m"]
     height = t.values["height_m"]
@@ -56,8 +56,8 @@ def stand(t: Trials, i: Index) -> None:
 
 def drag(t: Trials, i: Index) -> None:
     """Let only the lever of its weight hold an object that tips."""
-    state = t.own["tipping"]
-    mover = t.own["sliding"]
+    state = t.states["tipping"]
+    mover = t.states["sliding"]
     tips = pick(state.tips, i)
     force = pick(state.force, i)
     slide = pick(mover.slide, i)

@@ -34,7 +34,7 @@ def stand(t: Trials, i: Index) -> None:
     aside = pick(t.values["aside_m"], i)
     radius = 0.5 * pick(t.values["foot_m"], i)
     lever = LEVER * radius
-    mover = t.own["sliding"]
+    mover = t.states["sliding"]
     easier = 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
     mover.static[i] = pick(mover.static, i) * easier
     mover.kinetic[i] = pick(mover.kinetic, i) * easier
@@ -50,8 +50,8 @@ def pass_on(t: Trials, i: Index) -> None:
     A load between two columns is shared by them; a load beyond the window goes to its
     last column.
     """
-    state = t.own["turning"]
-    turned = pick(state.per_metre, i) * pick(t.own["sliding"].slide, i)
+    state = t.states["turning"]
+    turned = pick(state.per_metre, i) * pick(t.states["sliding"].slide, i)
     state.turned[i] = turned
     columns = turned * (t.skin.cols / (2.0 * math.pi))
     moving = (columns != 0.0).nonzero()[0]

@@ -64,10 +64,10 @@ class Viscous:
 
     def bear_on(self, i: Index) -> None:
         """Set the load with which each row's next step begins."""
-        given = pick(self.given, i)
+        pushed = pick(self.given, i)
         force = pick(self.force, i)
         late = pick(self.late, i) + pick(self.damped, i)
-        self.load[:, i] = -(pick(self.kept, i) * given + late * force)
+        self.load[:, i] = -(pick(self.kept, i) * pushed + late * force)
 
     def move_on(self, i: Index, borne: Array) -> None:
         """Update the state by a step's forces (rows, n of i).
@@ -75,9 +75,9 @@ class Viscous:
         Where no force is borne, the surface recovers by itself with gain F = L.
         """
         elastic = np.maximum((borne - pick(self.load, i)) / pick(self.gain, i), 0.0)
-        given = pick(self.kept, i) * pick(self.given, i)
-        given = given + pick(self.late, i) * pick(self.force, i)
-        self.given[:, i] = given + pick(self.let_go, i) * elastic
+        pushed = pick(self.kept, i) * pick(self.given, i)
+        pushed = pushed + pick(self.late, i) * pick(self.force, i)
+        self.given[:, i] = pushed + pick(self.let_go, i) * elastic
         self.force[:, i] = elastic
         self.bear_on(i)
 
@@ -91,16 +91,16 @@ def begin(rows: int, n: int) -> Viscous:
 
 def stand(t: Trials, i: Index) -> None:
     """Begin without any; the effects that share this module add theirs next."""
-    t.own["viscous"] = begin(t.rows, t.n)
+    t.states["viscous"] = begin(t.rows, t.n)
 
 
 def tune(t: Trials, i: Index) -> None:
     """Set the law for steps of this length."""
-    t.own["viscous"].set_step(i, pick(t.h, i))
+    t.states["viscous"].set_step(i, pick(t.h, i))
 
 
 def settle(t: Trials, i: Index) -> None:
     """Update each row by the step's forces."""
     upright = np.arange(t.n)[i][~t.plan.also("tilt", i)]
     t.row_force[0, upright] = pick(t.loads[0], upright)
-    t.own["viscous"].move_on(i, pick(t.row_force, i))
+    t.states["viscous"].move_on(i, pick(t.row_force, i))
