@@ -15,7 +15,7 @@ import pytest
 import edge
 from tests.board.debian import CHECKOUT
 
-LARGEST = 310_000
+LARGEST = 320_000
 
 
 @pytest.fixture(scope="session")
