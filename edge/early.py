@@ -21,14 +21,14 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
     Raises:
         InputError: the rate is outside (0, 1), or is certified for no task.
     """
-    chosen: dict[str, Policy] = {}
+    policy_of: dict[str, Policy] = {}
     for task, rule in stopping_rules(model, error).items():
         if rule is None:
-            chosen[task] = Uncertified(model.info)
+            policy_of[task] = Uncertified(model.info)
         else:
             kind = Product if task in model.info.products else Early
-            chosen[task] = kind(model.info, task, rule, error)
-    return chosen
+            policy_of[task] = kind(model.info, task, rule, error)
+    return policy_of
 
 
 class Uncertified:

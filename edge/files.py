@@ -157,7 +157,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _check_target(target: Path) -> None:
-    """Refuse a name that no file can have, and that of what is no regular file."""
+    """Refuse an impossible name, and the name of a folder, a FIFO or a device."""
     if "\0" in target.name:
         raise InputError(
             f"{target}: a file's name cannot hold a null character; choose another"

@@ -34,7 +34,7 @@ def rounded(confidence: float | None) -> float | None:
 
 @dataclass(frozen=True)
 class Question:
-    """What a policy is asked: a task of a contact at a decision point.
+    """A question to a policy: a task of a contact at a decision point.
 
     Attributes:
         blank: the task's answer, without a label yet.

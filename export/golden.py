@@ -32,8 +32,8 @@ def trials_of(dataset: DataSet, count: int) -> list[int]:
     """Trials spread evenly over the labels of the finest task."""
     finest = max(dataset.tasks, key=lambda task: len(set(dataset.labels(task))))
     order = np.argsort(dataset.labels(finest), kind="stable")
-    chosen = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
-    return sorted({int(order[i]) for i in chosen})
+    places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
+    return sorted({int(order[i]) for i in places})
 
 
 def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:

@@ -102,8 +102,8 @@ def _decide(
     k = voting.k
     roots = build.node("Sqrt", [build.node("Add", [squares, length])])
     build.node("Mul", [roots, build.by_decision_point(units)], f"{task}_distances")
-    known = build.constant(voting.labels, np.int64, f"labels of {task}")
-    voters = build.node("Gather", [known, rows])
+    trial_labels = build.constant(voting.labels, np.int64, f"labels of {task}")
+    voters = build.node("Gather", [trial_labels, rows])
     # A vector that is not finite has no votes: class -1, whose row of the votes (the
     # last) is 0.
     finite = build.node("LessOrEqual", [off, build.constant(LARGEST)])

@@ -153,7 +153,7 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Mode:
-    """What is tried by default.
+    """The candidates that are tried by default.
 
     Attributes:
         combinations, with_joints: feature sets without and with joint angles.

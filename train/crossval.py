@@ -81,12 +81,12 @@ def neighbours(
     with single_thread():
         for i, query in enumerate(X if tested is None else tested):
             others = np.delete(np.arange(n), i)
-            mean, gain, known = centred_and_scaled(X[others], scaling, features)
-            axes = Spectrum(known).leading(max_components)
+            mean, gain, scaled = centred_and_scaled(X[others], scaling, features)
+            axes = Spectrum(scaled).leading(max_components)
             weights = on_grid(axes.T)
-            grid = Grid.of(known, len(axes))
+            grid = Grid.of(scaled, len(axes))
             used = len(axes)
-            differences = grid.project(known, weights) - grid.project(
+            differences = grid.project(scaled, weights) - grid.project(
                 (query - mean) * gain, weights
             )
             # Sums of squares by the first 1, 2, ... components: exact, as all are whole

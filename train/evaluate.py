@@ -149,13 +149,13 @@ class _Fit:
         columns = columns_of(grid.features, vectors.features, vectors.columns)
         types = types_of(grid.features, vectors.features, vectors.columns)
         X = vectors.X
-        mean, gain, known = centred_and_scaled(
+        mean, gain, scaled = centred_and_scaled(
             X[np.ix_(rows, columns)], grid.scaling, *types
         )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
         first = (np.cumsum(counts) - counts)[counts > 0]
         new = (X[np.ix_(self.test, columns)] - mean) * gain
-        return Decomposition(known, new, labels_of, first)
+        return Decomposition(scaled, new, labels_of, first)
 
     def right(
         self,

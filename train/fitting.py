@@ -80,7 +80,7 @@ class Fitted:
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
-    """What a fit holds fixed, and what it may choose; see `fit`."""
+    """The settings that a fit holds fixed; it chooses the others. See `fit`."""
 
     features: Sequence[str] | None = None
     projection: str | None = None

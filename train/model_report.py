@@ -96,10 +96,10 @@ def _left_out(
     answers = []
     for quarter in range(QUARTERS):
         train = others[quarter_of <= quarter]
-        known = vectors.part(train)
-        fewer = fittable(choices, known.y, known.is_own)
+        earlier = vectors.part(train)
+        fewer = fittable(choices, earlier.y, earlier.is_own)
         model = ContactClassifier(fewer, features, widths)
-        model.fit(known.X, known.y, known.is_own)
+        model.fit(earlier.X, earlier.y, earlier.is_own)
         answers.append(model.classes_[task][model.decide(X[test])[task].labels])
     rows = model.neighbours(task, X[test])[1]
     key = model.spaces_[task]
@@ -389,9 +389,9 @@ def _learning(exported: Exported) -> Section:
         "the same ones."
     )
     title = "Accuracy by the number of training trials"
-    drawn = lines("learning", title, sizes, results, label="training trials")
+    figure = lines("learning", title, sizes, results, label="training trials")
     return Section(
-        "The value of more recordings", text, [Table("learning", title, rows)], [drawn]
+        "The value of more recordings", text, [Table("learning", title, rows)], [figure]
     )
 
 

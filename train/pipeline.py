@@ -304,12 +304,12 @@ class ContactClassifier:
         with little shrinkage draw the trials of a label up to a hundred times closer
         together than new ones.
         """
-        measured = np.lexsort([y[task] for task in sorted(y)])[
+        sample = np.lexsort([y[task] for task in sorted(y)])[
             :: -(-len(X) // MOST_MEASURED)
         ]
-        X = X[measured]
-        y = {task: labels[measured] for task, labels in y.items()}
-        is_own = None if is_own is None else is_own[measured]
+        X = X[sample]
+        y = {task: labels[sample] for task, labels in y.items()}
+        is_own = None if is_own is None else is_own[sample]
         folds = np.arange(len(X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
@@ -324,9 +324,11 @@ class ContactClassifier:
                 met = new & used & np.isin(y[task], classes)
                 if len(classes) > 1:
                     squares = model.squares(task, X[met])
-                    known = model.labels_[task]
+                    trial_labels = model.labels_[task]
                     unit = model.unit(task)
-                    distances = label_distances(squares, known, len(classes), unit)
+                    distances = label_distances(
+                        squares, trial_labels, len(classes), unit
+                    )
                     labels = classes.searchsorted(y[task][met])[:, None]
                     right = np.take_along_axis(distances, labels, axis=1)[:, 0]
                     np.put_along_axis(distances, labels, np.inf, axis=1)
@@ -398,11 +400,11 @@ class ContactClassifier:
         graph's votes."""
         labels = {}
         distances = {}
-        for task, known in self.labels_.items():
+        for task, trial_labels in self.labels_.items():
             squares = self.squares(task, X)
-            labels[task] = vote(known[self.nearest(task, squares)])
+            labels[task] = vote(trial_labels[self.nearest(task, squares)])
             classes = len(self.classes_[task])
-            to_labels = label_distances(squares, known, classes, self.unit(task))
+            to_labels = label_distances(squares, trial_labels, classes, self.unit(task))
             distances[task] = to_labels * self.slopes_[task]
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)

@@ -180,6 +180,6 @@ class Decomposition:
             self._new_scores = self._spectrum.scores_of(self._new)
         if (task, shrinkage) not in self._along:
             directions = self._spectrum.directions(self._labels[task], shrinkage)
-            known = (self._spectrum.scores @ directions)[self._first]
-            self._along[task, shrinkage] = known, self._new_scores @ directions
+            rows = (self._spectrum.scores @ directions)[self._first]
+            self._along[task, shrinkage] = rows, self._new_scores @ directions
         return self._along[task, shrinkage]

@@ -69,7 +69,7 @@ Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64]]]
 
 
 def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answers:
-    """What models, one for each decision point, answer to vectors (points, m, p)."""
+    """The answers of models, one for each decision point, to vectors (points, m, p)."""
     points = [_answers(model, x) for model, x in zip(models, X, strict=True)]
     by_task = {}
     for task in points[0]:

@@ -204,7 +204,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _keeper(
     arguments: argparse.Namespace, model: Model, opened: Opened
 ) -> Iterator[Callable[[Frame, Sequence[Event]], None]]:
-    """What takes in every frame with its events; it keeps touches where asked."""
+    """A function that takes in every frame with its events; it keeps touches where
+    asked."""
     if arguments.keep is None:
         yield lambda frame, events: None
         return

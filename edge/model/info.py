@@ -132,7 +132,8 @@ class ModelInfo:
         )
 
     def unusual(self, vector: NDArray[np.float64]) -> str | None:
-        """What is most unlike training in a vector of the full window, as a phrase."""
+        """The property of a vector of the full window that is most unlike training, as a
+        phrase."""
         if not self.usual:
             return None
         ends = np.cumsum(self.widths)[:-1]
@@ -337,7 +338,7 @@ def _check(info: ModelInfo, name: str) -> None:
 
 
 def _contradiction(info: ModelInfo) -> str:
-    """What contradicts itself in the whole metadata; "" if nothing does."""
+    """A contradiction in the whole metadata, as a sentence; "" without one."""
     if not info.tasks:
         return "its metadata names no task"
     if info.decision_points_s and not _points_fit(info):
@@ -352,7 +353,7 @@ def _contradiction(info: ModelInfo) -> str:
 
 
 def _contradiction_of_task(info: ModelInfo, task: str) -> str:
-    """What contradicts itself in a task; "" if nothing does."""
+    """A contradiction in a task, as a sentence; "" without one."""
     entry = info.tasks[task]
     if entry.components > info.width:
         return (

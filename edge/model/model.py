@@ -126,8 +126,10 @@ class Model:
         for name, (kind, shape) in expected.items():
             declared_kind, sizes = declared.get(name, (None, []))
             # Older versions of ONNX Runtime leave some sizes open; `run` checks these.
-            known = [size if isinstance(size, int) else None for size in sizes[1:]]
-            if declared_kind != kind or known not in (shape, [None] * len(shape)):
+            sizes_known = [
+                size if isinstance(size, int) else None for size in sizes[1:]
+            ]
+            if declared_kind != kind or sizes_known not in (shape, [None] * len(shape)):
                 raise InputError(
                     f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
                     "which its metadata describes; export it again"

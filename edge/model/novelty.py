@@ -33,7 +33,7 @@ PREFIXES = ("log_", "sqrt_", "relative_")
 
 
 def unusual(means: Sequence[float], usual: Mapping[str, Sequence[float]]) -> str:
-    """What is most unusual about a contact, as a phrase.
+    """The most unusual property of a contact, as a phrase.
 
     Args:
         means: of each feature over the window, in the order of `usual`.

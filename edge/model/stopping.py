@@ -128,13 +128,13 @@ class Stopping:
         """A sentence that says why an error rate cannot be certified, and how many
         trials could."""
         share = self.wrong / self.trials
-        known = (
+        sentence = (
             f"the smallest error that {self.trials} calibration trials certify is "
             f"{self.smallest_error:.3f}"
         )
         if share >= error:
             return (
-                f"{known}, and {share:.1%} of them are decided wrongly even at the "
+                f"{sentence}, and {share:.1%} of them are decided wrongly even at the "
                 "full window: "
                 "more trials alone will not do"
             )
@@ -144,7 +144,7 @@ class Stopping:
             divergence += share * math.log(share / error)
         level = TEST_SHARE * self.risk
         needed = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
-        return f"{known}; {error:g} needs about {needed} trials"
+        return f"{sentence}; {error:g} needs about {needed} trials"
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:

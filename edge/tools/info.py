@@ -81,7 +81,7 @@ def change_text(key: str, a: Any, b: Any) -> str:
 
 
 def _list_change(key: str, a: list[Any], b: list[Any]) -> str:
-    """What only one of two lists holds."""
+    """The values that only one of two lists holds, as text."""
     only_a = [value for value in a if value not in b]
     only_b = [value for value in b if value not in a]
     texts = []

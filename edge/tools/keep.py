@@ -90,7 +90,7 @@ class Keeper:
             self._hand_over(self._complete.popleft())
 
     def close(self) -> None:
-        """Save what is complete, and wait until all is written."""
+        """Save the complete touches, and wait until all are written."""
         rest = self._trials.rest()
         for frames in [*self._complete, *([rest] if rest else [])]:
             self._hand_over(frames)

@@ -98,16 +98,16 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.undo:
         return undo(arguments.data, output)
     every = find(arguments.data)
-    chosen = _chosen(every, arguments.only)
-    if not chosen:
+    recordings = _chosen(every, arguments.only)
+    if not recordings:
         output.text(f"none of {counted(len(every), 'recording')} is of this kind")
         return 1
     if arguments.delete:
-        paths = [path for path, _ in chosen]
+        paths = [path for path, _ in recordings]
         return _delete(output, paths, agreed=arguments.yes)
     if arguments.accept or arguments.rename or arguments.set or arguments.unset:
-        return _relabel(arguments, output, chosen)
-    _print(output, chosen)
+        return _relabel(arguments, output, recordings)
+    _print(output, recordings)
     return 0
 
 
@@ -128,12 +128,12 @@ def _chosen(
 def _relabel(
     arguments: argparse.Namespace,
     output: Output,
-    chosen: Sequence[tuple[Path, Recording]],
+    recordings: Sequence[tuple[Path, Recording]],
 ) -> int:
     """Show what labels become, ask, and change them."""
     change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
     differing = []
-    for path, recording in chosen:
+    for path, recording in recordings:
         meta = recording.meta
         labels = review.accepted(meta) if arguments.accept else {}
         relabelled = replace(change, labels={**labels, **change.labels})
@@ -143,7 +143,7 @@ def _relabel(
     if not differing:
         output.text("every recording has these labels already")
         return 0
-    former = {path: recording.labels for path, recording in chosen}
+    former = {path: recording.labels for path, recording in recordings}
     for path, after in differing:
         old = _text(former[path])
         output.text(f"{path}: {old} becomes {_text(after.get('labels', {}))}")
@@ -151,7 +151,7 @@ def _relabel(
         output.text("nothing is changed")
         return 1
     change_all(differing)
-    _print(output, [(path, load(path)) for path, _ in chosen])
+    _print(output, [(path, load(path)) for path, _ in recordings])
     return 0
 
 
@@ -329,7 +329,7 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
 
 @dataclass(frozen=True)
 class Change:
-    """What is to change in labels.
+    """A change of labels.
 
     Attributes:
         names: {task: its new name}.

@@ -140,7 +140,7 @@ def _replay(
 
 
 def compared(name: str, first: Summary, other_name: str, other: Summary) -> str:
-    """What a second model gains or loses on the same labelled recordings, by task."""
+    """The gains and losses of a second model on the same labelled recordings, by task."""
     lines = [f"{other_name} compared with {name}:"]
     for task in first.hits.keys() & other.hits.keys():
         shared = first.hits[task].keys() & other.hits[task].keys()

@@ -37,7 +37,7 @@ def sparkline(percent: Sequence[int]) -> str:
 
 
 def decisions(meta: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """{task: its decision} of a kept touch; empty of others, and of what is none."""
+    """{task: its decision} of a kept touch; empty for other recordings."""
     decided = meta.get("decided")
     if not isinstance(decided, Mapping):
         return {}
@@ -109,5 +109,5 @@ def kind_or_task(text: str) -> str:
 
 def selected(meta: Mapping[str, Any], words: Sequence[str]) -> bool:
     """Whether a recording is of every kind, or has every task, that some words name."""
-    known = {*kinds(meta), *meta.get("labels", {}), *decisions(meta)}
-    return known.issuperset(words)
+    names = {*kinds(meta), *meta.get("labels", {}), *decisions(meta)}
+    return names.issuperset(words)

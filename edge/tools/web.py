@@ -277,10 +277,10 @@ class WebServer:
             return True  # HTTP 1.0 names none
         address = str(browser.socket.getsockname()[0])
         name = host.rpartition(":")[0] if not host.endswith("]") else host
-        known = self._names | {address, f"[{address}]"}
+        hosts = self._names | {address, f"[{address}]"}
         origin = fields.get("origin")
         from_here = origin is None or origin == f"http://{host}"
-        return from_here and (name or host).removesuffix(".local") in known
+        return from_here and (name or host).removesuffix(".local") in hosts
 
     def _get(self, browser: Browser, path: str) -> None:
         if path == "/picture":

@@ -280,15 +280,15 @@ class Contact:
 
     def series(self) -> FeatureSeries:
         """The measurements so far; later frames do not change them."""
-        measured: dict[str, Any] = {
+        columns: dict[str, Any] = {
             name: np.array([row[name] for row in self._rows]) for name in self._rows[0]
         }
-        counted = measured.pop("counted")
+        counted = columns.pop("counted")
         zones = self._measurer.zones
         width = self._measurer.width
         sums = counted[:, PLAIN:].reshape(len(counted), len(zones), width)
         return FeatureSeries(
-            **measured,
+            **columns,
             peak=counted[:, 0],
             area=counted[:, 1],
             sums=counted[:, 2:PLAIN],

@@ -226,8 +226,8 @@ class _Course:
             values: NDArray[Any] = wide.T
         else:
             values = np.array([self._measured(f) for f in group], dtype=np.float64)
-        known = np.isfinite(values)
-        complete = known.all(axis=1)
+        finite = np.isfinite(values)
+        complete = finite.all(axis=1)
         for feature, row in zip(group, values, strict=False):
             if np.isinf(row).any():
                 raise OutOfRange(
@@ -237,8 +237,8 @@ class _Course:
                 )
         sampled = np.zeros((len(values), len(times)))
         sampled[complete] = _resample(times, t, values[complete])
-        for i in np.flatnonzero(~complete & known.any(axis=1)):
-            sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
+        for i in np.flatnonzero(~complete & finite.any(axis=1)):
+            sampled[i] = _resample(times, t[finite[i]], values[i, finite[i]])
         if first.quantity == "taxel_force":
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled

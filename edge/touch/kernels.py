@@ -191,9 +191,9 @@ def kernel_channels(
     """
     rows: NDArray[np.int64] | None = series.kernel_cells
     if name == "zone_kernels":
-        measured = len(series.zones) == len(ZONES)
+        complete = len(series.zones) == len(ZONES)
         zones = [sums[:, :ZONE_WIDTH] for sums in series.zones.values()]
-        rows = np.column_stack(zones) if measured else None
+        rows = np.column_stack(zones) if complete else None
     if rows is None:
         raise not_measured(feature(name))
     step_s = window_s / (SAMPLES - 1)

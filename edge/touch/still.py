@@ -20,7 +20,7 @@ STILL_S = 2.0
 """A taxel whose count stays the same for so long is not touched. It takes a second more
 than contacts are followed, where that is longer."""
 EARLY_S = 0.3
-"""What is there in the first frame is a touch under way if it changes so soon."""
+"""Seconds within which a touch that was under way in the first frame changes."""
 LONGEST_EARLY_S = 10.0
 """Seconds of first frames that are kept while what is set aside may be a touch."""
 CHECK_S = 0.25
@@ -97,8 +97,8 @@ class StillTaxels:
         same = active & self._near(frame, self._reference)
         self._looks = np.where(same, self._looks + 1, 0)
         np.copyto(self._reference, frame.counts, where=~same)
-        known = active & (self._levels > 0) & self._near(frame, self._levels)
-        still = known | (self._looks * CHECK_S >= self._still_s)
+        unchanged = active & (self._levels > 0) & self._near(frame, self._levels)
+        still = unchanged | (self._looks * CHECK_S >= self._still_s)
         if still.any() and not self.touched:
             self._set_aside(frame, still)
 
@@ -163,8 +163,8 @@ class WatchfulTracker(ContactTracker):
         return contacts
 
     def finish(self) -> list[Contact]:
-        """What was there in the first frame and never changed, where the stream has
-        had no other contact."""
+        """The contacts of the first frame that never changed, where the stream has had
+        no other contact."""
         self._follow_early()
         return [
             contact

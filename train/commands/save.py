@@ -197,8 +197,8 @@ def write_hdf5(out: Path, long: Long) -> None:
     with h5py.File(buffer, "w") as target:
         target.create_dataset("trial", data=long.trial, dtype=text)
         for task, labels in long.labels.items():
-            known = [label or "" for label in labels]
-            target.create_dataset(f"labels/{task}", data=known, dtype=text)
+            texts = [label or "" for label in labels]
+            target.create_dataset(f"labels/{task}", data=texts, dtype=text)
         target["t"] = long.t
         target["frames"] = long.frames
         target["valid"] = long.valid

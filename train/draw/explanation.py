@@ -106,34 +106,36 @@ def draw(
             folder holds none of the trials.
     """
     touch = contact_of(where, recording)[1]
-    known: dict[str, FeatureSeries | None] = {}
+    series_of: dict[str, FeatureSeries | None] = {}
     cases = []
     for line in explanations(model, recording, where):
         rival = line["rival"] or {"label": "others"}
         near = []
         for trial in [*line["nearest"][:MOST_NEAR], *filter(None, [line["rival"]])]:
             name = trial["trial"]
-            if name not in known:
-                known[name] = _trial(folder, name)
+            if name not in series_of:
+                series_of[name] = _trial(folder, name)
             text = f"{name}: {trial['label']}, {trial['distance']:.3g} away"
-            missing = "" if known[name] is not None else " (recording not found)"
-            near.append((text + missing, known[name], trial["label"] == line["label"]))
+            missing = "" if series_of[name] is not None else " (recording not found)"
+            near.append(
+                (text + missing, series_of[name], trial["label"] == line["label"])
+            )
         title = f"{line['task']}: {line['label']}"
         cases.append(Case(title, touch, near, line["pulls"], rival["label"]))
-    if not any(known.values()):
+    if not any(series_of.values()):
         raise InputError(
-            f"{folder}: holds none of the nearest trials, such as {next(iter(known))}; "
+            f"{folder}: holds none of the nearest trials, such as {next(iter(series_of))}; "
             "name their "
             "folder by --data"
         )
     with mpl.rc_context(STYLE):
-        drawn = Figure(figsize=(6.4, 5.0 * len(cases)), layout="constrained")
-        canvases = drawn.subfigures(len(cases), squeeze=False)[:, 0]
+        figure = Figure(figsize=(6.4, 5.0 * len(cases)), layout="constrained")
+        canvases = figure.subfigures(len(cases), squeeze=False)[:, 0]
         for canvas, case in zip(canvases, cases, strict=True):
             canvas.suptitle(case.title, fontsize=10, weight="bold")
             draw_case(canvas, case, recording.layout, model.info.window_s, False)
         with write_whole(out) as file:
-            drawn.savefig(file, format="png", dpi=110)
+            figure.savefig(file, format="png", dpi=110)
 
 
 def _trial(folder: Path, name: str) -> FeatureSeries | None:

@@ -53,7 +53,7 @@ def draw_side(
     leans or turns there.
     """
     joints = recording.joints
-    drawn = recording.meta.get("simulation")
+    simulation = recording.meta.get("simulation")
     assert joints is not None
     first: Place | None = None
     motion = ""
@@ -86,15 +86,17 @@ def draw_side(
         if since == 0.0:
             star = {"color": style, "ms": 13, "mec": "white", "ls": "none"}
             axis.plot(*place[0][[0, 2]], "*", **star, label=f"contact {text}")
-        if drawn:
+        if simulation:
             motion = _object(
-                axis, drawn, first, place[0], since, color=style, hatch=hatch
+                axis, simulation, first, place[0], since, color=style, hatch=hatch
             )
     title = "seen from the side"
-    if drawn:
-        mass = drawn["values"].get("mass_kg")
-        title += f": {drawn['family']}" + (f", {mass:.2g} kg" if mass else "") + motion
-        title += "\n" + ", ".join(drawn["effects"])
+    if simulation:
+        mass = simulation["values"].get("mass_kg")
+        title += (
+            f": {simulation['family']}" + (f", {mass:.2g} kg" if mass else "") + motion
+        )
+        title += "\n" + ", ".join(simulation["effects"])
     axis.set_title(title, fontsize=9)
     axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
     axis.set_aspect("equal", adjustable="datalim")
@@ -132,7 +134,7 @@ def _last_contact(
 
 def _object(
     axis: Any,
-    drawn: dict[str, Any],
+    simulation: dict[str, Any],
     first: Place,
     now: np.ndarray,
     since: float,
@@ -148,7 +150,7 @@ def _object(
         now: (3,) position of the last contact, `since` seconds ago.
         style: colour and hatching, by their names in matplotlib.
     """
-    body = _Body.of(drawn, first)
+    body = _Body.of(simulation, first)
     ahead = math.copysign(1.0, first[1][0] or 1.0)
     start = first[0][[0, 2]]
     table = start[0] + ahead * np.array([-0.1, body.depth + 0.25])
@@ -188,13 +190,13 @@ class _Body:
     depth: float
 
     @classmethod
-    def of(cls, drawn: Mapping[str, Any], first: Place) -> Self:
+    def of(cls, simulation: Mapping[str, Any], first: Place) -> Self:
         """The object of a simulated recording, touched at a place."""
-        values = drawn["values"]
+        values = simulation["values"]
         height = values.get("height_m") or STANDS_M
         width = values.get("width_m") or 0.1
         return cls(
-            effects=drawn["effects"],
+            effects=simulation["effects"],
             values=values,
             floor=-max(height, 0.5 * min(width, 0.6)),
             top=max(min(0.5 * width, first[2]), ABOVE_M),

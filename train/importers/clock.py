@@ -40,7 +40,7 @@ class Order:
 
     @property
     def text(self) -> str:
-        """What was done, in words; empty for times that increase."""
+        """The change that was made, in words; empty for times that increase."""
         parts = []
         if self.swapped:
             parts.append(f"{self.swapped} times went back within the jitter")

@@ -37,7 +37,7 @@ LONGEST_STEPS = {"ms": 2e3, "us": 2e6}
 
 @dataclass(frozen=True)
 class Meaning:
-    """What the columns of a table are taken for.
+    """The meaning of a table's columns.
 
     Attributes:
         time: the column of times; None without one.
@@ -86,7 +86,7 @@ def spanned(names: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the user says of the columns; None where he does not.
+    """The user's words on the columns; None where there are none.
 
     Attributes:
         time, taxels, joints: lists of columns, see `columns`.
@@ -113,13 +113,13 @@ def columns(table: Table, names: Sequence[str], terms: str) -> list[str]:
     Raises:
         InputError: the table has no such column.
     """
-    chosen: list[str] = []
+    picks: list[str] = []
     for term in terms.split(","):
-        chosen += _term(table, names, term.strip())
-    twice = next((name for name in chosen if chosen.count(name) > 1), None)
+        picks += _term(table, names, term.strip())
+    twice = next((name for name in picks if picks.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{table.path}: column {twice} is named twice in {terms}")
-    return chosen
+    return picks
 
 
 def _term(table: Table, names: Sequence[str], term: str) -> list[str]:
@@ -213,12 +213,12 @@ def _time_column(
         (*others, time) = columns(table, names, wishes.time)
         if others:
             raise InputError(f"{table.path}: --time names several columns; name one")
-        known = TIME.fullmatch(time)
-        return time, _plain(known["unit"] if known else None)
+        match = TIME.fullmatch(time)
+        return time, _plain(match["unit"] if match else None)
     for name in table.names:
-        known = TIME.fullmatch(name)
-        if known is not None and name not in joints:
-            return name, _plain(known["unit"])
+        match = TIME.fullmatch(name)
+        if match is not None and name not in joints:
+            return name, _plain(match["unit"])
     dates = [name for name in table.names if _is_date(table, name)]
     return (dates[0], "iso") if len(dates) == 1 else (None, None)
 

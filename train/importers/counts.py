@@ -139,8 +139,8 @@ class Rest:
         shear = None
         if values.shear is not None:
             unloaded = np.float64(0.0) if self.shear is None else self.shear
-            known = np.where(valid[:, :, None], values.shear - unloaded, 0.0)
-            shear = counts_of(where, known, self.scale).reshape(-1, *shape, 2)
+            finite = np.where(valid[:, :, None], values.shear - unloaded, 0.0)
+            shear = counts_of(where, finite, self.scale).reshape(-1, *shape, 2)
             skin["axes"] = 3
         return Recording(
             t=t - t[0],
@@ -169,7 +169,7 @@ class Rest:
 
     @property
     def meta(self) -> dict[str, object]:
-        """What a recording says of it; empty for counts as they stand."""
+        """The entry in a recording's metadata; empty for counts as they stand."""
         if self.values is None:
             return {}
         at_rest = [None if np.isnan(v) else float(v) for v in self.values]
@@ -222,7 +222,7 @@ def _finest(deviations: Sequence[NDArray[np.float64]], largest: float) -> float:
 
 
 def _check_counts(path: object, counts: NDArray[np.float64], exact: bool) -> None:
-    """Refuse what are no counts."""
+    """Refuse values that are no counts."""
     low = float(counts.min(initial=0.0))
     high = float(counts.max(initial=0.0))
     whole = not exact or bool((counts == np.rint(counts)).all())

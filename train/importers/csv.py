@@ -485,20 +485,20 @@ def _understood(
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
     path = trial.source.table.path
-    known = first.source.table.path
+    first_path = first.source.table.path
     if len(trial.meaning.taxels) != len(first.meaning.taxels):
-        few = f"{len(trial.meaning.taxels)} taxels, and {known} "
+        few = f"{len(trial.meaning.taxels)} taxels, and {first_path} "
         raise InputError(
             f"{path}: has {few}{len(first.meaning.taxels)}; name them by --taxels"
         )
     if trial.meaning.taxels != first.meaning.taxels:
         raise InputError(
             f"{path}: its taxels are {shown(list(trial.meaning.taxels))}, and those of "
-            f"{known} {shown(list(first.meaning.taxels))}"
+            f"{first_path} {shown(list(first.meaning.taxels))}"
         )
     if trial.meaning.unit != first.meaning.unit:
         raise InputError(
-            f"{path}: its time seems to be in {trial.meaning.unit}, and that of {known} "
+            f"{path}: its time seems to be in {trial.meaning.unit}, and that of {first_path} "
             f"in {first.meaning.unit}; give --time-unit"
         )
 

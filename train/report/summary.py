@@ -252,8 +252,8 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
     for trial in dataset.trials:
         joints = trial.series.joints
         assert joints is not None
-        known = joints[np.isfinite(joints).all(axis=1)]
-        at_onset.append(known[0] if len(known) else np.zeros(joints.shape[1]))
+        finite = joints[np.isfinite(joints).all(axis=1)]
+        at_onset.append(finite[0] if len(finite) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
     angles = np.array(at_onset)[labels != ""]
     labels = labels[labels != ""]

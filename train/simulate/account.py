@@ -50,7 +50,7 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class Costs:
-    """What a run of a scene took.
+    """The times of a run of a scene.
 
     Attributes:
         trials: how many there are.

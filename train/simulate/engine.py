@@ -60,8 +60,8 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     out: dict[str, Array] = {}
     for group in dict.fromkeys(streamed):
         members = [i for i, stream in enumerate(streamed) if stream == group]
-        for name, drawn in _values(scene, [specs[i] for i in members]).items():
-            out.setdefault(name, np.full(len(specs), np.nan))[members] = drawn
+        for name, numbers in _values(scene, [specs[i] for i in members]).items():
+            out.setdefault(name, np.full(len(specs), np.nan))[members] = numbers
     return out
 
 
@@ -211,7 +211,7 @@ def run_physics(
 
 @dataclass(frozen=True)
 class _Log:
-    """What a run keeps of its frames; see `PhysicsRun`.
+    """The frames of a run, as it keeps them; see `PhysicsRun`.
 
     Attributes:
         joints, force, traces, window, images: of `PhysicsRun`.

@@ -239,7 +239,7 @@ def _check_left_out(scene: Scene, where: str) -> None:
 
 
 def _needs(name: str) -> list[str]:
-    """What a scene needs to support an effect."""
+    """The needs of an effect that a scene must meet, as phrases."""
     info = EFFECTS[name]
     needs = []
     if info.axes:
@@ -274,7 +274,7 @@ def check_heeded(scene: Scene, where: str) -> None:
 
 
 def given_steps(scene: Scene) -> str:
-    """What the scene says of its steps; "" where they are measured."""
+    """The steps that a scene gives, as a sentence; "" where they are measured."""
     if not scene.step_s:
         return ""
     steps = ", ".join(f"{name} {1e3 * s:g} ms" for name, s in scene.step_s.items())

@@ -61,7 +61,7 @@ def recordings(
         trial = seen.trial
         kept = slice(None) if seen.kept is None else seen.kept
         t = seen.t if seen.times is None else seen.times
-        drawn = {
+        trial_values = {
             name: float(value[seen.which]) for name, value in trials.values.items()
         }
         soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
@@ -83,7 +83,7 @@ def recordings(
                 "family": trial.object.family,
                 "redrawn": trial.attempt,
                 "effects": list(seen.effects),
-                "values": {k: v for k, v in drawn.items() if math.isfinite(v)},
+                "values": {k: v for k, v in trial_values.items() if math.isfinite(v)},
             },
         }
         shear = seen.shear()

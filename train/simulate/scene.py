@@ -396,20 +396,20 @@ def draw_family(
     generator = stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
-            drawn = _draw_object(generator, ranges, part)
-            if not movable or _moves({**usual, **drawn}, push_n, skin):
+            values = _draw_object(generator, ranges, part)
+            if not movable or _moves({**usual, **values}, push_n, skin):
                 break
         else:
             enough = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", enough)
-        yield {**shared, "name": f"{name} {number + 1:02d}", **_counted(drawn)}
+        yield {**shared, "name": f"{name} {number + 1:02d}", **_counted(values)}
 
 
-def _counted(drawn: Mapping[str, float]) -> dict[str, Any]:
+def _counted(values: Mapping[str, float]) -> dict[str, Any]:
     """The values of an object, those that count something rounded."""
     return {
         key: round(value) if OBJECT[key].integer else value
-        for key, value in drawn.items()
+        for key, value in values.items()
     }
 
 
@@ -417,11 +417,11 @@ def _draw_object(
     generator: np.random.Generator, ranges: Mapping[str, Value], part: Value
 ) -> dict[str, float]:
     """The values of an object, with its kinetic friction as a part of the static."""
-    drawn = {key: _draw(generator, value) for key, value in ranges.items()}
-    if "friction_static" in drawn:
-        kinetic = drawn["friction_static"] * _draw(generator, part)
-        drawn["friction_kinetic"] = kinetic
-    return drawn
+    values = {key: _draw(generator, value) for key, value in ranges.items()}
+    if "friction_static" in values:
+        kinetic = values["friction_static"] * _draw(generator, part)
+        values["friction_kinetic"] = kinetic
+    return values
 
 
 def _moves(values: Mapping[str, float], push_n: float, skin: Cylinder) -> bool:
@@ -433,17 +433,22 @@ def _moves(values: Mapping[str, float], push_n: float, skin: Cylinder) -> bool:
     return hold <= level * min(push_n, passed_on(values, skin))
 
 
-def passed_on(drawn: Mapping[str, float], skin: Cylinder) -> float:
+def passed_on(values: Mapping[str, float], skin: Cylinder) -> float:
     """Newtons that an object passes on to its foot: the force that presses its stems or
     its elastic layer (`effects.foundation`) `PRESSED_M` deep; infinite for other
     objects."""
-    if "stem_n_m" in drawn:
-        return round(drawn["stem_count"]) * drawn["stem_n_m"] * PRESSED_M
-    if "modulus_pa" in drawn:
-        length = min(drawn["width_m"], skin.rows * skin.pitch[0])
+    if "stem_n_m" in values:
+        return round(values["stem_count"]) * values["stem_n_m"] * PRESSED_M
+    if "modulus_pa" in values:
+        length = min(values["width_m"], skin.rows * skin.pitch[0])
         half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)
         per_length = (
-            4.0 / 3.0 * drawn["modulus_pa"] / drawn["depth_m"] * PRESSED_M * half_width
+            4.0
+            / 3.0
+            * values["modulus_pa"]
+            / values["depth_m"]
+            * PRESSED_M
+            * half_width
         )
         return length * per_length
     return math.inf

@@ -170,12 +170,14 @@ FAMILIES = {
 
 def keys_of(family: str) -> dict[str, float | None]:
     """{key of `OBJECT` that an object of a family may have: its default, or None}."""
-    known = FAMILIES[family]
-    others = {key for other in FAMILIES.values() for key in other.own} - {*known.own}
+    family_info = FAMILIES[family]
+    others = {key for other in FAMILIES.values() for key in other.own} - {
+        *family_info.own
+    }
     defaults = {
         key: field.default for key, field in OBJECT.items() if key not in others
     }
-    return {**defaults, **known.defaults}
+    return {**defaults, **family_info.defaults}
 
 
 ELASTIC = ("foam", "pillow")

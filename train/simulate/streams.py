@@ -42,8 +42,8 @@ def draws(
         trials: (n,) trial numbers, 0 and up.
         kind: `random` on [0, 1), or `standard_normal`, cut at `FARTHEST`.
     """
-    drawn = getattr(stream(seed, name, condition), kind)(int(trials.max()) + 1)
-    return np.asarray(np.clip(drawn, -FARTHEST, FARTHEST)[trials])
+    numbers = getattr(stream(seed, name, condition), kind)(int(trials.max()) + 1)
+    return np.asarray(np.clip(numbers, -FARTHEST, FARTHEST)[trials])
 
 
 @cache

@@ -98,11 +98,11 @@ def section(context: Context) -> Section:
         splits.append((others, group_folds(y[GROUP_TASK])))
     cases = [(method, *split) for split in splits for method in compared.values()]
     answers = context.workers.map("methods", call, cases)
-    known = dict(zip(compared, answers, strict=False))
+    by_name = dict(zip(compared, answers, strict=False))
     unseen = dict(zip(compared, answers[len(compared) :], strict=False))
-    text = [sentence(task, known, unseen) for task in y]
-    known[SEARCHED] = grid_search(context.vectors(), y)
-    known[GUESS] = {task: majority(labels) for task, labels in y.items()}
+    text = [sentence(task, by_name, unseen) for task in y]
+    by_name[SEARCHED] = grid_search(context.vectors(), y)
+    by_name[GUESS] = {task: majority(labels) for task, labels in y.items()}
     never = {
         task: {
             m: percent(result[task].accuracy)
@@ -116,7 +116,7 @@ def section(context: Context) -> Section:
         | {"objects never met %": never[task].get(method, "")}
         | score(result[task])
         for task in y
-        for method, result in known.items()
+        for method, result in by_name.items()
     ]
     title = "Accuracy of each method on new contacts"
     return Section(
@@ -144,8 +144,8 @@ def section(context: Context) -> Section:
             figures.bars(
                 "methods",
                 f"{title}; diamonds show objects never met",
-                list(known),
-                by_task(known),
+                list(by_name),
+                by_task(by_name),
                 marks=never,
                 mark="never met",
             )

@@ -216,10 +216,10 @@ def draw_task(axes: Any, compared: Compared, task: str) -> None:
         colour, marker, _ = STROKES[number]
         for kind, dashes in ((KNOWN, "-"), (UNMET, ":")):
             shares = {w: share(made[task], kind) for w, made in answers.points.items()}
-            drawn = {w: 100.0 * s for w, s in shares.items() if s is not None}
+            percentages = {w: 100.0 * s for w, s in shares.items() if s is not None}
             axes.plot(
-                list(drawn),
-                list(drawn.values()),
+                list(percentages),
+                list(percentages.values()),
                 color=colour,
                 marker=marker,
                 ms=3,

@@ -7,8 +7,8 @@ from train.simulate.readings import Readings
 def sensor(readings: Readings) -> None:
     """Zero the counts of dead taxels."""
     scene = readings.scene
-    drawn = readings.stream("dead_taxels").random(scene.skin.shape)
-    valid = drawn >= scene.setting("dead_taxels", "part")
+    shares = readings.stream("dead_taxels").random(scene.skin.shape)
+    valid = shares >= scene.setting("dead_taxels", "part")
     readings.counts *= valid
     if scene.setting("dead_taxels", "known"):
         readings.valid = valid

@@ -9,5 +9,5 @@ from train.simulate.readings import Readings
 def clock(readings: Readings) -> None:
     """Choose the frames that arrive; the first one always does."""
     readings.kept = np.ones(len(readings.t), dtype=bool)
-    drawn = readings.stream("dropped_frames").random(len(readings.t) - 1)
-    readings.kept[1:] = drawn >= readings.scene.setting("dropped_frames", "part")
+    shares = readings.stream("dropped_frames").random(len(readings.t) - 1)
+    readings.kept[1:] = shares >= readings.scene.setting("dropped_frames", "part")

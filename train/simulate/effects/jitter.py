@@ -15,9 +15,9 @@ def clock(readings: Readings) -> None:
     counts = readings.counts.reshape(len(readings.t), -1)
     frame = t[1] - t[0]
     part = np.zeros(len(t))
-    drawn = readings.stream("jitter").standard_normal(len(t) - 2)
+    deviations = readings.stream("jitter").standard_normal(len(t) - 2)
     part[1:-1] = np.clip(
-        drawn * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45
+        deviations * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45
     )
     readings.times = t + part * frame
     series: tuple[NDArray[Any], ...] = readings.joints, counts
