@@ -324,12 +324,22 @@ class ActiveTaxels:
             bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
             if 2 * bits.bit_count() > self.bits.bit_count():
                 return Region(self._grid, bits, int(self.counts.item(index)))
+        if not self.bits & self._grid.neighbours(self.bits):
+            return self._lone(previous)
         areas = self._components.areas
         tied = np.flatnonzero(areas == areas.max())
         label = tied.item(0) if len(tied) == 1 else self._first_of(tied, previous)
         taxels = np.zeros_like(self._padded)
         taxels.reshape(-1)[self._taxels[self._components.of_taxel == label]] = True
         return Region(self._grid, self._grid.pack(taxels), int(self._peaks[label]))
+
+    def _lone(self, previous: Region | None) -> Region:
+        """The first of lone taxels by the rule of `_first_of`: a flickering skin may
+        have nothing else, a hundred and more of them."""
+        before = 0 if previous is None else previous.bits
+        taxels = np.flatnonzero(self._grid.unpack(self.bits & before or self.bits))
+        index = int(taxels[self.counts.reshape(-1)[taxels].argmax()])
+        return Region(self._grid, self._grid.bit(index), int(self.counts.item(index)))
 
     def _first_of(self, tied: NDArray[np.intp], previous: Region | None) -> int:
         """Of components of one area, that of the largest overlap with a region, then of
