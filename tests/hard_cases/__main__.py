@@ -5,7 +5,8 @@ import sys
 import textwrap
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Self
 
 from tests.bench import tables
 from tests.hard_cases import margins
@@ -32,18 +33,38 @@ def place(worst: Worst) -> str:
     return f"{number(worst.error)} at {', '.join(parameters)} of {worst.tried} tried"
 
 
-def row_of(case: Case, worst: Worst) -> Mapping[str, str]:
-    """The case's row of the table; measures its margin, its price and the usual tools."""
-    row = {
-        "hard case": case.key,
-        "oracle": case.oracle,
-        "error": case.unit,
-        "bound": number(case.bound),
-        "largest error": place(worst),
-        "margin": margins.margin(case),
-        "the usual tools": case.theirs() or "-",
-        "cost": margins.price(case),
-    }
+@dataclass(frozen=True)
+class Entry:
+    """A case in the two tables of the page, and for the terminal.
+
+    Attributes:
+        answer: how far the case holds, and at what cost.
+        judge: the oracle, and what the usual tools answer.
+    """
+
+    answer: Mapping[str, str]
+    judge: Mapping[str, str]
+
+    @classmethod
+    def of(cls, case: Case, worst: Worst) -> Self:
+        """The entry of a case; measures its margin, its price and the usual tools."""
+        answer = {
+            "hard case": case.key,
+            "holds to": margins.margin(case),
+            "bound": number(case.bound),
+            "largest error": place(worst),
+            "cost": margins.price(case),
+        }
+        judge = {
+            "hard case": case.key,
+            "oracle": case.oracle,
+            "error": case.unit,
+            "the usual tools": case.theirs() or "-",
+        }
+        return cls(_escaped(answer), _escaped(judge))
+
+
+def _escaped(row: Mapping[str, str]) -> Mapping[str, str]:
     return {name: text.replace("|", "\\|") for name, text in row.items()}
 
 
@@ -52,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
     parser.add_argument("--only", default="", help="cases whose name holds this text")
     arguments = parser.parse_args(argv)
-    rows: list[Mapping[str, Any]] = []
+    entries: list[Entry] = []
     beyond = 0
     for case in CASES:
         if arguments.only not in case.key:
@@ -61,16 +82,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         worst = case.worst()
         within = worst.error <= case.bound
         beyond += not within
-        row = row_of(case, worst)
-        rows.append(row)
+        entry = Entry.of(case, worst)
+        entries.append(entry)
         took = time.perf_counter() - began
         print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
-        for name, text in row.items():
+        for name, text in {**entry.judge, **entry.answer}.items():
             if text != case.key:
                 print(textwrap.fill(f"{name}: {text}", 96, **INDENT))
-    print(f"{len(rows)} cases, {beyond} beyond their bound")
-    if len(rows) == len(CASES):
-        tables.write("hard_cases", [rows], "make hard-cases")
+    print(f"{len(entries)} cases, {beyond} beyond their bound")
+    if len(entries) == len(CASES):
+        answers = [entry.answer for entry in entries]
+        judges = [entry.judge for entry in entries]
+        tables.write("hard_cases", [answers, judges], "make hard-cases")
     return 1 if beyond else 0
 
 
