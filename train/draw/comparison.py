@@ -126,7 +126,8 @@ def _draw(
     ):
         axis.set_ylim(bottom=0.0)
         axis.set_ylabel(f"{title} ({unit})")
-    axes[0, 0].set_ylabel("row, elbow to wrist")
+    on_arm = recordings[0][1].layout.wraps
+    axes[0, 0].set_ylabel("row, elbow to wrist" if on_arm else "row")
     bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
     bar.set_label(f"{UNITS[recordings[0][1].layout.force_unit]} per taxel")
     with write_whole(out) as file:

@@ -152,7 +152,10 @@ def _frames(
             axis.plot(col % layout.cols, row, "r+", markersize=9)
             title += f", {region.area} taxels"
         axis.set_title(title, fontsize=10)
-        axis.set(xlabel="column (around)", ylabel="row, from elbow")
+        if layout.wraps:
+            axis.set(xlabel="column (around)", ylabel="row, from elbow")
+        else:
+            axis.set(xlabel="column", ylabel="row")
         axis.label_outer()
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
     bar.set_label(f"{UNITS[layout.force_unit]} per taxel")

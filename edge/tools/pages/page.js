@@ -89,8 +89,9 @@ function drawSkin(picture) {
   }
   pen.stroke();
   if (picture.shear) drawShear(pen, picture, touched, left, side);
-  $("seam").textContent = "Rows run down, from elbow to wrist." +
-    (picture.wraps ? " The last column touches the first." : "");
+  $("seam").textContent = picture.wraps ?
+    "Rows run down, from elbow to wrist. The last column touches the first." :
+    "Rows run down, columns to the right.";
 }
 
 // A line from the middle of each taxel in contact: its shear, half a taxel for the strongest.
