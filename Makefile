@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk \
+  board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk \
   stopping soak soak-day constraints clean
 
 help:
@@ -30,6 +30,7 @@ help:
 	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
 	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
+	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
@@ -277,6 +278,15 @@ wheel-test: $(DEV) wheel
 
 kernel-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_kernel.py -rs --capture=tee-sys
+
+$(VENV)/.browser: $(DEV)
+	$(PIP) --group browser
+	@touch $@
+
+BROWSED := tests/edge/tools/test_page.py tests/train/tradeoff/test_slider.py
+
+browser-test: $(VENV)/.browser
+	$(BIN)/python -m pytest $(BROWSED) -rs
 
 service-test: $(DEV)
 	$(BIN)/python -m pytest tests/board/test_service.py -rs
