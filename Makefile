@@ -283,7 +283,8 @@ $(VENV)/.browser: $(DEV)
 	$(PIP) --group browser
 	@touch $@
 
-BROWSED := tests/edge/tools/test_page.py tests/train/tradeoff/test_slider.py
+BROWSED := tests/edge/tools/test_page.py tests/train/tradeoff/test_slider.py \
+  tests/train/report/test_page.py tests/train/study/test_study_report.py
 
 browser-test: $(VENV)/.browser
 	$(BIN)/python -m pytest $(BROWSED) -rs

@@ -84,6 +84,10 @@ def fold_count(trials: int, quick: bool = False) -> int:
     return QUICK_FOLDS if quick or trials > MANY else FOLDS
 
 
+Plan = tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]
+"""(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
+
+
 @dataclass(frozen=True)
 class Chosen:
     """The settings that a task is fitted with, and their accuracy.
@@ -376,7 +380,7 @@ def _by_fold(
 def decided_together(
     chosen: Mapping[str, Chosen],
     vectors: Vectors,
-    plans: Mapping[str, tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]],
+    plans: Mapping[str, Plan],
     jobs: int = 1,
 ) -> dict[str, Chosen]:
     """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a
@@ -391,42 +395,56 @@ def decided_together(
             trials}}.
         jobs: processes.
     """
-    y = vectors.y
-    at_end = replace(vectors, X=vectors.X[None])
-    family_of = {task: family for family in families(y) for task in family}
+    family_of = {task: family for family in families(vectors.y) for task in family}
     right: dict[tuple[str, str], NDArray[np.bool_]] = {}
     for family in dict.fromkeys(family_of.values()):
         for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
-            folds, choices = plans[left_out]
-            some = [{task: by_task[task] for task in family} for by_task in choices]
-            nothing = np.zeros(len(folds), dtype=bool)
-            right |= {(left_out, task): nothing.copy() for task in family}
-            by_fold = held_out(at_end, folds, some, jobs)
-            for fold, answers in enumerate(by_fold):
-                for task, (labels, *_) in answers.items():
-                    asked = folds == fold
-                    right[left_out, task][asked] = labels[0] == y[task][asked]
+            plan = plans[left_out]
+            for task, hits in _right_together(family, vectors, plan, jobs).items():
+                right[left_out, task] = hits
 
     def counted(task: str, left_out: str, result: Promise) -> Promise:
         if task not in family_of:
             return result
-        hits = right[left_out, task][(plans[left_out][0] >= 0) & (y[task] != "")]
+        folds, _ = plans[left_out]
+        tested = (folds >= 0) & (vectors.y[task] != "")
+        hits = right[left_out, task][tested]
         assert result.hits is not None
         more = int(hits.sum()) - int(result.hits.sum())
         return replace(result, right=result.right + more, hits=hits)
 
-    return {
-        task: replace(
+    together = {}
+    for task, settings in chosen.items():
+        members = family_of.get(task, (task,))
+        _, by_fold = plans[settings.left_out]
+        together[task] = replace(
             settings,
             accuracy=counted(task, settings.left_out, settings.accuracy),
             by_trial=counted(task, TRIAL, settings.by_trial),
-            by_fold=tuple(
-                {member: by_task[member] for member in family_of.get(task, (task,))}
-                for by_task in plans[settings.left_out][1]
-            ),
+            by_fold=tuple(_of_tasks(by_task, members) for by_task in by_fold),
         )
-        for task, settings in chosen.items()
-    }
+    return together
+
+
+def _of_tasks(choices: Mapping[str, Choice], tasks: Sequence[str]) -> dict[str, Choice]:
+    """{task: its choice} of some tasks."""
+    return {task: choices[task] for task in tasks}
+
+
+def _right_together(
+    family: Sequence[str], vectors: Vectors, plan: Plan, jobs: int
+) -> dict[str, NDArray[np.bool_]]:
+    """{task: (n,) whether the label named without a trial's fold is right} of tasks
+    that are decided together."""
+    folds, choices = plan
+    at_end = replace(vectors, X=vectors.X[None])
+    of_family = [_of_tasks(by_task, family) for by_task in choices]
+    right = {task: np.zeros(len(folds), dtype=bool) for task in family}
+    for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
+        asked = folds == fold
+        for task, (labels, _) in answers.items():
+            right[task][asked] = labels[0] == vectors.y[task][asked]
+    return right
 
 
 def without_folds(

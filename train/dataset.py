@@ -506,9 +506,8 @@ def complete(touched: Touched, *, partial: bool) -> Labelled:
     tasks = shared_tasks(labels, partial=partial)
     lacking: dict[str, tuple[Path, ...]] = {}
     for task in tasks:
-        without = [
-            p for p, is_own in zip(paths, labels, strict=True) if task not in is_own
-        ]
+        by_path = zip(paths, labels, strict=True)
+        without = [path for path, of_trial in by_path if task not in of_trial]
         lacking[f"a label for {task}"] = tuple(dict.fromkeys(without))
     enough = any if partial else all
     trials: list[Trial] = []

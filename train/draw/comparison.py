@@ -2,6 +2,7 @@
 time."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -71,56 +72,30 @@ def draw(
 def _draw(
     recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None
 ) -> None:
-    touches = [
-        (name, recording, *contact_of(name, recording))
-        for name, recording in recordings
-    ]
+    touches = []
+    for name, recording in recordings:
+        onset, series = contact_of(name, recording)
+        touches.append(_Touch(name, recording, onset, series))
     horizon = WINDOW_S if model is None else model.info.window_s
     figure = Figure(figsize=(2.6 * len(recordings) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
     frames = [
-        strongest_frame(recording, onset, horizon) for _, recording, onset, _ in touches
+        strongest_frame(touch.recording, touch.onset_s, horizon) for touch in touches
     ]
-    scale = PowerNorm(
-        GAMMA, vmin=0.0, vmax=max(float(force.max()) for _, force in frames)
-    )
-    for (name, recording, _, series), (seconds, force), column in zip(
-        touches, frames, axes.T, strict=True
-    ):
+    strongest = max(float(force.max()) for _, force in frames)
+    scale = PowerNorm(GAMMA, vmin=0.0, vmax=strongest)
+    for touch, (seconds, force), column in zip(touches, frames, axes.T, strict=True):
         image = column[0].imshow(force, norm=scale, cmap="magma", aspect="auto")
-        kind = recording.labels.get("category", "").replace("-", ", ")
-        title = (
-            "\n".join(filter(None, (kind, recording.labels.get("object")))) or "touch"
-        )
-        column[0].set_title(title, fontsize=14, weight="bold")
+        column[0].set_title(touch.title, fontsize=14, weight="bold")
         column[0].set_xlabel(f"column, at {seconds:.2f} s")
-        decided = None if model is None else _decided(name, recording, model)
-        end = horizon if decided is None else decided.window_s
-        for axis, curve in zip(column[1:], curves(series).values(), strict=True):
-            axis.plot(series.t, curve, color="C0", linewidth=2.2)
-            axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
-            if decided is not None:
-                axis.axvline(end, color="C1", linewidth=1.8)
-            axis.set_xlim(0.0, 1.15 * horizon)
-            axis.grid(alpha=0.25)
-        column[3].set_xlabel("seconds from onset")
+        decided = None
+        if model is not None:
+            decided = _decided(touch.name, touch.recording, model)
+        _draw_curves(column[1:], touch.series, decided, horizon)
         if decided is not None:
-            share = f"after {decided.window_s:g} s"
-            if decided.confidence is not None:
-                share = f"{decided.confidence:.0%} {share}"
-            column[3].text(
-                0.5,
-                -0.45,
-                f"decided: {decided.label}\n{share}",
-                transform=column[3].transAxes,
-                ha="center",
-                va="top",
-                fontsize=13,
-                color="C1",
-                weight="bold",
-            )
+            _draw_answer(column[3], decided)
     for axis, title, unit in zip(
         axes[1:, 0], TITLES, units(recordings[0][1].layout).values(), strict=True
     ):
@@ -177,4 +152,54 @@ def strongest_frame(
     k = inside[recording.frames[inside].sum(axis=(1, 2), dtype=np.int64).argmax()]
     return float(t[k]), recording.frames[k] / (
         recording.layout.counts_per_newton or 1.0
+    )
+
+
+@dataclass(frozen=True)
+class _Touch:
+    """A recording, and its first contact."""
+
+    name: str
+    recording: Recording
+    onset_s: float
+    series: FeatureSeries
+
+    @property
+    def title(self) -> str:
+        """Its kind and object."""
+        kind = self.recording.labels.get("category", "").replace("-", ", ")
+        words = (kind, self.recording.labels.get("object"))
+        return "\n".join(filter(None, words)) or "touch"
+
+
+def _draw_curves(
+    axes: Sequence[Any], series: FeatureSeries, decided: Decided | None, horizon: float
+) -> None:
+    """A touch's curves below each other, and until when they count."""
+    end = horizon if decided is None else decided.window_s
+    for axis, curve in zip(axes, curves(series).values(), strict=True):
+        axis.plot(series.t, curve, color="C0", linewidth=2.2)
+        axis.axvspan(0.0, end, color="C0", alpha=0.08, linewidth=0)
+        if decided is not None:
+            axis.axvline(end, color="C1", linewidth=1.8)
+        axis.set_xlim(0.0, 1.15 * horizon)
+        axis.grid(alpha=0.25)
+    axes[-1].set_xlabel("seconds from onset")
+
+
+def _draw_answer(axis: Any, decided: Decided) -> None:
+    """A decision in words below an axis."""
+    share = f"after {decided.window_s:g} s"
+    if decided.confidence is not None:
+        share = f"{decided.confidence:.0%} {share}"
+    axis.text(
+        0.5,
+        -0.45,
+        f"decided: {decided.label}\n{share}",
+        transform=axis.transAxes,
+        ha="center",
+        va="top",
+        fontsize=13,
+        color="C1",
+        weight="bold",
     )

@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -54,19 +54,20 @@ def summary(fitted: Fitted, prices: Prices) -> str:
             f"{task}: {accuracy(chosen)}",
             f"  {_described(chosen.choice, fitted)}",
         ]
-    units: dict[str, list[str]] = {}
-    for name, unit in fitted.dataset.units.items():
-        units.setdefault("without unit" if unit == "1" else f"in {unit}", []).append(
-            name
-        )
-    lines += [
-        "",
-        *(f"{unit}: {', '.join(features)}" for unit, features in units.items()),
-    ]
+    lines += ["", *_by_unit(fitted.dataset.units)]
     if any(moves(measures.feature(name)) for name in fitted.dataset.names):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+
+
+def _by_unit(units: Mapping[str, str]) -> list[str]:
+    """A line for each unit, with its features, from {feature: its unit}."""
+    features: dict[str, list[str]] = {}
+    for name, unit in units.items():
+        words = "without unit" if unit == "1" else f"in {unit}"
+        features.setdefault(words, []).append(name)
+    return [f"{words}: {', '.join(names)}" for words, names in features.items()]
 
 
 def candidates(fitted: Fitted, prices: Prices) -> Table:
