@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk \
+  board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
   stopping soak soak-day constraints clean
 
 help:
@@ -42,6 +42,7 @@ help:
 	@echo "  make shear-transfer   models with shear and without on trials from another engine (MuJoCo)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
+	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
 	@echo "  make soak          ten minutes of the loop in virtual time: memory and schedule"
 	@echo "  make soak-day      24 hours of the same at 15 Hz"
@@ -229,6 +230,10 @@ docs: $(VENV)/.docs
 
 risk: $(DEV)
 	$(BIN)/python -m tests.bench.risk $(RISK)
+
+shifts: $(DEV) $(SIMULATED)/.made
+	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
+	$(BIN)/python -m tests.bench.shifts --model $(OUT)/shifts/model.onnx
 
 ifndef DATA
 stopping: $(SIMULATED)/.made

@@ -110,6 +110,11 @@ class Model:
         self._outputs = _outputs(self.info)
         self._engine = open_engine(name, self.contents, engine)
         self._check()
+        if self.info.products:
+            # Few models have products; the first decision is not to wait for an import.
+            from edge.model.agreement import agreed
+
+            self._agreed = agreed
 
     @property
     def engine(self) -> str:
@@ -292,10 +297,8 @@ class Model:
 
     def _agree(self, labels: dict[str, Any], distances: dict[str, Any]) -> None:
         """Give products and their factors the nearest answer in which they agree."""
-        from edge.model.agreement import agreed  # few models have products
-
         for task, factors in self.info.products.items():
-            agreed_labels, agreed_distances = agreed(task, factors, distances)
+            agreed_labels, agreed_distances = self._agreed(task, factors, distances)
             labels |= agreed_labels
             distances |= agreed_distances
 
