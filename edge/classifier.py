@@ -199,11 +199,11 @@ class Classifier:
         """Ask about the contacts whose next decision point has come, the longest due
         first, and at most so many times."""
         events: list[Event] = []
-        asked = 0
+        questions = 0
         for pending in sorted(self._pending, key=self._due_s):
-            while pending.tasks and asked < most and self._is_due(pending, t):
+            while pending.tasks and questions < most and self._is_due(pending, t):
                 events += self._decide(pending, began)
-                asked += 1
+                questions += 1
         self._pending = [pending for pending in self._pending if pending.tasks]
         return events
 

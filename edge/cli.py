@@ -197,10 +197,10 @@ def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:
     """Say that there is no such command, and which may have been meant; returns 2."""
     from difflib import get_close_matches  # rarely needed, and slow to load
 
-    near = get_close_matches(word, commands, 1, 0.5)
+    similar = get_close_matches(word, commands, 1, 0.5)
     hint = f"the commands are {', '.join(commands)}"
-    if near:
-        hint = f"did you mean {near[0]!r}?"
+    if similar:
+        hint = f"did you mean {similar[0]!r}?"
     print(f"{program}: there is no command {word!r}; {hint}", file=sys.stderr)
     return 2
 

@@ -30,6 +30,6 @@ class SystemClock:
 
     def sleep_until(self, t: float) -> None:
         """Wait until `t`; return at once if it has passed."""
-        left = t - time.monotonic()
-        if left > 0.0:
-            time.sleep(left)
+        remaining_s = t - time.monotonic()
+        if remaining_s > 0.0:
+            time.sleep(remaining_s)

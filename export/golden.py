@@ -41,15 +41,15 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     first, last = np.searchsorted(
         recording.t, (onset_s - 0.25, onset_s + model.info.window_s)
     )
-    kept = slice(first, last + 2)
+    window = slice(first, last + 2)
     valid = np.array(True) if recording.valid is None else recording.valid
     return replace(
         recording,
-        t=recording.t[kept],
-        frames=recording.frames[kept],
-        joints=None if recording.joints is None else recording.joints[kept],
-        shear=None if recording.shear is None else recording.shear[kept],
-        valid=np.broadcast_to(valid, recording.frames.shape)[kept],
+        t=recording.t[window],
+        frames=recording.frames[window],
+        joints=None if recording.joints is None else recording.joints[window],
+        shear=None if recording.shear is None else recording.shear[window],
+        valid=np.broadcast_to(valid, recording.frames.shape)[window],
     )
 
 

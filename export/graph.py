@@ -50,8 +50,8 @@ def _squares(
     0: the tasks of a space share its rows.
     """
     if components < rows[0].shape[1]:
-        used = (np.arange(rows[0].shape[1]) < components).astype(np.float64)
-        z = build.node("Mul", [z, build.constant(used)])
+        mask = (np.arange(rows[0].shape[1]) < components).astype(np.float64)
+        z = build.node("Mul", [z, build.constant(mask)])
     columns = build.by_decision_point_small(
         [-2.0 * r.T for r in rows], f"columns of {task}"
     )
@@ -197,8 +197,10 @@ def _task(
     z, off = projected
     squares, length = _squares(build, output, z, widened(rows), components, labels < 0)
     voters = build.constant([k], np.int64, f"k of {output}")
-    near = ["", names[f"{task}_neighbours"]]
-    values, places = build.nodes("TopK", [squares, voters], near, largest=0, sorted=1)
+    outputs = ["", names[f"{task}_neighbours"]]
+    values, places = build.nodes(
+        "TopK", [squares, voters], outputs, largest=0, sorted=1
+    )
     nearest = values, places, length
     _decide(build, output, _Voters(labels, classes, k), nearest, units, off)
     if f"{task}_label_distances" in names:
@@ -272,8 +274,8 @@ def _label_distances(
         "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0, sorted=1
     )
     roots = build.node("Round", [build.node("Sqrt", [nearest])])
-    kept = build.node("Where", [taken, roots, build.constant(0.0)])
-    total = build.node("ReduceSum", [kept, build.ints(2)], keepdims=0)
+    counted = build.node("Where", [taken, roots, build.constant(0.0)])
+    total = build.node("ReduceSum", [counted, build.ints(2)], keepdims=0)
     return build.node("Div", [total, counts])
 
 

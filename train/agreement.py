@@ -45,16 +45,16 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
     No task belongs to two products.
     """
     out: dict[str, dict[str, tuple[int, ...]]] = {}
-    taken: set[str] = set()
+    used_tasks: set[str] = set()
     for task, factors in products(y).items():
         met = set(zip(*(y[t].tolist() for t in (task, *factors)), strict=True))
         pairs = sorted(labels for labels in met if all(labels))
         names = {factor: sorted(set(y[factor].tolist()) - {""}) for factor in factors}
-        if taken & {task, *factors} or len(pairs) != np.prod(
+        if used_tasks & {task, *factors} or len(pairs) != np.prod(
             list(map(len, names.values()))
         ):
             continue
-        taken |= {task, *factors}
+        used_tasks |= {task, *factors}
         indices = zip(factors, list(zip(*pairs, strict=True))[1:], strict=True)
         out[task] = {f: tuple(map(names[f].index, labels)) for f, labels in indices}
     return out

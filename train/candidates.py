@@ -121,14 +121,14 @@ def candidates(  # noqa: PLR0913 - each option of `export` that fixes a choice
     """
     fixed = Fixed(features, projection, scaling, components, k)
     mode = Mode.of(drawn=drawn, quick=quick)
-    tried = []
+    combinations = []
     for sets in _combinations(fixed, mode, joints=joints, shear=shear):
         for kind in KINDS if projection is None else (projection,):
             if fixed.asks or mode.tries(kind, sets):
                 grid = _grid(sets, kind, fixed, mode)
                 grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-                tried.append(Candidate(tuple(sets), kind, grids))
-    return tried
+                combinations.append(Candidate(tuple(sets), kind, grids))
+    return combinations
 
 
 @dataclass(frozen=True)

@@ -227,8 +227,8 @@ class Choosing:
         if any(grid.targets for grid in grids):
             return self._y
         together = [family for family in families(self._y) if self._grouped & {*family}]
-        needed = self._grouped.union(*together)
-        return {task: self._y[task] for task in self._y if task in needed}
+        tasks = self._grouped.union(*together)
+        return {task: self._y[task] for task in self._y if task in tasks}
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
         """{task: answers of the candidate that is best in plain cross-validation}."""
@@ -268,11 +268,11 @@ class Choosing:
         by_window = [self._right(window_s) for window_s in windows]
         right = {task: [answers[task] for answers in by_window] for task in self._y}
         order = np.arange(len(windows))
-        needed = [
+        places = [
             choose(np.array(each), order, margin=WINDOW_MARGIN)
             for each in right.values()
         ]
-        best = windows[max(needed)]
+        best = windows[max(places)]
         shares = "; ".join(
             f"{task} "
             + ", ".join(
@@ -441,9 +441,9 @@ def _right_together(
     of_family = [_of_tasks(by_task, family) for by_task in choices]
     right = {task: np.zeros(len(folds), dtype=bool) for task in family}
     for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
-        asked = folds == fold
+        in_fold = folds == fold
         for task, (labels, _) in answers.items():
-            right[task][asked] = labels[0] == vectors.y[task][asked]
+            right[task][in_fold] = labels[0] == vectors.y[task][in_fold]
     return right
 
 

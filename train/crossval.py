@@ -80,12 +80,12 @@ def neighbours(
     rows = np.empty((n, max_components, min(max_k, n - 1)), dtype=np.int64)
     with single_thread():
         for i, query in enumerate(X if tested is None else tested):
-            others = np.delete(np.arange(n), i)
-            mean, gain, scaled = centred_and_scaled(X[others], scaling, features)
+            training = np.delete(np.arange(n), i)
+            mean, gain, scaled = centred_and_scaled(X[training], scaling, features)
             axes = Spectrum(scaled).leading(max_components)
             weights = on_grid(axes.T)
             grid = Grid.of(scaled, len(axes))
-            used = len(axes)
+            axes_count = len(axes)
             differences = grid.project(scaled, weights) - grid.project(
                 (query - mean) * gain, weights
             )
@@ -93,8 +93,10 @@ def neighbours(
             # numbers.
             squares = np.cumsum(differences.T**2, axis=0)
             order = np.argsort(squares, axis=1, kind="stable")[:, : rows.shape[2]]
-            rows[i, :used] = others[order]
-            rows[i, used:] = others[order[-1]] if used else others[: rows.shape[2]]
+            rows[i, :axes_count] = training[order]
+            rows[i, axes_count:] = (
+                training[order[-1]] if axes_count else training[: rows.shape[2]]
+            )
     return rows
 
 

@@ -132,10 +132,10 @@ class DataSet:
 
     def part(self, trials: NDArray[np.bool_]) -> DataSet:
         """Some of the trials (n,)."""
-        kept = (
+        part = (
             trial for trial, taken in zip(self.trials, trials, strict=True) if taken
         )
-        return replace(self, trials=tuple(kept))
+        return replace(self, trials=tuple(part))
 
     def untouched_labels(self, task: str) -> list[str]:
         """The labels for a task of the recordings in which no contact was found."""
@@ -208,16 +208,18 @@ class DataSet:
     def of(self, names: Sequence[str]) -> DataSet:
         """The same trials with some of the features measured, in the order of
         `self.names`."""
-        taken = tuple(name for name in self.names if name in names)
-        types = measures.features(taken)
+        measured_names = tuple(name for name in self.names if name in names)
+        types = measures.features(measured_names)
         return replace(
             self,
-            names=taken,
+            names=measured_names,
             layout=replace(self.layout, axes=axes(types)),
             chain=self.chain if any(map(moves, types)) else None,
             joints=self.joints if any(feature.of_joints for feature in types) else 0,
             kernels={
-                name: table for name, table in self.kernels.items() if name in taken
+                name: table
+                for name, table in self.kernels.items()
+                if name in measured_names
             },
         )
 
@@ -355,12 +357,12 @@ def with_shear(
     has = [recording.shear is not None for recording in data.recordings]
     if not any(has):
         raise InputError("no recording has shear, which the features need")
-    kept = replace(
+    resorted = replace(
         data,
         paths=tuple(compress(data.paths, has)),
         recordings=tuple(compress(data.recordings, has)),
     )
-    return kept, tuple(path for path in data.paths if path not in kept.paths)
+    return resorted, tuple(path for path in data.paths if path not in resorted.paths)
 
 
 @dataclass(frozen=True)
@@ -390,12 +392,12 @@ def with_poses(
     """
     moving = any(map(moves, types))
     of_joints = any(feature.of_joints for feature in types)
-    needed = data.joints and (of_joints or moving)
+    needs_joints = data.joints and (of_joints or moving)
     named: list[Named] = []
     arms: list[Chain | None] = []
     without: list[Path] = []
     for recording, path in zip(data.recordings, data.paths, strict=True):
-        if needed and recording.joints is None:
+        if needs_joints and recording.joints is None:
             without.append(path)
             continue
         chain = arm_of(recording, str(path), arm)

@@ -344,8 +344,8 @@ def evaluate(
             progress()
         for task, answers in result.items():
             # For fold i these are answers to fold j, and the other way round.
-            for without, asked in {pair, pair[::-1]}:
-                places = folds[test] == asked
+            for without, other in {pair, pair[::-1]}:
+                places = folds[test] == other
                 right[task][without][:, test[places]] = answers[:, places]
     tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
     for task, of_task in right.items():

@@ -435,10 +435,10 @@ def calibrate(
     options: FitOptions,
 ) -> SequentialClassifier:
     """A classifier for all decision points, with its stopping rules."""
-    used = list(settings.choices.values())
+    choices = list(settings.choices.values())
     for by_task in settings.without:
-        used += by_task.values()
-    dataset = measured.of(_features(used))
+        choices += by_task.values()
+    dataset = measured.of(_features(choices))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
         settings.choices,

@@ -120,11 +120,11 @@ class Mixing:
 
     def grids(self, chosen: Mapping[str, Chosen]) -> list[SearchGrid]:
         """The settings of each task with each weight that is tried."""
-        tried = dict.fromkeys((ONCE, (1, self.half), ALONE, SIMULATED))
+        weights_tried = dict.fromkeys((ONCE, (1, self.half), ALONE, SIMULATED))
         shared = self.shared
         grids = []
         for task in self.y:
-            for weights in tried if task in shared else (ALONE,):
+            for weights in weights_tried if task in shared else (ALONE,):
                 choice = chosen[task].choice
                 grids.append(_grid(task, choice, weights, self.labelled(task)))
         return grids

@@ -91,11 +91,11 @@ def _left_out(
     classes, index = np.unique(y[task], return_inverse=True)
     counting = choices[task].counts(y[task], vectors.is_own) > 0
     counting[test] = False
-    others = np.flatnonzero(counting)
-    quarter_of = stratified_folds(y[task][others], QUARTERS)
+    training = np.flatnonzero(counting)
+    quarter_of = stratified_folds(y[task][training], QUARTERS)
     answers = []
     for quarter in range(QUARTERS):
-        train = others[quarter_of <= quarter]
+        train = training[quarter_of <= quarter]
         earlier = vectors.part(train)
         fewer = fittable(choices, earlier.y, earlier.is_own)
         model = ContactClassifier(fewer, features, widths)

@@ -287,11 +287,11 @@ class ContactClassifier:
             rank = self.projections_[self.spaces_[task]].rank_
             self.components_[task] = min(choice.components, rank)
         if complete:
-            used = {
+            labels_used = {
                 t: np.where(counts[space] > 0, y[t], "")
                 for t, space in self.spaces_.items()
             }
-            self.products_ = factors_of(used)
+            self.products_ = factors_of(labels_used)
             self.slopes_ = self._slopes(X, y, is_own)
         return self
 
@@ -314,11 +314,11 @@ class ContactClassifier:
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
             new = folds == fold
-            others = {task: labels[~new] for task, labels in y.items()}
+            known_labels = {task: labels[~new] for task, labels in y.items()}
             owned = None if is_own is None else is_own[~new]
-            choices = fittable(self.choices, others, owned)
+            choices = fittable(self.choices, known_labels, owned)
             model = ContactClassifier(choices, self.features, self.widths)
-            model.fit(X[~new], others, owned, complete=False)
+            model.fit(X[~new], known_labels, owned, complete=False)
             for task, classes in model.classes_.items():
                 used = self.choices[task].counts(y[task], is_own) > 0
                 met = new & used & np.isin(y[task], classes)
@@ -386,9 +386,9 @@ class ContactClassifier:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Distances and training rows (m, k) for vectors (m, p), nearest first."""
         squares = self.squares(task, X)
-        near = self.nearest(task, squares)
-        distances = np.sqrt(np.take_along_axis(squares, near, axis=1))
-        return distances, self.members_[self.spaces_[task]][near]
+        rows = self.nearest(task, squares)
+        distances = np.sqrt(np.take_along_axis(squares, rows, axis=1))
+        return distances, self.members_[self.spaces_[task]][rows]
 
     def nearest(self, task: str, squares: NDArray[np.float64]) -> NDArray[np.int64]:
         """(m, k) places of the smallest squares (m, members); of equal ones the
@@ -418,8 +418,8 @@ def columns_of(
 ) -> NDArray[np.int64]:
     """The columns of vectors of `features` that hold the `names` ones, rising; all if
     empty."""
-    taken = [not names or name in names for name in features]
-    return np.flatnonzero(np.repeat(taken, widths))
+    is_named = [not names or name in names for name in features]
+    return np.flatnonzero(np.repeat(is_named, widths))
 
 
 def types_of(
@@ -427,7 +427,7 @@ def types_of(
 ) -> tuple[list[str], list[int]]:
     """Names and widths of the `names` among the features, in their order; all if
     empty."""
-    taken = [
+    pairs = [
         (f, w) for f, w in zip(features, widths, strict=True) if not names or f in names
     ]
-    return [name for name, _ in taken], [width for _, width in taken]
+    return [name for name, _ in pairs], [width for _, width in pairs]

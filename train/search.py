@@ -56,8 +56,8 @@ class SearchGrid:
         if self.projection == "pca":
             cells = [(c, 0.01) for c in self.components]
         else:
-            taken = min(directions, self.most_directions or directions)
-            cells = [(taken, shrinkage) for shrinkage in self.shrinkages]
+            directions_kept = min(directions, self.most_directions or directions)
+            cells = [(directions_kept, shrinkage) for shrinkage in self.shrinkages]
         return [
             Choice(
                 self.scaling,

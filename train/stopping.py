@@ -115,12 +115,12 @@ def held_out(
 def _fold(
     vectors: Vectors, left_out: NDArray[np.bool_], choices: Mapping[str, Choice]
 ) -> Answers:
-    others = vectors.part(~left_out)
-    form = others.features, others.widths
+    training = vectors.part(~left_out)
+    form = training.features, training.widths
     with single_thread():
         models = [
-            ContactClassifier(choices, *form).fit(x, others.y, others.is_own)
-            for x in others.X
+            ContactClassifier(choices, *form).fit(x, training.y, training.is_own)
+            for x in training.X
         ]
         return answers(models, vectors.X[:, left_out])
 
@@ -351,10 +351,10 @@ class SequentialClassifier:
         is_own: NDArray[np.bool_] | None,
     ) -> None:
         """Fit the classifier of each decision point."""
-        kept = _taken(self.choices.values(), self.features)
+        features = _taken(self.choices.values(), self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
-        self.columns_ = columns_of(kept, self.features, widths)
-        self.types_ = types_of(kept, self.features, widths)
+        self.columns_ = columns_of(features, self.features, widths)
+        self.types_ = types_of(features, self.features, widths)
         self.n_features_in_ = len(self.columns_)
         self.decision_points_ = []
         with single_thread():
@@ -370,12 +370,12 @@ class SequentialClassifier:
     ) -> None:
         """Fit the space of novelty, and set its limits by held-out trials."""
         most = finest({task: y[task] for task in self.choices})
-        kept = np.ascontiguousarray(X[..., self.columns_])
+        vectors = np.ascontiguousarray(X[..., self.columns_])
         _, widths = self.types_
         with single_thread():
-            self.space_ = NoveltySpace.of(kept, y[most], widths)
+            self.space_ = NoveltySpace.of(vectors, y[most], widths)
         novelty_folds = np.where(folds >= 0, stratified_folds(y[most], FOLDS), -1)
-        scores = held_out_scores(kept, y[most], novelty_folds, widths, self.jobs)
+        scores = held_out_scores(vectors, y[most], novelty_folds, widths, self.jobs)
         self.novelty_ = limits_of(most, scores[:, folds >= 0])
         self._excess = excess_of(self.novelty_, scores)
         self.unknown_ = unlike(self.novelty_, scores)
@@ -504,8 +504,8 @@ class SequentialClassifier:
 
 def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
     """The features that some choice takes, in their order."""
-    taken = set().union(*(choice.features or features for choice in choices))
-    return [name for name in features if name in taken]
+    names = set().union(*(choice.features or features for choice in choices))
+    return [name for name in features if name in names]
 
 
 def cross_fitted(
@@ -520,8 +520,8 @@ def cross_fitted(
     confidences = np.zeros(right.shape)
     for fold in range(int(folds.max()) + 1):
         left_out = folds == fold
-        others = tested & ~left_out
-        curve = Curve.of(margins[:, others], excess[:, others], right[:, others])
+        outside = tested & ~left_out
+        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
         evidence = margins[:, left_out], excess[:, left_out]
         confidences[:, left_out] = curve.probabilities(*evidence)
     return confidences

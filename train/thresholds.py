@@ -160,15 +160,15 @@ def chosen(
     )
     if not unfelt or present[1] == 0:
         return dataset, []
-    tried = [dataset, *(load(*level) for level in levels if level != present)]
-    shares = [accuracy(candidate) for candidate in tried]
+    datasets = [dataset, *(load(*level) for level in levels if level != present)]
+    shares = [accuracy(candidate) for candidate in datasets]
     best = int(np.argmax(shares))
     n = len(dataset.trials) + len(dataset.untouched)
     error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
     if n * (shares[best] - shares[0]) <= max(error, FEWEST_GAINED):
         return dataset, []
-    layout = tried[best].layout
-    return tried[best], [
+    layout = datasets[best].layout
+    return datasets[best], [
         f"the threshold is {layout.threshold_counts} and the onset {layout.onset} "
         "counts: at "
         f"{present[0]} and {present[1]} counts, {unfelt} recordings show no contact; in "

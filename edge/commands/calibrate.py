@@ -177,15 +177,15 @@ def moved_together(
     zero.
     """
     if former is not None:
-        moved = np.abs(baseline.astype(np.int64) - former.baseline)
+        change = np.abs(baseline.astype(np.int64) - former.baseline)
     else:
-        moved = np.zeros(baseline.shape, dtype=np.int64)
+        change = np.zeros(baseline.shape, dtype=np.int64)
         for chip in file.chips:
             if chip.kind.rests_at_zero:
-                moved.ravel()[chip.served] = baseline.ravel()[chip.served]
+                change.ravel()[chip.served] = baseline.ravel()[chip.served]
     if file.layout.onset == 0:  # any noise would be above it
         return []
-    regions = find_regions(moved, file.layout.onset, wraps=file.layout.wraps)
+    regions = find_regions(change, file.layout.onset, wraps=file.layout.wraps)
     taxels: list[tuple[int, int]] = []
     for region in regions:
         if region.area >= FEWEST_TOGETHER:
@@ -266,7 +266,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"only {measured.frames} frames could be read; at least {FEWEST_FRAMES} "
             "are needed"
         )
-    kept = replace_unusable(file, measured, former, arguments.force)
+    replaced = replace_unusable(file, measured, former, arguments.force)
     noise = measured.calibration.noise
     moving = noisiest_taxels(noise)
     if moving and not arguments.force:
@@ -290,7 +290,7 @@ def run(arguments: argparse.Namespace) -> int:
         "frames": measured.frames,
         "noise_median": round(median, 3),
         "noise_largest": round(largest, 3),
-        "kept": kept,
+        "kept": replaced,
         "moving": moving,
     }
     Output.of(arguments).event(

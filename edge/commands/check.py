@@ -134,10 +134,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.model is not None:
         model = Model(arguments.model)
         remarked += differences(model.info.layout, file.layout)
-    asked = file.reading.rate_hz
-    if wires.rate_hz < asked:
+    target_hz = file.reading.rate_hz
+    if wires.rate_hz < target_hz:
         wrong.append(
-            f"the file asks for {asked:g} Hz, but the wires carry {wires.rate_hz:.1f} "
+            f"the file asks for {target_hz:g} Hz, but the wires carry {wires.rate_hz:.1f} "
             "Hz: use more buses, a faster clock_hz or baud, or a lower [read] rate_hz"
         )
     buses = []
@@ -153,7 +153,7 @@ def run(arguments: argparse.Namespace) -> int:
     lines.append(
         f"The wires carry {wires.rate_hz:.1f} frames a second, with "
         f"{arguments.overhead:g} us of software for each transaction; the file asks "
-        f"for {asked:g}."
+        f"for {target_hz:g}."
     )
     lines += [f"Wrong:  {sentence}" for sentence in wrong]
     lines += [f"Remark: {sentence}" for sentence in remarked]
@@ -165,7 +165,7 @@ def run(arguments: argparse.Namespace) -> int:
         "buses": buses,
         "frame_rate_hz": round(wires.rate_hz, 1),
         "overhead_us": arguments.overhead,
-        "asked_hz": asked,
+        "asked_hz": target_hz,
         "remarks": wrong + remarked,
     }
     output.event(event, "\n".join(lines))

@@ -188,13 +188,13 @@ def _sense(
     """The function that gives a chip its raw values: rest values, and the scene with
     its sign and noise. A stage without a taxel rests."""
     taxels = np.array(chip.taxels)
-    used = taxels != UNUSED
-    at_rest = np.where(used, rest[taxels], chip.traits.rest).astype(np.int64)
+    wired = taxels != UNUSED
+    at_rest = np.where(wired, rest[taxels], chip.traits.rest).astype(np.int64)
 
     def sense(t: float) -> NDArray[np.uint16]:
         counts = scene(t).reshape(-1)[taxels].astype(np.int64)
         noisy = noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(noise)]
-        raw = at_rest + used * (chip.sign * counts + noisy[taxels])
+        raw = at_rest + wired * (chip.sign * counts + noisy[taxels])
         return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
 
     return sense

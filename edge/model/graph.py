@@ -195,12 +195,12 @@ class Graph:
     def _plan(self, names: tuple[str, ...]) -> list[Node]:
         """The nodes that the values need, in the order of computation."""
         if names not in self._plans:
-            needed = set(names)
+            values = set(names)
             plan = []
             # A file holds its nodes in the order of computation.
             for node in reversed(self._nodes):
-                if not needed.isdisjoint(node.outputs):
-                    needed.update(node.inputs)
+                if not values.isdisjoint(node.outputs):
+                    values.update(node.inputs)
                     plan.append(node)
             self._plans[names] = plan[::-1]
         return self._plans[names]

@@ -161,11 +161,11 @@ class Model:
         Raises:
             InputError: the source has no joint angles, or another number of them.
         """
-        needed = self.info.dof
-        if needed is not None and dof != needed:
+        dof_of_model = self.info.dof
+        if dof_of_model is not None and dof != dof_of_model:
             raise InputError(
                 f"{where}: has {dof or 'no'} joint angles, but the model needs "
-                f"{needed} of each frame; record them, or export a model without joints"
+                f"{dof_of_model} of each frame; record them, or export a model without joints"
             )
 
     @property

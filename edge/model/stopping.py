@@ -27,8 +27,8 @@ def margin(distances: Sequence[float], label: int) -> float:
         far away, and 0 if there is no other label.
     """
     own_distance = distances[label]
-    others = [d for other, d in enumerate(distances) if other != label]
-    nearest_other = min(others, default=own_distance)
+    other_distances = [d for other, d in enumerate(distances) if other != label]
+    nearest_other = min(other_distances, default=own_distance)
     return nearest_other - own_distance if own_distance < math.inf else -math.inf
 
 
@@ -143,8 +143,8 @@ class Stopping:
         if share > 0.0:
             divergence += share * math.log(share / error)
         level = TEST_SHARE * self.risk
-        needed = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
-        return f"{sentence}; {error:g} needs about {needed} trials"
+        trials = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
+        return f"{sentence}; {error:g} needs about {trials} trials"
 
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:

@@ -123,9 +123,9 @@ def second_opinion(model: Model, arrays: Mapping[str, NDArray[Any]]) -> Check | 
     name = "the same in numpy"
     rows = len(arrays["vectors"])
     other = answers(Model(model.path, "numpy"), arrays)
-    for key, seen in _comparable(model, arrays).items():
+    for key, answer in _comparable(model, arrays).items():
         answered = golden_labels(arrays, key) >= 0
-        check = compared(key, seen[answered], other[key][answered], 0.0)
+        check = compared(key, answer[answered], other[key][answered], 0.0)
         if not check.passed:
             return replace(check, name=f"{name}: {key}", rows=rows)
     return Check(name, rows, 0.0, None)
@@ -203,13 +203,13 @@ def _graph(
                 "takes "
                 f"{model.info.width} features; export both together"
             )
-    for key, seen in _comparable(model, arrays).items():
+    for key, answer in _comparable(model, arrays).items():
         bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
         refused = golden_labels(arrays, key) < 0
         if key != answered_key(key):
-            seen = seen.copy()
-            seen[refused] = arrays[key][refused]
-        yield key, seen, arrays[key], bound
+            answer = answer.copy()
+            answer[refused] = arrays[key][refused]
+        yield key, answer, arrays[key], bound
 
 
 def _comparable(
@@ -220,11 +220,13 @@ def _comparable(
     Models of that time gave the size of the excess, which not every engine rounds
     alike.
     """
-    seen = answers(model, arrays)
-    older = [key for key in seen if key.endswith(OUT_OF_RANGE) and key not in arrays]
+    comparable = answers(model, arrays)
+    older = [
+        key for key in comparable if key.endswith(OUT_OF_RANGE) and key not in arrays
+    ]
     for key in older:
-        del seen[key]
-    return seen
+        del comparable[key]
+    return comparable
 
 
 def answers(

@@ -33,9 +33,9 @@ def characters(shear: NDArray[np.int64]) -> list[list[str]]:
         along, around = shear[top : top + 2].sum(axis=0).T
         sizes = np.hypot(along, around)
         eighths = np.rint(np.arctan2(along, around) / (np.pi / 4)).astype(int) % 8
-        shown = sizes > SHORTEST * longest
+        long_enough = sizes > SHORTEST * longest
         line = []
-        for eighth, visible in zip(eighths.tolist(), shown.tolist(), strict=True):
+        for eighth, visible in zip(eighths.tolist(), long_enough.tolist(), strict=True):
             line.append(WAYS[eighth] if visible else "")
         lines.append(line)
     return lines

@@ -136,8 +136,8 @@ def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.in
     """Channels (c, samples) times powers of two, cut off at the largest number of
     `BITS` bits."""
     by = np.array(shifts)[:, None]
-    moved = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
-    return np.asarray(np.minimum(moved, (1 << BITS) - 1), dtype=np.int32)
+    scaled = np.minimum(channels, 1 << 48) << np.maximum(by, 0) >> np.maximum(-by, 0)
+    return np.asarray(np.minimum(scaled, (1 << BITS) - 1), dtype=np.int32)
 
 
 def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:

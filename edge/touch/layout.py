@@ -244,7 +244,7 @@ def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
     Raises:
         InputError: they cannot, see `for_device`.
     """
-    used = for_device(model, device)
+    matched = for_device(model, device)
     sentences = []
     dead = set(device.dead) - set(model.dead)
     if dead:
@@ -255,8 +255,8 @@ def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
             f"{model.counts_per_newton:g} in training; forces are converted"
         )
     for name, device_value, trained in (
-        ("threshold", device.threshold_counts, used.threshold_counts),
-        ("onset", device.onset, used.onset),
+        ("threshold", device.threshold_counts, matched.threshold_counts),
+        ("onset", device.onset, matched.onset),
     ):
         if (
             device_value

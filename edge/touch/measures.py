@@ -149,8 +149,8 @@ def names(quantities: Sequence[str] = QUANTITIES) -> list[str]:
         quantities: of the zones; with those of `SHEAR` for a skin of three axes.
     """
     zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in quantities]
-    others = [name for name in (*ALONE, *zones) if name not in PAPER]
-    return [*PAPER, *(name for name in others if name != "contact_max_force")]
+    names = [name for name in (*ALONE, *zones) if name not in PAPER]
+    return [*PAPER, *(name for name in names if name != "contact_max_force")]
 
 
 @lru_cache(maxsize=1024)

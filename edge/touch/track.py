@@ -136,9 +136,9 @@ class ContactTracker:
             region = None if share is None else regions[share]
             self._follow(contact, frame, active, region)
         contacts = list(self._contacts)
-        taken = set(shares.values())
+        shared = set(shares.values())
         for number, region in enumerate(regions):
-            if number in taken or not self._may_begin(region, contacts):
+            if number in shared or not self._may_begin(region, contacts):
                 continue
             contact = self._begin(frame, region)
             contacts.append(contact)

@@ -99,8 +99,8 @@ def counted_warnings() -> Iterator[None]:
         logger.removeHandler(counted)
         if counted.count:
             more = counted.count - 1
-            others = f" ({more} more recordings are like it)" if more else ""
-            LOG.warning(printable(f"{counted.first}{others}"))
+            more_text = f" ({more} more recordings are like it)" if more else ""
+            LOG.warning(printable(f"{counted.first}{more_text}"))
 
 
 def write(

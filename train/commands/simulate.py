@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         from train.simulate.run import total_trials, write
 
         options = {name: getattr(arguments, name) for name in ("jobs", "address")}
-        with bar(total=total_trials(scene), unit="trial", desc=scene.name) as shown:
-            written = write(scene, arguments.out, **options, progress=shown.update)
+        with bar(total=total_trials(scene), unit="trial", desc=scene.name) as progress:
+            written = write(scene, arguments.out, **options, progress=progress.update)
         lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]
         if written.redrawn:
             lines.append(

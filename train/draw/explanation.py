@@ -110,18 +110,18 @@ def draw(
     cases = []
     for line in explanations(model, recording, where):
         rival = line["rival"] or {"label": "others"}
-        near = []
+        neighbours = []
         for trial in [*line["nearest"][:MOST_NEAR], *filter(None, [line["rival"]])]:
             name = trial["trial"]
             if name not in series_of:
                 series_of[name] = _trial(folder, name)
             text = f"{name}: {trial['label']}, {trial['distance']:.3g} away"
             missing = "" if series_of[name] is not None else " (recording not found)"
-            near.append(
+            neighbours.append(
                 (text + missing, series_of[name], trial["label"] == line["label"])
             )
         title = f"{line['task']}: {line['label']}"
-        cases.append(Case(title, touch, near, line["pulls"], rival["label"]))
+        cases.append(Case(title, touch, neighbours, line["pulls"], rival["label"]))
     if not any(series_of.values()):
         raise InputError(
             f"{folder}: holds none of the nearest trials, such as {next(iter(series_of))}; "

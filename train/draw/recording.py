@@ -124,14 +124,14 @@ def _frames(
     t = recording.t
     spread = np.linspace(0.0, min(WINDOW_S, float(t[-1]) - onset), FRAMES - 1)
     times = [max(onset - 0.05, float(t[0])), *(onset + spread)]
-    shown = np.searchsorted(t, times).clip(0, len(t) - 1)
+    places = np.searchsorted(t, times).clip(0, len(t) - 1)
     scale = layout.counts_per_newton or 1.0
-    top = max(int(recording.frames[shown].max()), 1) / scale
+    top = max(int(recording.frames[places].max()), 1) / scale
     longest = 1.0
     if recording.shear is not None:
-        longest = max(float(np.abs(recording.shear[shown].astype(float)).max()), 1.0)
+        longest = max(float(np.abs(recording.shear[places].astype(float)).max()), 1.0)
     axes = [figure.add_subplot(grid[0, i]) for i in range(FRAMES)]
-    for axis, k in zip(axes, shown, strict=True):
+    for axis, k in zip(axes, places, strict=True):
         counts = frames[k].counts
         valid = frames[k].valid
         force = np.ma.masked_array(

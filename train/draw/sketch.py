@@ -155,10 +155,10 @@ def _object(
     start = first[0][[0, 2]]
     table = start[0] + ahead * np.array([-0.1, body.depth + 0.25])
     axis.plot(table, 2 * [start[1] + body.floor], color="sienna")
-    moved = max(ahead * float(now[0] - first[0][0]), 0.0)
-    slid = moved if "sliding" in body.effects else 0.0
+    way = max(ahead * float(now[0] - first[0][0]), 0.0)
+    slid = way if "sliding" in body.effects else 0.0
     if "stems" in body.effects:
-        for ends in body.stems(moved, slid):
+        for ends in body.stems(way, slid):
             heights = start[1] + [body.floor, body.top]
             line = start[0] + ahead * ends
             axis.plot(line, heights, color=style["color"], alpha=0.5, lw=1)
@@ -222,14 +222,14 @@ class _Body:
         back = [[self.depth, self.top], [self.depth, self.floor]]
         return np.vstack([np.column_stack([face, z]), back])
 
-    def stems(self, moved: float, slid: float) -> Iterator[np.ndarray]:
+    def stems(self, way: float, slid: float) -> Iterator[np.ndarray]:
         """The foot and the end of each stem, along the push."""
         count = min(int(self.values.get("stem_count") or 12), STEMS)
         spread = self.values.get("stem_spread_m") or 0.06
         for behind in np.linspace(0.0, spread, count):
             # A pot that slides takes its stems along; otherwise they bend as far as
             # pressed.
-            pressed = max(moved - slid - behind, 0.0)
+            pressed = max(way - slid - behind, 0.0)
             bent = pressed * (self.top - self.floor) / -self.floor
             yield slid + behind + np.array([0.0, bent])
 

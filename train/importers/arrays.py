@@ -141,17 +141,17 @@ def table_of(
         place = _time_axis(path, name, array, frames, axis)
         if place is None:
             continue
-        moved = np.moveaxis(array, place, 0)
+        time_first = np.moveaxis(array, place, 0)
         if array.ndim > 1:
             form.append(f"time is axis {place + 1} of {name or 'the array'}")
-        if moved.ndim > 3:
+        if time_first.ndim > 3:
             raise InputError(
-                f"{path}: {name or 'the array'} has {moved.ndim} dimensions; give "
+                f"{path}: {name or 'the array'} has {time_first.ndim} dimensions; give "
                 "--trials where the first is the trial, or save frames x rows x columns"
             )
-        if moved.ndim == 3:
-            shape = moved.shape[1:]
-        block = moved.reshape(frames, -1)
+        if time_first.ndim == 3:
+            shape = time_first.shape[1:]
+        block = time_first.reshape(frames, -1)
         names += _names(name, block.shape[1])
         blocks.append(block)
     data = pd.DataFrame(np.hstack(blocks), columns=names)

@@ -140,11 +140,11 @@ def parted(table: Table, axes: Axes) -> Parted:
         InputError: the columns of the axes do not belong together.
     """
     columns: dict[str, dict[str, str]] = {letter: {} for letter in LETTERS}
-    others = []
+    plain_names = []
     for name in table.names:
         found = lettered(name)
         if found is None:
-            others.append(name)
+            plain_names.append(name)
         else:
             columns[found[0]][found[1]] = name
     if not any(columns.values()):
@@ -161,7 +161,7 @@ def parted(table: Table, axes: Axes) -> Parted:
         name: (columns[axes.along][name], columns[axes.around][name]) for name in taxels
     }
     names = {column: name for name, column in taxels.items()}
-    data = table.data[[*others, *taxels.values()]].rename(columns=names)
+    data = table.data[[*plain_names, *taxels.values()]].rename(columns=names)
     return Parted(replace(table, data=data), shear)
 
 

@@ -210,8 +210,8 @@ def _time_column(
 ) -> tuple[str | None, str | None]:
     """The column of times, and the unit that its name tells."""
     if wishes.time:
-        (*others, time) = columns(table, names, wishes.time)
-        if others:
+        (*further, time) = columns(table, names, wishes.time)
+        if further:
             raise InputError(f"{table.path}: --time names several columns; name one")
         match = TIME.fullmatch(time)
         return time, _plain(match["unit"] if match else None)
@@ -330,15 +330,15 @@ def _unit_of(step: float) -> str:
     return next(units, "ns")
 
 
-def times_of(table: Table, taken: Meaning) -> NDArray[np.float64]:
+def times_of(table: Table, meaning: Meaning) -> NDArray[np.float64]:
     """(n,) seconds from the first row; NaN where a time is missing."""
-    assert taken.time is not None
-    if taken.unit == "iso":
+    assert meaning.time is not None
+    if meaning.unit == "iso":
         dates = pd.to_datetime(
-            table.data[taken.time], errors="coerce", format="ISO8601", utc=True
+            table.data[meaning.time], errors="coerce", format="ISO8601", utc=True
         )
         values = (dates - dates.iloc[0]).dt.total_seconds().to_numpy(np.float64)
     else:
-        values = numbers_of(table, taken.time).to_numpy()
-        values = (values - values[0]) * UNITS_S[taken.unit]
+        values = numbers_of(table, meaning.time).to_numpy()
+        values = (values - values[0]) * UNITS_S[meaning.unit]
     return np.asarray(values)

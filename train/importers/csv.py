@@ -258,15 +258,15 @@ def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[
     if suffix in arrays.SUFFIXES:
         stored = arrays.read_arrays(file)
         axis = None if options.axis is None else options.axis - 1
-        used = _used(stored, options)
+        names = _used(stored, options)
         if options.trials:
             for of_trial in arrays.trials_of(file, stored, options.task):
                 trial_name, trial_labels, trial_arrays = of_trial
-                table = arrays.table_of(file, trial_arrays, axis, used)
+                table = arrays.table_of(file, trial_arrays, axis, names)
                 every = {**labels, **trial_labels}
                 yield Source(trial_name, every, "the arrays", table, table.names)
             return
-        table = arrays.table_of(file, stored, axis, used)
+        table = arrays.table_of(file, stored, axis, names)
     else:
         table = read_parquet(file) if suffix == ".parquet" else read_text(file)
     if "trial" in table.names:
@@ -384,10 +384,10 @@ def _trials_in(table: Table) -> Iterator[Source]:
     values = [name for name in texts if name in dates or name == "taxel"]
     labels = [name for name in texts if name not in values]
     label = f"columns {', '.join(labels)}" if labels else "none"
-    kept = [n for n in table.names if n != "trial" and n not in labels]
+    columns_of_values = [n for n in table.names if n != "trial" and n not in labels]
     for trial, rows in table.data.groupby("trial", sort=False):
         of_trial = {name: _constant(table, name, str(trial), rows) for name in labels}
-        data = rows[kept].reset_index(drop=True)
+        data = rows[columns_of_values].reset_index(drop=True)
         part = Table(table.path, data, table.named, table.shape, table.form)
         if "taxel" in table.names:
             part = _pivoted(part, str(trial))
@@ -420,12 +420,12 @@ def _is_time(table: Table, name: str) -> bool:
 def _pivoted(table: Table, trial: str) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
-    others = [name for name in table.names if name not in ("taxel", "value")]
-    if "value" not in table.names or not others:
+    columns_beside = [name for name in table.names if name not in ("taxel", "value")]
+    if "value" not in table.names or not columns_beside:
         raise InputError(
             f"{table.path}: needs the columns value and a time beside taxel"
         )
-    time = others[0]
+    time = columns_beside[0]
     data = table.data
     again = data.duplicated([time, "taxel"])
     if again.any():
@@ -514,27 +514,27 @@ def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Me
         source = replace(source, names=table.names)
     if table.shape and not wishes.taxels:
         wishes = _all_of_the_array(table, wishes)
-    taken = meaning(table, source.names if table.named else table.names, wishes)
-    values = np.column_stack([numbers_of(table, name) for name in taken.taxels])
+    sense = meaning(table, source.names if table.named else table.names, wishes)
+    values = np.column_stack([numbers_of(table, name) for name in sense.taxels])
     shear = None
     if axes is not None:
         values *= axes.sign(axes.normal)
-        shear = shear_of(whole, part, taken.taxels, axes)
+        shear = shear_of(whole, part, sense.taxels, axes)
     values[~np.isfinite(values)] = np.nan
     if np.isnan(values).all():
         raise InputError(f"{table.path}: none of its values is a finite number")
     joints = None
-    if taken.joints:
-        angles = [numbers_of(table, name) for name in taken.joints]
+    if sense.joints:
+        angles = [numbers_of(table, name) for name in sense.joints]
         joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
     head = replace(table, data=table.data.iloc[:0])
     source = replace(source, table=head)
-    if taken.time is None:
+    if sense.time is None:
         assert options.rate is not None
         t = np.arange(len(values)) / options.rate
-        return Measured(source, t, Values(values, shear), joints, taken)
-    t = times_of(table, taken)
-    return _in_order(Measured(source, t, Values(values, shear), joints, taken))
+        return Measured(source, t, Values(values, shear), joints, sense)
+    t = times_of(table, sense)
+    return _in_order(Measured(source, t, Values(values, shear), joints, sense))
 
 
 def _in_order(trial: Measured) -> Measured:
@@ -543,12 +543,12 @@ def _in_order(trial: Measured) -> Measured:
     order = clock.order(trial.t, path, "row")
     if order.text:
         say(f"{path}: {order.text}")
-    kept = order.kept
+    rows = order.kept
     shear = trial.values.shear
     joints = trial.joints
-    values = Values(trial.values.normal[kept], None if shear is None else shear[kept])
-    joints = None if joints is None else joints[kept]
-    return replace(trial, t=trial.t[kept], values=values, joints=joints)
+    values = Values(trial.values.normal[rows], None if shear is None else shear[rows])
+    joints = None if joints is None else joints[rows]
+    return replace(trial, t=trial.t[rows], values=values, joints=joints)
 
 
 def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:

@@ -190,8 +190,8 @@ def _parsed(
 ) -> pd.DataFrame:
     """The columns of a text after some lines."""
     if b"\n#" in data:
-        kept = [line for line in data.splitlines() if not line.startswith(b"#")]
-        data = b"\n".join(kept)
+        lines_kept = [line for line in data.splitlines() if not line.startswith(b"#")]
+        data = b"\n".join(lines_kept)
         lines -= head.lines
     # Parts of a column may be of other types; `numbers_of` and `is_text` look at all.
     warnings.simplefilter("ignore", pd.errors.DtypeWarning)
@@ -294,13 +294,13 @@ def _check_names(path: Path, names: list[str]) -> None:
     for name in names:
         if HEX.fullmatch(name):
             raise InputError(f"{path}: {name} is no decimal number; save it as one")
-    seen: set[str] = set()
+    names_before: set[str] = set()
     for name in names:
-        if name and name in seen:
+        if name and name in names_before:
             raise InputError(
                 f"{path}: two columns are named {name}; rename one of them"
             )
-        seen.add(name)
+        names_before.add(name)
 
 
 def _unpacked(path: Path) -> bytes:

@@ -95,9 +95,9 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
     left, right = (np.array(frames)[:, place] for place in places)
     side_by_side = np.concatenate([left, 0 * left[:, :, :1], right], axis=2)
     t = (np.array(stamps) - stamps[0]) / 1000.0
-    kept = clock.order(t, file).kept
-    t = t[kept]
-    side_by_side = side_by_side[kept]
+    rows = clock.order(t, file).kept
+    t = t[rows]
+    side_by_side = side_by_side[rows]
     layout = SkinLayout(
         rows=alive.shape[0],
         cols=alive.shape[1],
@@ -201,9 +201,9 @@ def _joints(
     if not angles:
         return None
     joints_t = (np.array(stamps) - start_ms) / 1000.0
-    kept = clock.order(joints_t, f"{file}: its joint angles", "angle").kept
+    rows = clock.order(joints_t, f"{file}: its joint angles", "angle").kept
     radians = np.radians(np.array(angles))
-    return clock.angles_at(t, joints_t[kept], radians[kept], RELEASE_S)
+    return clock.angles_at(t, joints_t[rows], radians[rows], RELEASE_S)
 
 
 def _number(

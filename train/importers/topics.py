@@ -319,8 +319,8 @@ class Log:
         Raises:
             InputError: nothing tells it, or it is another number of taxels.
         """
-        asked = asked_shape(self.options.shape)
-        if asked is None and len(told) != 2:
+        shape_option = asked_shape(self.options.shape)
+        if shape_option is None and len(told) != 2:
             skin = self.beside.table("skin", {})
             if not (skin.has("rows") and skin.has("cols")):
                 raise InputError(
@@ -329,8 +329,8 @@ class Log:
                     f'{{"skin": {{"rows": ..., "cols": ...}}}} into '
                     f"{self.path.stem}.json beside it"
                 )
-            asked = skin.whole("rows"), skin.whole("cols")
-        rows, cols = asked or (told[0], told[1])
+            shape_option = skin.whole("rows"), skin.whole("cols")
+        rows, cols = shape_option or (told[0], told[1])
         taxels = int(np.prod(told))
         if rows * cols != taxels:
             raise InputError(
@@ -406,10 +406,10 @@ class Log:
             joint_columns(logged, self.arm.names)
         except InputError as error:
             raise InputError(f"{self.path}: {topic} has {error}") from None
-        others = [name for name in logged if name not in self.arm.names]
-        if others:
+        names = [name for name in logged if name not in self.arm.names]
+        if names:
             LOG.warning(
-                f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
+                f"{self.path}: {topic}: joints outside the arm: {', '.join(names)}"
             )
         return self.arm.names
 

@@ -123,8 +123,8 @@ def confusion(
         axes = canvas.subplots()
         axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
         small = {"fontsize": 7} if phone and n > 6 else {}
-        shown = range(0, n, -(-n // MATRIX_TEXT))
-        axes.set_xticks(shown, [i + 1 for i in shown], **(small and {"fontsize": 6}))
+        places = range(0, n, -(-n // MATRIX_TEXT))
+        axes.set_xticks(places, [i + 1 for i in places], **(small and {"fontsize": 6}))
         axes.set_yticks(range(n), numbered, **small)
         axes.set(xlabel="answer, as a row's number", ylabel="label")
         for i, j in zip(*np.nonzero(counts), strict=True) if n <= MATRIX_TEXT else ():

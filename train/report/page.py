@@ -27,11 +27,11 @@ def table_csv(table: Table) -> dict[str, str]:
     if table.timed:
         files[f"{table.name}_timings"] = [columns[0], *table.timed]
     texts = {}
-    for name, shown in files.items():
+    for name, figure in files.items():
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerows(
-            [shown, *([row.get(c, "") for c in shown] for row in table.rows)]
+            [figure, *([row.get(c, "") for c in figure] for row in table.rows)]
         )
         texts[f"{name}.csv"] = text.getvalue()
     return texts

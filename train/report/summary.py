@@ -279,11 +279,11 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
         t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials
     ]
     counts = Counter(paths)
-    seen = Counter[Path]()
+    trials_of = Counter[Path]()
     trials = []
     for path in paths:
-        seen[path] += 1
-        number = f" {seen[path]}" if counts[path] > 1 else ""
+        trials_of[path] += 1
+        number = f" {trials_of[path]}" if counts[path] > 1 else ""
         trials.append(printable(path.as_posix()) + number)
     return printable(folder.name), tuple(trials)
 

@@ -179,7 +179,7 @@ def _of_kind(
 
 def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
     """The step that the trials take, and the errors of the steps tried."""
-    tried = ", ".join(
+    errors = ", ".join(
         f"{100.0 * e:.2g} % at {1e3 * s:.3g} ms"
         for s, e in zip(measured.steps_s, measured.errors, strict=False)
     )
@@ -189,7 +189,7 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
     if not measured.within:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
     return (
-        f"  step {1e3 * step_s:g} ms; {verdict} (error {tried}; order "
+        f"  step {1e3 * step_s:g} ms; {verdict} (error {errors}; order "
         f"{measured.order:.2g}; "
         f"reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
     )

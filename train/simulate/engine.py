@@ -117,9 +117,9 @@ def begin(
     t.plan.run((*SETUP, *TUNE, *FRAME), t)
     t.y[:] = t.y_frame
     t.compliance[:] = 0.0
-    held = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
-    if held.any():
-        i = int(np.argmax(held))
+    touches = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
+    if touches.any():
+        i = int(np.argmax(touches))
         trial = t.specs[i]
         yaw = abs(t.values["yaw_deg"][i])
         raise InputError(
@@ -329,10 +329,10 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
     )
     held = stored + lost
     brought = stored[:, :1] + moving + work
-    made = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
-    if made.any():
-        i = int(np.argmax(made.any(axis=1)))
-        frame = int(np.argmax(made[i]))
+    gains = ~(held <= brought + ENERGY_MADE * both_ways + 1e-9)
+    if gains.any():
+        i = int(np.argmax(gains.any(axis=1)))
+        frame = int(np.argmax(gains[i]))
         raise EdgeError(
             f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes "
             "energy: "
@@ -363,7 +363,7 @@ def readings(
         for effect, window in physics.images.items():
             images[effect] = np.zeros((*counts.shape, window.shape[-1]), np.float32)
             images[effect][:, :, t.columns[:, i]] = window[i]
-        seen = Readings(
+        reading = Readings(
             scene=scene,
             trial=t.specs[i],
             effects=plan.effects[i],
@@ -376,5 +376,5 @@ def readings(
         for stage in SENSOR:
             for call in plan.stages[stage]:
                 if call.which[i]:
-                    call.function(seen)
-        yield seen
+                    call.function(reading)
+        yield reading

@@ -57,12 +57,12 @@ def recordings(
     scene = scene or trials.scene
     arm = scene.arm.to_dict()
     skin = scene.skin.to_dict()
-    for seen in readings(physics, which, scene):
-        trial = seen.trial
-        kept = slice(None) if seen.kept is None else seen.kept
-        t = seen.t if seen.times is None else seen.times
+    for reading in readings(physics, which, scene):
+        trial = reading.trial
+        arrived = slice(None) if reading.kept is None else reading.kept
+        t = reading.t if reading.times is None else reading.times
         trial_values = {
-            name: float(value[seen.which]) for name, value in trials.values.items()
+            name: float(value[reading.which]) for name, value in trials.values.items()
         }
         soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
         file = file_name(scene, trial)
@@ -82,20 +82,20 @@ def recordings(
                 "step_s": trial.step_s,
                 "family": trial.object.family,
                 "redrawn": trial.attempt,
-                "effects": list(seen.effects),
+                "effects": list(reading.effects),
                 "values": {k: v for k, v in trial_values.items() if math.isfinite(v)},
             },
         }
-        shear = seen.shear()
+        shear = reading.shear()
         yield (
             file,
             Recording(
-                t=t[kept],
-                frames=seen.frames()[kept],
-                joints=seen.joints[kept],
-                valid=seen.valid,
+                t=t[arrived],
+                frames=reading.frames()[arrived],
+                joints=reading.joints[arrived],
+                valid=reading.valid,
                 meta=meta,
-                shear=None if shear is None else shear[kept],
+                shear=None if shear is None else shear[arrived],
             ),
         )
 

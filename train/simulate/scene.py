@@ -322,12 +322,12 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
 
 def _check_needs(table: SceneTable, movable: bool) -> None:
     """Refuse an object without the keys that its other keys and conditions need."""
-    needed: list[str] = []
+    keys: list[str] = []
     if movable:
-        needed += ["mass_kg", "friction_static", "friction_kinetic"]
+        keys += ["mass_kg", "friction_static", "friction_kinetic"]
     if table.has("base_m") or table.has("height_m"):
-        needed += ["base_m", "height_m"]
-    for key in needed:
+        keys += ["base_m", "height_m"]
+    for key in keys:
         table.get(key)
 
 

@@ -146,8 +146,8 @@ class Trials:
 
     def equilibrium(self, t: Any, i: Index = ALL) -> Array:
         """(dof, n) equilibrium angles of some trials at their times (n,)."""
-        moved = self.rate * np.minimum(t, pick(self.travel_s, i))
-        return np.asarray(pick(self.start, i) + moved)
+        way = self.rate * np.minimum(t, pick(self.travel_s, i))
+        return np.asarray(pick(self.start, i) + way)
 
     def add_springs(self, i: Index, gaps: Array, stiffness: Array) -> None:
         """Add springs (S, n of i) to each row of some trials."""

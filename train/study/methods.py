@@ -71,15 +71,15 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
         PAPER: partial(nested, context.vectors(), grid=PAPERS_GRID, features=FEATURES)
     }
     for name, projection in OURS:
-        taken = data.of(SETS[name])
+        subset = data.of(SETS[name])
         compared[
             f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"
         ] = partial(
             nested,
-            taken.features(WINDOW_S, SAMPLES // 2),
+            subset.features(WINDOW_S, SAMPLES // 2),
             grid=SearchGrid("IV", projection),
-            features=taken.names,
-            widths=taken.widths(SAMPLES // 2),
+            features=subset.names,
+            widths=subset.widths(SAMPLES // 2),
         )
     compared[f"{TREES} extra trees on every taxel"] = partial(
         extra_trees, taxels(context)
@@ -91,11 +91,11 @@ def section(context: Context) -> Section:
     """Each method's accuracy on trials that were left out, and on objects that were
     left out."""
     y = context.labels
-    others = {task: labels for task, labels in y.items() if task != GROUP_TASK}
+    tasks_of_groups = {task: labels for task, labels in y.items() if task != GROUP_TASK}
     compared = methods(context)
     splits = [(y, stratified_folds(y[finest(y)]))]
-    if GROUP_TASK in y and others:
-        splits.append((others, group_folds(y[GROUP_TASK])))
+    if GROUP_TASK in y and tasks_of_groups:
+        splits.append((tasks_of_groups, group_folds(y[GROUP_TASK])))
     cases = [(method, *split) for split in splits for method in compared.values()]
     answers = context.workers.map("methods", call, cases)
     by_name = dict(zip(compared, answers, strict=False))

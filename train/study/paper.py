@@ -174,7 +174,7 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
         _ranks(list(settings), known, data_sets, tested) for _, settings in by_task
     ]
     inside = [row for row in rows if row["within"] == "yes"]
-    others = [row for row in rows if not row["headline"]]
+    plain_rows = [row for row in rows if not row["headline"]]
     others_inside = sum(not row["headline"] for row in inside)
     title = f"Our accuracies against the paper's: {len(inside)} of {len(known)} within the interval"
     return Section(
@@ -188,11 +188,11 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             f"({counted(len(data_sets), 'simulated data set')}) and in the paper's "
             f"{TRIALS}. The "
             "objects touched are not the same.",
-            f"{len(rows) - len(others)} of the {len(rows)} repeat the three headline "
+            f"{len(rows) - len(plain_rows)} of the {len(rows)} repeat the three headline "
             "accuracies of "
             "the paper's section IV-A. The free values of the scene were chosen to "
             "meet these, so "
-            f"they are no predictions. Of the other {len(others)}, {others_inside} "
+            f"they are no predictions. Of the other {len(plain_rows)}, {others_inside} "
             "agree. Nothing "
             "was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),

@@ -40,11 +40,11 @@ def variants(scene: Scene) -> dict[str, Scene]:
         changed[f"speed x {factor:g}"] = faster
         changed[f"arm stiffness x {factor:g}"] = replace(scene, stiffness=stiffness)
     for name in SENSOR_EFFECTS:
-        others = tuple(effect for effect in scene.add if effect != name)
+        effects = tuple(effect for effect in scene.add if effect != name)
         if name in scene.add:
-            changed[f"without {name}"] = replace(scene, add=others)
+            changed[f"without {name}"] = replace(scene, add=effects)
         else:
-            changed[f"with {name}"] = replace(scene, add=(*others, name))
+            changed[f"with {name}"] = replace(scene, add=(*effects, name))
     return changed
 
 

@@ -98,20 +98,20 @@ def study(
         # The last comes first, because it notices when the recordings are of another
         # scene.
         sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
-        shown = [section for section in sections if section]
+        applicable = [section for section in sections if section]
         if source is not None:
-            numbers = [_numbers(shown)]
+            numbers = [_numbers(applicable)]
             numbers += [
                 _again(context, source, i)
                 for i in bar(range(1, seeds), desc="data sets")
             ]
-            shown.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
+            applicable.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
     name = source.name if source is not None else Path(data[0]).name
     return write(
         out,
         f"The paper's analyses, repeated on {name}",
         _lead(context, constant),
-        shown,
+        applicable,
     )
 
 

@@ -45,8 +45,8 @@ def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Prepared:
     seconds = [float(r.t[-1] - r.t[0]) for r in raw.recordings]
     loaded = trials_of(raw, (*CHOSEN_S, windows_of(seconds)[-1]), options)
     trials = loaded.dataset.trials
-    tried = windows_of([float(t.recording.t[-1]) - t.onset_s for t in trials])
-    longer = tuple(window for window in tried if window > CHOSEN_S[-1])
+    windows = windows_of([float(t.recording.t[-1]) - t.onset_s for t in trials])
+    longer = tuple(window for window in windows if window > CHOSEN_S[-1])
     return Prepared(loaded.dataset, (*CHOSEN_S, *longer), loaded.notes)
 
 

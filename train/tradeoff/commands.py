@@ -70,8 +70,8 @@ class Commands:
     def _facts(self) -> str:
         """What make must be told."""
         facts = ""
-        made = str(self._models / Path(self.scene).stem) if self.scene else None
-        if self.data != (made,):
+        folder = str(self._models / Path(self.scene).stem) if self.scene else None
+        if self.data != (folder,):
             several = " ".join(self.data)
             facts += f" DATA={shlex.quote(several)}"
         elif self.scene is not None and Path(self.scene).stem != DEFAULT_SCENE:

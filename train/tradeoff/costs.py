@@ -115,13 +115,11 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
     y = {task: dataset.labels(task) for task in dataset.tasks}
     for part in PARTS:
-        kept = dataset.part(stratified_folds(y[finest(y)], part) == 0)
-        if len(kept.trials) >= FEWEST:
-            name = f"{len(kept.trials)} of {len(dataset.trials)} trials"
-            price = (
-                f"{counted(len(dataset.trials) - len(kept.trials), 'recording')} fewer"
-            )
-            cases.append(Change(name, price, kept, fewer=True))
+        part_of_set = dataset.part(stratified_folds(y[finest(y)], part) == 0)
+        if len(part_of_set.trials) >= FEWEST:
+            name = f"{len(part_of_set.trials)} of {len(dataset.trials)} trials"
+            price = f"{counted(len(dataset.trials) - len(part_of_set.trials), 'recording')} fewer"
+            cases.append(Change(name, price, part_of_set, fewer=True))
     return cases
 
 
@@ -161,8 +159,8 @@ def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
     dataset = source
     if not isinstance(dataset, DataSet):
         dataset = followed(dataset, quick=quick, like=like)
-    made = hits(dataset, chosen(dataset, **change.given))
-    return made, time.process_time() - began
+    result = hits(dataset, chosen(dataset, **change.given))
+    return result, time.process_time() - began
 
 
 def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:

@@ -156,15 +156,15 @@ def _held_out(
     }
     fitted = fit(dataset.part(~test), quick=quick, jobs=1, **options)
     model = fitted.sequential
-    others = replace(dataset.part(test), kernels=fitted.dataset.kernels)
+    test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
     new = np.stack(
         [
-            others.features(s, fitted.samples, fitted.dataset.names)
+            test_set.features(s, fitted.samples, fitted.dataset.names)
             for s in decision_points_s
         ]
     )
-    truth = {task: others.labels(task) for task in model.choices}
+    truth = {task: test_set.labels(task) for task in model.choices}
     return (model, *model.judged(new, truth))
 
 

@@ -110,8 +110,8 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     workers = Workers(options.jobs)
     choose = partial(chosen, quick=quick)
-    made = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
-    points = dict(zip(ready.windows, made, strict=True))
+    results = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
+    points = dict(zip(ready.windows, results, strict=True))
     rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
     comparisons = early.compare_stopping(
         dataset, WINDOWS_S, quick=quick, jobs=options.jobs

@@ -66,10 +66,10 @@ def answers(
 ) -> Answers:
     """The choice at each window, and early decisions."""
     cases = [(dataset, window) for window in windows]
-    made = workers.map("windows", partial(chosen, quick=quick), cases)
+    results = workers.map("windows", partial(chosen, quick=quick), cases)
     points = [window for window in windows if window <= WINDOWS_S[-1]]
     return Answers(
-        dict(zip(windows, made, strict=True)),
+        dict(zip(windows, results, strict=True)),
         compare_stopping(dataset, points, quick=quick, jobs=workers.jobs),
     )
 

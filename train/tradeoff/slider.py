@@ -36,7 +36,7 @@ def slider(measured: Measured) -> str:
     points = measured.points
     windows = list(points)
     first = min(range(len(windows)), key=lambda i: abs(windows[i] - FIRST_S))
-    shown = {
+    content = {
         task: [_texts(tasks[task]) for tasks in points.values()]
         for task in points[windows[0]]
     }
@@ -46,15 +46,15 @@ def slider(measured: Measured) -> str:
             curve=_curve(measured.results(task), first),
             **texts[first],
         )
-        for task, texts in shown.items()
+        for task, texts in content.items()
     ]
     levels = [reached(measured, level / 100.0) for level in LEVELS]
     commands = [measured.commands.export(f"--window {window:g}") for window in windows]
     data = json.dumps(
         {
             "windows": windows,
-            "tasks": list(shown.values()),
-            "names": list(shown),
+            "tasks": list(content.values()),
+            "names": list(content),
             "commands": commands,
             "levels": LEVELS,
             "reached": levels,

@@ -48,18 +48,18 @@ class Use:
 
 def uses(measured: Measured, task: str) -> list[Use]:
     """Every fixed window and every early decision of a task."""
-    made = []
+    options = []
     for window, result in measured.results(task).items():
         command = measured.commands.export(f"--window {window:g}")
         seconds = window + measured.after_s
-        made.append(Use(f"after {window:g} s", seconds, result, command))
+        options.append(Use(f"after {window:g} s", seconds, result, command))
     export = measured.commands.export(*EARLY)
     for rule in distinct(measured.comparisons[task]):
         name = f"early, at most {rule.asked:.0%} wrong"
         seconds = rule.mean_s + measured.after_s
         command = f"{export}, then edge-classify run --error {rule.asked:g}"
-        made.append(Use(name, seconds, rule.result, command))
-    return made
+        options.append(Use(name, seconds, rule.result, command))
+    return options
 
 
 def cheapest(measured: Measured, task: str) -> Use:

@@ -137,7 +137,7 @@ def waited_s(layout: SkinLayout, rate_hz: float) -> float:
     """
     choices = [microcontroller(layout)] if layout.axes else wires(layout)
     fastest = min(choices, key=lambda choice: choice.frame_s)
-    used = next(
+    wired = next(
         (choice for choice in choices if choice.name.startswith("AD7147, 3")), fastest
     )
-    return 0.5 * used.every(rate_hz) / rate_hz + used.frame_s
+    return 0.5 * wired.every(rate_hz) / rate_hz + wired.frame_s

@@ -125,9 +125,9 @@ def law(t: Trials, i: Index) -> None:
 def tune(t: Trials, i: Index) -> None:
     """Set the stiffness and the compliance of each joint within a step of this
     length."""
-    held = t.damping / pick(t.h, i)
-    t.held[:, i] = held
-    t.give[:, i] = 1.0 / (held + t.joint_k)
+    step_stiffness = t.damping / pick(t.h, i)
+    t.held[:, i] = step_stiffness
+    t.give[:, i] = 1.0 / (step_stiffness + t.joint_k)
 
 
 def locate(t: Trials, i: Index) -> None:
@@ -162,10 +162,10 @@ def predict(t: Trials, i: Index) -> None:
     now = pick(t.t, i) + pick(t.h, i)
     pulled = t.joint_k * t.equilibrium(now, i)
     q_free = (pick(t.held, i) * pick(t.q, i) + pulled) * pick(t.give, i)
-    moved = q_free - pick(t.q_frame, i)
+    change = q_free - pick(t.q_frame, i)
     t.t[i] = now
     t.q_free[:, i] = q_free
-    t.y[:, i] = pick(t.y_frame, i) + total(pick(t.jacobian, i) * moved[:, None])
+    t.y[:, i] = pick(t.y_frame, i) + total(pick(t.jacobian, i) * change[:, None])
 
 
 def press(t: Trials, i: Index) -> None:

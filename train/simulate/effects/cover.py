@@ -17,8 +17,8 @@ def pass_on(t: Trials, i: Index) -> None:
     """Move a part of each taxel's load to its four neighbours; none is lost at the
     skin's ends."""
     image = pick(t.image, i)
-    moved = image * pick(t.values["cover_spread"], i)
-    around = np.pad(moved, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    spread = image * pick(t.values["cover_spread"], i)
+    around = np.pad(spread, ((1, 1), (1, 1), (0, 0)), mode="edge")
     beside = around[1:-1, 2:] + around[1:-1, :-2]
     above = around[2:, 1:-1] + around[:-2, 1:-1]
-    t.image[:, :, i] = image - 4.0 * moved + beside + above
+    t.image[:, :, i] = image - 4.0 * spread + beside + above

@@ -110,9 +110,9 @@ def drag(t: Trials, i: Index) -> None:
 def settle(t: Trials, i: Index) -> None:
     """Update the stretch; the skin slips where friction cannot hold it."""
     state = t.states["friction"]
-    moved = total(pick(state.jacobian, i) * (pick(t.q, i) - pick(state.before, i)))
+    way = total(pick(state.jacobian, i) * (pick(t.q, i) - pick(state.before, i)))
     low, high = bounds(t, i)
-    stretch = pick(state.stretch, i) + moved
+    stretch = pick(state.stretch, i) + way
     state.stretch[i] = np.clip(stretch, low / state.stiffness, high / state.stiffness)
 
 

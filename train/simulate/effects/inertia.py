@@ -78,14 +78,14 @@ def pace(t: Trials, i: Index) -> None:
     change = force - pick(state.force, i)
     peak = np.maximum(pick(state.peak, i), force)
     jolts = np.abs(change - pick(state.change, i)) > JOLT * peak
-    left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
-    near = (force == 0.0) & (depth + NEAR * closing > 0.0)
+    frames_left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
+    approaching = (force == 0.0) & (depth + NEAR * closing > 0.0)
     state.depth[i] = depth
     state.force[i] = force
     state.change[i] = change
     state.peak[i] = peak
-    t.steps[i] = np.where(near | (left > 0), FINER, 1) * pick(t.usual, i)
-    state.left[i] = np.maximum(left - 1, 0)
+    t.steps[i] = np.where(approaching | (frames_left > 0), FINER, 1) * pick(t.usual, i)
+    state.left[i] = np.maximum(frames_left - 1, 0)
 
 
 def tune(t: Trials, i: Index) -> None:
@@ -93,10 +93,10 @@ def tune(t: Trials, i: Index) -> None:
     state = t.states["inertia"]
     h = pick(t.h, i)
     weight = state.inertia / h
-    held = pick(t.held, i) + weight / h
+    step_stiffness = pick(t.held, i) + weight / h
     state.weight[:, i] = weight
-    t.held[:, i] = held
-    t.give[:, i] = 1.0 / (held + t.joint_k)
+    t.held[:, i] = step_stiffness
+    t.give[:, i] = 1.0 / (step_stiffness + t.joint_k)
 
 
 def predict(t: Trials, i: Index) -> None:

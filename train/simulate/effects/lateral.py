@@ -41,8 +41,8 @@ def delay(x: Array, depth: Array) -> Array:
 def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
     """The depths at which columns are touched whose gaps are R (1 - cos theta)."""
     # The cylinder's gap gives x = R sin theta.
-    near = np.minimum(gaps, radius)
-    return gaps + delay(np.sqrt(near * (2.0 * radius - near)), depth) / radius
+    depths = np.minimum(gaps, radius)
+    return gaps + delay(np.sqrt(depths * (2.0 * radius - depths)), depth) / radius
 
 
 def widen(t: Trials, i: Index) -> None:

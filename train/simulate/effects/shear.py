@@ -59,9 +59,11 @@ def shared(pull: Array, limits: Array) -> Array:
     # The pull at which the s-th weakest spring slips: all stronger ones bear as much.
     stronger = np.arange(springs - 1, -1, -1.0)[:, None]
     slips = below + stronger * rising
-    held = np.maximum((slips < pull).sum(axis=0), 0)
-    slipped = np.minimum(held, springs - 1)
-    lost = np.where(held > 0, np.take_along_axis(below, (held - 1)[None], axis=0)[0], 0)
+    sticking = np.maximum((slips < pull).sum(axis=0), 0)
+    slipped = np.minimum(sticking, springs - 1)
+    lost = np.where(
+        sticking > 0, np.take_along_axis(below, (sticking - 1)[None], axis=0)[0], 0
+    )
     level = (pull - lost) / (springs - slipped)
     borne = np.minimum(limits, level)
     whole = below[-1]

@@ -114,9 +114,9 @@ def settle(t: Trials, i: Index) -> None:
     at = slips.any(axis=0).nonzero()[0]
     if at.size:
         trials = np.arange(t.n)[i][at]
-        held = ~slips.take(at, -1)
-        state.stiffness[:, trials] *= held
-        state.damping[:, trials] *= held
+        bends = ~slips.take(at, -1)
+        state.stiffness[:, trials] *= bends
+        state.damping[:, trials] *= bends
         let_go(t, trials)
     state.drag[i] = total(np.where(bent > 0.0, pick(state.damping, i), 0.0))
     tune(t, i)
@@ -126,11 +126,11 @@ def bear(t: Trials, i: Index) -> None:
     """The force on the skin, and how far the first stem is bent."""
     state = t.states["stems"]
     depth = pick(t.depth[0], i)
-    held = pick(state.stiffness, i) > 0.0
+    bends = pick(state.stiffness, i) > 0.0
     bent = depth - pick(state.depth, i)
     t.force[i] = pick(t.loads[0], i)
-    t.deepest[i] = np.where(held, bent, 0.0).max(axis=0)
-    t.inside[i] = np.where(held, bent, FAR_M).max(axis=0)
+    t.deepest[i] = np.where(bends, bent, 0.0).max(axis=0)
+    t.inside[i] = np.where(bends, bent, FAR_M).max(axis=0)
 
 
 def image(t: Trials, i: Index) -> None:

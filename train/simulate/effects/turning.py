@@ -62,11 +62,11 @@ def pass_on(t: Trials, i: Index) -> None:
     trials = np.arange(t.n)[i][moving]
     last = len(t.columns) - 1
     image = t.image.take(trials, -1)
-    moved = np.zeros_like(image)
+    turned_image = np.zeros_like(image)
     places = np.arange(len(moving))
     for beyond, share in ((0, 1.0 - part), (1, part)):
         shared = image * share
         for column in range(last + 1):
             to = np.clip(column + beyond + further, 0, last).astype(np.intp)
-            moved[:, to, places] += shared[:, column]
-    t.image[:, :, trials] = moved
+            turned_image[:, to, places] += shared[:, column]
+    t.image[:, :, trials] = turned_image

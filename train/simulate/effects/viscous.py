@@ -53,13 +53,13 @@ class Viscous:
         damped = pick(self.loss_s, i) / h
         part = h / pick(self.relax_s, i)
         relaxes = ratio > 0.0
-        kept = np.where(relaxes, np.exp(-part), 0.0)
+        decay = np.where(relaxes, np.exp(-part), 0.0)
         rise = np.where(relaxes, ratio * (-np.expm1(-part) / part), 0.0)
         self.damped[i] = damped
-        self.kept[i] = kept
+        self.kept[i] = decay
         self.gain[i] = 1.0 + rise + damped
         self.let_go[i] = ratio - rise
-        self.late[i] = rise - kept * ratio
+        self.late[i] = rise - decay * ratio
         self.bear_on(i)
 
     def bear_on(self, i: Index) -> None:
