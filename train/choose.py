@@ -106,6 +106,9 @@ class Chosen:
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.
+        known: the settings that are best for objects that were recorded, where groups
+            were left out to choose the others.
+        known_by_fold: [fold] the same, chosen without the fold's trials.
     """
 
     choice: Choice
@@ -118,6 +121,8 @@ class Chosen:
         default_factory=lambda: np.zeros(0, np.int64), repr=False
     )
     by_fold: tuple[dict[str, Choice], ...] = ()
+    known: Choice | None = None
+    known_by_fold: tuple[Choice, ...] = ()
 
 
 class Choosing:
@@ -350,7 +355,20 @@ class Choosing:
             picks=tuple(choices[place] for place in picks),
             folds=table.folds,
         )
+        if grouped:
+            chosen = self._with_known(chosen, task, trials)
         return _Settled(chosen, without, without_groups)
+
+    def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:
+        """A task's settings, with those that are best for recorded objects."""
+        choices = trials.choices[task]
+        prices = costs(choices, self._widths)
+        places = trials.by_fold(task, prices)
+        return replace(
+            chosen,
+            known=choices[trials.chosen(task, prices)],
+            known_by_fold=tuple(choices[place] for place in places),
+        )
 
 
 @dataclass(frozen=True)
