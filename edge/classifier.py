@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 
 LATE = "late"
 """Flag of a decision on a contact that began before it could be seen."""
-MOST_ASKED = 2
-"""Questions to the model in a frame in which several contacts are due. Each takes one
-to two milliseconds on a workstation, of the ten that a frame has; 16 contacts with a
-decision point every tenth of a second need 1.6 a frame."""
+ASKED_A_SECOND = 200.0
+"""Questions to the model about several contacts. Each takes one to two milliseconds on
+a workstation; 16 contacts with a decision point every tenth of a second need 160."""
+FEWEST_ASKED = 2
+"""Questions that a frame may ask, however soon it follows the last one."""
 ASIDE_S = 0.5
 """Taxels are named as set aside after so long, as a touch under way soon shows."""
 
@@ -71,8 +72,9 @@ class Classifier:
 
     `push` and `finish` return events in the order of time: an `Onset` when a contact
     begins, a `Decided` for each task at the end of its window, and a `Release` when the
-    contact ends. Of several contacts that are due at once, the model is asked about two
-    a frame, so that no frame takes long; the answers are the same.
+    contact ends. Of several contacts that are due at once, a frame asks about a few, in
+    proportion to the time since the last frame, so that no frame takes long; the
+    answers are the same.
 
     With an error rate, each task follows the fastest stopping rule that the model holds
     certified for that rate: it is decided at the first decision point that is sure
@@ -137,7 +139,6 @@ class Classifier:
         self.error = error
         self.novelty_rate = novelty_rate
         self._max_contacts = max_contacts
-        self._most_asked = math.inf if max_contacts == 1 else MOST_ASKED
         self._motion_on_skin = motion_on_skin
         self._policies = self._policy_of_each_task()
         self.tracker = model.info.tracker(
@@ -173,6 +174,7 @@ class Classifier:
         """
         began = time.perf_counter()
         events: list[Event] = []
+        most = self._most_asked(frame.t)
         self._end_s = frame.t
         if self._begun == 0:
             self._note_untouched(frame)
@@ -180,11 +182,16 @@ class Classifier:
         aside = self._set_aside(frame)
         if aside is not None:
             events.append(aside)
-        return events + self._follow(contacts, frame.t, began)
+        events += self._follow(contacts, frame.t)
+        return events + self._decide_due(frame.t, began, most)
 
-    def _follow(
-        self, contacts: Iterable[Contact], t: float, began: float
-    ) -> list[Event]:
+    def _most_asked(self, t: float) -> float:
+        """How many questions the frame at a time may ask."""
+        if self._max_contacts == 1 or self._end_s is None:
+            return math.inf
+        return max(FEWEST_ASKED, round(ASKED_A_SECOND * (t - self._end_s)))
+
+    def _follow(self, contacts: Iterable[Contact], t: float) -> list[Event]:
         """The events of contacts up to a time."""
         events: list[Event] = []
         for contact in contacts:
@@ -193,7 +200,7 @@ class Classifier:
             if contact.ended:
                 number = self._numbers.pop(contact)
                 events.append(Release(contact.onset_s, t, self._named(number)))
-        return events + self._decide_due(t, began, self._most_asked)
+        return events
 
     def _decide_due(self, t: float, began: float, most: float) -> list[Event]:
         """Ask about the contacts whose next decision point has come, the longest due
@@ -260,7 +267,7 @@ class Classifier:
             contacts = self.tracker.finish()
             if not contacts:
                 return list(self._untouched(self._end_s, began))
-            events = self._follow(contacts, self._end_s, began)
+            events = self._follow(contacts, self._end_s)
         if self._end_s is not None:
             events += self._decide_due(self._end_s, began, math.inf)
         for pending in self._pending:

@@ -7,6 +7,7 @@ connectivity algorithm, 1982). The rounds are few, and each is linear in the run
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,12 @@ class Components:
     lengths: Integers
     labels: Integers
 
-    @property
+    @cached_property
     def of_taxel(self) -> Integers:
         """(taxels,) component of each active taxel, by rising index."""
         return self.labels.repeat(self.lengths)
 
-    @property
+    @cached_property
     def areas(self) -> Integers:
         """(components,) taxels of each."""
         return np.bincount(self.of_taxel)

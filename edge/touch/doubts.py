@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -52,8 +51,7 @@ def frame_doubts(
     within = series.t <= window_s
     t = series.t[within]
     steps = np.diff(np.append(t, min(window_s, float(series.t[-1]))))
-    # numpy.median would import numpy.ma, in the midst of the first decision.
-    usual = statistics.median(steps.tolist()) if len(t) >= FEWEST else 0.0
+    usual = _median(steps) if len(t) >= FEWEST else 0.0
     longest = max(GAP_SHARE * window_s, GAP_S, PERIODS * usual)
     repeated = series.same[within] & (series.area[within] > 0)
     doubts = {
@@ -66,6 +64,13 @@ def frame_doubts(
         doubts["still_joints"] = bool((angles == angles[0]).all())
         doubts["joint_limits"] = _beyond(angles, limits)
     return doubts
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    """numpy's own would import numpy.ma, in the midst of the first decision."""
+    ordered = np.sort(values)
+    middle = len(ordered) // 2
+    return float(0.5 * (ordered[middle] + ordered[~middle]))
 
 
 def _longest_run(t: NDArray[np.float64], repeated: NDArray[np.bool_]) -> float:

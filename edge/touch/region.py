@@ -279,11 +279,6 @@ class ActiveTaxels:
         return components_of(self._padded, self._grid.wraps)
 
     @cached_property
-    def _taxels(self) -> NDArray[np.intp]:
-        """Indices in the padded frame of the active taxels, rising."""
-        return np.flatnonzero(self._padded)
-
-    @cached_property
     def _peaks(self) -> NDArray[np.int64]:
         """The largest count of each component."""
         components = self._components
@@ -330,8 +325,9 @@ class ActiveTaxels:
         tied = np.flatnonzero(areas == areas.max())
         label = tied.item(0) if len(tied) == 1 else self._first_of(tied, previous)
         taxels = np.zeros_like(self._padded)
-        taxels.reshape(-1)[self._taxels[self._components.of_taxel == label]] = True
-        return Region(self._grid, self._grid.pack(taxels), int(self._peaks[label]))
+        taxels[:, :-1][self.mask] = self._components.of_taxel == label
+        peak = int(self.counts[taxels[:, :-1]].max())
+        return Region(self._grid, self._grid.pack(taxels), peak)
 
     def _lone(self, previous: Region | None) -> Region:
         """The first of lone taxels by the rule of `_first_of`: a flickering skin may

@@ -41,5 +41,6 @@ def test_a_young_file_stays_as_it_may_not_be_locked_yet(tmp_path):
     assert left.exists()
 
 
-def test_a_folder_that_is_missing_holds_nothing(tmp_path):
+def test_a_folder_that_is_missing_is_not_made(tmp_path):
     remove_leftovers(tmp_path / "none")
+    assert list(tmp_path.iterdir()) == []

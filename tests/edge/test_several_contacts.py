@@ -1,13 +1,12 @@
 """Several contacts at once are decided with a few questions a frame."""
 
-import math
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from edge.classifier import MOST_ASKED, Classifier
+from edge.classifier import ASKED_A_SECOND, FEWEST_ASKED, Classifier
 from edge.events import Decided, Onset
 from edge.model.model import Model
 from edge.touch.frame import Frame
@@ -16,6 +15,8 @@ from tests.conftest import ROOT, export, save_touches
 PLACES = [(row, col) for row in (0, 4, 8, 12) for col in (0, 6, 12, 18)]
 POINTS_S = (0.4, 0.8, 1.2)
 ERROR = 0.9
+AT_ONCE = 1e9
+"""Questions a second that hold nothing back."""
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +66,7 @@ def decided(model, places, error):
 def test_no_frame_asks_more_than_a_few_questions(early, error):
     events, asked = decided(early, PLACES, error)
     assert sum(isinstance(event, Onset) for event in events) == len(PLACES)
-    assert max(asked) == MOST_ASKED
+    assert max(asked) == FEWEST_ASKED
     tasks = len(early.info.tasks)
     assert sum(isinstance(event, Decided) for event in events) == tasks * len(PLACES)
 
@@ -79,10 +80,25 @@ def answers_of(events):
     }
 
 
+def test_a_slow_skin_asks_more_a_frame_so_that_no_answer_comes_late(early):
+    """At 20 Hz a frame has five times as long as at 100 Hz."""
+    slow = list(frames(PLACES, early.info.dof or 0))[::5]
+    classifier = Classifier(early, error=ERROR, max_contacts=len(PLACES))
+    seen = [(frame.t, event) for frame in slow for event in classifier.push(frame)]
+    late_s = [
+        t - event.onset_s - event.window_s
+        for t, event in seen
+        if isinstance(event, Decided)
+    ]
+    assert late_s
+    needed_s = len(PLACES) / ASKED_A_SECOND
+    assert max(late_s) <= needed_s + 0.05
+
+
 @pytest.mark.parametrize("error", [None, ERROR])
 def test_the_answers_are_those_of_asking_at_once(early, error, monkeypatch):
     spread, _ = decided(early, PLACES, error)
-    monkeypatch.setattr("edge.classifier.MOST_ASKED", math.inf)
+    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
     at_once, asked = decided(early, PLACES, error)
     assert max(asked) == len(PLACES)
     assert len(answers_of(at_once)) == len(PLACES) * len(early.info.tasks)
@@ -94,7 +110,7 @@ def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):
     short = list(frames(PLACES, early.info.dof or 0))[:83]
     limited = Classifier(early, error=ERROR, max_contacts=len(PLACES))
     spread = [e for frame in short for e in limited.push(frame)] + limited.finish()
-    monkeypatch.setattr("edge.classifier.MOST_ASKED", math.inf)
+    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
     free = Classifier(early, error=ERROR, max_contacts=len(PLACES))
     at_once = [e for frame in short for e in free.push(frame)] + free.finish()
     assert answers_of(spread) == answers_of(at_once)
