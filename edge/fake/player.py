@@ -154,8 +154,8 @@ def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
         )
         shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size
         with delayed():  # numpy imports its generators at their first use
-            drawn = np.random.default_rng([seed, b]).standard_normal(shape)
-        noise = np.rint(noise_counts * drawn).astype(np.int64)
+            normal = np.random.default_rng([seed, b]).standard_normal(shape)
+        noise = np.rint(noise_counts * normal).astype(np.int64)
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
             sense = _sense(chip, scene, calibration.baseline.ravel(), noise)

@@ -263,8 +263,8 @@ def _entries(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, list[A
     if len(lengths) != 1:
         sizes = {name: len(values) for name, values in entries.items()}
         raise InputError(
-            f"{path}: its arrays have {shown(sizes)} trials; leave out what is not by "
-            "trial"
+            f"{path}: its arrays have {shown(sizes)} trials; leave out the arrays "
+            "that do not have one entry for each trial"
         )
     return entries
 

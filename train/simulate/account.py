@@ -55,13 +55,13 @@ class Costs:
     Attributes:
         trials: how many there are.
         seconds: of the run, redraws and the writing of files left out.
-        each: {effect, module that effects share, or `BASE`: seconds for each trial that
-            calls for it}.
+        by_effect: {effect, module that effects share, or `BASE`: seconds for each trial
+            that calls for it}.
     """
 
     trials: int
     seconds: float
-    each: Mapping[str, float]
+    by_effect: Mapping[str, float]
 
     def of(self, effects: Kind) -> dict[str, float]:
         """{`BASE` or effect: seconds} of a trial that calls for these effects.
@@ -69,11 +69,11 @@ class Costs:
         Work that effects share is parted among those of them that the trial calls for.
         So the parts of all trials add up to the run.
         """
-        parts = {name: self.each.get(name, 0.0) for name in (BASE, *effects)}
+        parts = {name: self.by_effect.get(name, 0.0) for name in (BASE, *effects)}
         for module, sharing in SHARED.items():
             callers = [effect for effect in effects if effect in sharing]
             for effect in callers:
-                parts[effect] += self.each.get(module, 0.0) / len(callers)
+                parts[effect] += self.by_effect.get(module, 0.0) / len(callers)
         return parts
 
 

@@ -119,8 +119,8 @@ def wire_time_s(
     Recordings of `edge-classify record` hold the time of a frame on their skin's wires
     (`meta.wire_s`). Simulated ones have the paper's skin. Others tell nothing.
     """
-    told = [recording.meta.get("wire_s") for recording in recordings]
-    times = [float(wire_s) for wire_s in told if isinstance(wire_s, int | float)]
+    recorded = [recording.meta.get("wire_s") for recording in recordings]
+    times = [float(wire_s) for wire_s in recorded if isinstance(wire_s, int | float)]
     if times:
         return 0.5 / rate_hz + max(times)
     if all("simulation" in recording.meta for recording in recordings):

@@ -37,12 +37,12 @@ def test_shared_work_is_parted_among_the_effects_that_call_for_it(spent):
     assert SHARED == {"viscous": ("relaxation", "inertia")}
     alone = spent.of(("inertia",))["inertia"]
     parted = spent.of(("relaxation", "inertia"))
-    assert spent.each["viscous"] > 0.0
-    half = 0.5 * spent.each["viscous"]
-    assert alone == pytest.approx(spent.each["inertia"] + 2.0 * half)
-    assert parted["inertia"] == pytest.approx(spent.each["inertia"] + half)
-    assert parted["relaxation"] == pytest.approx(spent.each["relaxation"] + half)
-    assert parted[BASE] == spent.each[BASE]
+    assert spent.by_effect["viscous"] > 0.0
+    half = 0.5 * spent.by_effect["viscous"]
+    assert alone == pytest.approx(spent.by_effect["inertia"] + 2.0 * half)
+    assert parted["inertia"] == pytest.approx(spent.by_effect["inertia"] + half)
+    assert parted["relaxation"] == pytest.approx(spent.by_effect["relaxation"] + half)
+    assert parted[BASE] == spent.by_effect[BASE]
 
 
 def test_a_scene_says_why_its_steps_are_not_measured(tmp_path):
