@@ -1,12 +1,13 @@
 """A small web server for one live page: it sends pictures and takes actions.
 
 It is made for a loop that must not be late. The loop leaves its latest picture with
-`show`, which never waits for a browser. One thread serves all browsers. It takes few
-steps at a time and rests between them, so that no number of requests holds the loop up.
-The page, its pictures and its actions need the token of the link, so that no other
-site, user or machine can see them or act; the token is looked at before all else.
+`show`, which never waits for a browser. One thread serves all browsers. It rests after
+every few steps, so that no number of requests holds the loop up. The page, its pictures
+and its actions need the token of the link, so that no other site, user or machine can
+see them or act; the token is looked at before all else.
 """
 
+import asyncio
 import json
 import secrets
 import selectors
@@ -14,7 +15,7 @@ import socket
 import sys
 import threading
 import time
-from collections import Counter
+from asyncio import StreamReader, StreamWriter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
@@ -55,35 +56,26 @@ MOST_CONNECTIONS = 32
 MOST_OF_ONE = 8
 """Connections of one address."""
 STEPS = 4
-"""Sockets that are served before the thread rests."""
+"""Sockets that are served for each rest of the thread."""
 REST_S = 0.003
 SWITCH_S = 0.0005
 """The loop waits at most about so long for this thread."""
 PIECE = 1 << 18
-"""Bytes that are sent or taken at once."""
+"""Bytes that a browser has to take within `SLOW_S`."""
+TEXT = "text/plain; charset=utf-8"
+JSON = "application/json"
 
 
-class Browser:
-    """One connection of a browser.
+class RestingSelector(selectors.DefaultSelector):
+    """Rests whenever sockets are ready, the longer the more they are."""
 
-    Attributes:
-        socket: that does not block.
-        address: of the browser.
-        deadline: when it is dropped.
-        taken: bytes of its request.
-        left: bytes of the answer that are still to be sent.
-        streams: it gets every new picture.
-        seen: number of the last picture that it got.
-    """
-
-    def __init__(self, connection: socket.socket, address: str) -> None:
-        self.socket = connection
-        self.address = address
-        self.deadline = time.monotonic() + SLOW_S
-        self.taken = b""
-        self.left = b""
-        self.streams = False
-        self.seen = 0
+    def select(
+        self, timeout: float | None = None
+    ) -> list[tuple[selectors.SelectorKey, int]]:
+        """The sockets that are ready."""
+        ready = super().select(timeout)
+        time.sleep(REST_S * -(-len(ready) // STEPS))
+        return ready
 
 
 class WebServer:
@@ -118,7 +110,6 @@ class WebServer:
         except EdgeError:
             self._listener.close()
             raise
-        self._listener.setblocking(False)
         self.server_port: int = self._listener.getsockname()[1]
         name = _own_address() if host in ("0.0.0.0", "::") else host
         self._names = {name, "localhost", socket.gethostname()}
@@ -127,22 +118,13 @@ class WebServer:
         self.link = f"http://{name}:{self.server_port}/?token={self.token}"
         self._act = act
         self._picture: Mapping[str, Any] | None = None
-        self._number = 0
         self._asked_at = -WATCHED_S
-        folder = resources.files("edge.tools") / "pages"
-        self.files = {
-            path: (
-                f"text/{kind}; charset=utf-8",
-                (folder / (path[1:] or "page.html")).read_bytes(),
-            )
-            for path, kind in FILES.items()
-        }
-        self._browsers: dict[int, Browser] = {}
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._listener, selectors.EVENT_READ)
+        self._pages = resources.files("edge.tools") / "pages"
+        self._browsers: list[str] = []
+        """The address of each connection."""
         self._closing = False
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_S))
-        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     @property
@@ -153,7 +135,6 @@ class WebServer:
     def show(self, picture: Mapping[str, Any]) -> None:
         """Leave a picture, which must not change afterwards, for the browsers."""
         self._picture = picture
-        self._number += 1
 
     def picture(self) -> bytes:
         """The latest picture as JSON, or nothing if there is none yet."""
@@ -169,99 +150,70 @@ class WebServer:
         self._closing = True
         self._thread.join()
 
-    def _serve(self) -> None:
+    def _run(self) -> None:
+        def loop() -> asyncio.AbstractEventLoop:
+            return asyncio.SelectorEventLoop(RestingSelector())
+
+        with asyncio.Runner(loop_factory=loop) as runner:
+            runner.run(self._listen())
+
+    async def _listen(self) -> None:
+        """Serve until the server is closed."""
+        server = await asyncio.start_server(
+            self._serve,
+            sock=self._listener,
+            limit=LARGEST_HEAD,
+            backlog=MOST_CONNECTIONS,
+        )
         while not self._closing:
-            for step, (key, mask) in enumerate(self._selector.select(PICTURE_S / 2), 1):
-                if step % STEPS == 0:
-                    time.sleep(REST_S)
-                if key.fileobj is self._listener:
-                    self._accept()
-                else:
-                    self._step(key.data, mask)
-            self._stream()
-            self._drop_late()
-            time.sleep(REST_S)
-        for browser in list(self._browsers.values()):
-            self._drop(browser)
-        self._selector.close()
-        self._listener.close()
+            await asyncio.sleep(PICTURE_S / 2)
+        server.close()
 
-    def _accept(self) -> None:
-        try:
-            connection, (address, *_) = self._listener.accept()
-        except OSError:  # it went away, or there are too many open files
-            return
-        of_one = Counter(browser.address for browser in self._browsers.values())
-        full = len(self._browsers) >= MOST_CONNECTIONS
-        if full or of_one[address] >= MOST_OF_ONE:
-            connection.close()
-            return
-        connection.setblocking(False)
-        browser = Browser(connection, address)
-        self._browsers[connection.fileno()] = browser
-        self._selector.register(connection, selectors.EVENT_READ, browser)
+    async def _serve(self, reader: StreamReader, writer: StreamWriter) -> None:
+        """Serve a browser until it is slow or gone, or the server is closed.
 
-    def _drop(self, browser: Browser) -> None:
-        if self._browsers.pop(browser.socket.fileno(), None) is not None:
-            self._selector.unregister(browser.socket)
-        browser.socket.close()
-
-    def _drop_late(self) -> None:
-        now = time.monotonic()
-        for browser in list(self._browsers.values()):
-            if now > browser.deadline:
-                self._drop(browser)
-
-    def _step(self, browser: Browser, mask: int) -> None:
-        """Take in what a browser has sent, or send it what it can take."""
-        try:
-            if mask & selectors.EVENT_WRITE:
-                self._send(browser)
-            else:
-                self._take(browser)
-        except BlockingIOError:
-            return
-        except OSError:
-            self._drop(browser)
-
-    def _take(self, browser: Browser) -> None:
-        piece = browser.socket.recv(LARGEST_HEAD)
-        if not piece or browser.streams:  # a stream has nothing more to say
-            self._drop(browser)
-            return
-        browser.taken += piece
-        request, line_end, rest = browser.taken.partition(b"\r\n")
-        if line_end:
-            self._take_request(browser, request, rest)
-        elif len(browser.taken) > LARGEST_HEAD:
-            self._answer(browser, HTTPStatus.REQUEST_URI_TOO_LONG)
-
-    def _take_request(self, browser: Browser, request: bytes, rest: bytes) -> None:
-        """Take in a request's first line and what has come after it.
-
-        The token is looked at before anything else is read.
+        It is refused if it, or all browsers together, have too many connections.
         """
+        peer = writer.get_extra_info("peername") or [""]  # it may have gone already
+        address = str(peer[0])
+        many = len(self._browsers) >= MOST_CONNECTIONS
+        if many or self._browsers.count(address) >= MOST_OF_ONE:
+            writer.transport.abort()
+            return
+        self._browsers.append(address)
+        # `drain` then waits until all is sent.
+        writer.transport.set_write_buffer_limits(0)
+        try:
+            with suppress(OSError, asyncio.IncompleteReadError, asyncio.CancelledError):
+                async with asyncio.timeout(SLOW_S):
+                    answer = await self._answer(reader, writer)
+                await _send(writer, answer)
+                if answer == STREAM:
+                    await self._stream(reader, writer)
+        finally:
+            self._browsers.remove(address)
+            writer.transport.abort()
+
+    async def _answer(self, reader: StreamReader, writer: StreamWriter) -> bytes:
+        """The answer to a request, whose token is looked at before all else is read."""
+        try:
+            request = await reader.readuntil(b"\r")
+        except asyncio.LimitOverrunError:
+            return _answer(HTTPStatus.REQUEST_URI_TOO_LONG)
         method, path, query = _parts(request)
         if path not in OPEN and not self._has_token(query):
-            kind = "text/plain; charset=utf-8"
-            self._answer(browser, HTTPStatus.UNAUTHORIZED, WRONG_TOKEN, kind)
-            return
-        # A head without fields ends with the first line.
-        head, head_end, body = (b"\r\n" + rest).partition(b"\r\n\r\n")
-        if not head_end:
-            if len(browser.taken) > LARGEST_HEAD:
-                status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
-                self._answer(browser, status)
-            return
-        fields = _fields(head.removeprefix(b"\r\n"))
-        if not self._is_for_us(fields, browser):
-            self._answer(browser, HTTPStatus.FORBIDDEN, b"another host or origin")
-        elif method == "POST":
-            self._take_action(browser, fields, body)
-        elif method == "GET":
-            self._get(browser, path)
-        else:
-            self._answer(browser, HTTPStatus.METHOD_NOT_ALLOWED)
+            return _answer(HTTPStatus.UNAUTHORIZED, WRONG_TOKEN)
+        try:
+            fields = _fields(await reader.readuntil(b"\n\r\n"))
+        except asyncio.LimitOverrunError:
+            return _answer(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
+        if not self._is_for_us(fields, str(writer.get_extra_info("sockname")[0])):
+            return _answer(HTTPStatus.FORBIDDEN, b"another host or origin")
+        if method == "POST":
+            return await self._action(reader, fields)
+        if method == "GET":
+            return self._contents(path)
+        return _answer(HTTPStatus.METHOD_NOT_ALLOWED)
 
     def _has_token(self, query: str) -> bool:
         """Whether one of the query's values is the token."""
@@ -270,95 +222,69 @@ class WebServer:
             return False
         return secrets.compare_digest(values[0].encode(), self.token.encode())
 
-    def _is_for_us(self, fields: Mapping[str, str], browser: Browser) -> bool:
+    def _is_for_us(self, fields: Mapping[str, str], address: str) -> bool:
         """Whether the request names this server, and comes from its own page."""
         host = fields.get("host")
         if host is None:
             return True  # HTTP 1.0 names none
-        address = str(browser.socket.getsockname()[0])
         name = host.rpartition(":")[0] if not host.endswith("]") else host
         hosts = self._names | {address, f"[{address}]"}
         origin = fields.get("origin")
         from_here = origin is None or origin == f"http://{host}"
         return from_here and (name or host).removesuffix(".local") in hosts
 
-    def _get(self, browser: Browser, path: str) -> None:
+    def _contents(self, path: str) -> bytes:
+        """The answer with a file, or with the latest picture."""
+        if path == "/events":
+            self._asked_at = time.monotonic()
+            return STREAM
         if path == "/picture":
             picture = self.picture()
             status = HTTPStatus.OK if picture else HTTPStatus.NO_CONTENT
-            self._answer(browser, status, picture, "application/json")
-        elif path == "/events":
-            browser.streams = True
-            self._asked_at = time.monotonic()
-            head = _head(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
-            self._queue(browser, head)
-        elif path in self.files:
-            kind, contents = self.files[path]
-            self._answer(browser, HTTPStatus.OK, contents, kind)
-        else:
-            self._answer(browser, HTTPStatus.NOT_FOUND)
+            return _answer(status, picture, JSON)
+        if path in FILES:
+            contents = (self._pages / (path[1:] or "page.html")).read_bytes()
+            kind = f"text/{FILES[path]}; charset=utf-8"
+            return _answer(HTTPStatus.OK, contents, kind)
+        return _answer(HTTPStatus.NOT_FOUND)
 
-    def _take_action(
-        self, browser: Browser, fields: Mapping[str, str], body: bytes
-    ) -> None:
+    async def _action(self, reader: StreamReader, fields: Mapping[str, str]) -> bytes:
+        """Carry out an action; the answer says how it went."""
         length = fields.get("content-length", "")
-        if not length.isdecimal() or int(length[:9]) > LARGEST_ACTION:
-            self._answer(browser, HTTPStatus.BAD_REQUEST)
-            return
-        if len(body) < int(length):
-            return
+        if not length.isdecimal() or int(length) > LARGEST_ACTION:
+            return _answer(HTTPStatus.BAD_REQUEST)
+        body = await reader.readexactly(int(length))
         try:
-            answer = self._act(dict(json.loads(body[: int(length)])))
+            outcome = self._act(dict(json.loads(body)))
         except (TypeError, ValueError, RecursionError, EdgeError) as error:
-            self._answer(browser, HTTPStatus.BAD_REQUEST, str(error).encode())
-            return
-        if answer is None:
-            self._answer(browser, HTTPStatus.NO_CONTENT)
-        else:
-            contents = json.dumps(answer, allow_nan=False).encode()
-            self._answer(browser, HTTPStatus.OK, contents, "application/json")
+            return _answer(HTTPStatus.BAD_REQUEST, str(error).encode())
+        if outcome is None:
+            return _answer(HTTPStatus.NO_CONTENT)
+        contents = json.dumps(outcome, allow_nan=False).encode()
+        return _answer(HTTPStatus.OK, contents, JSON)
 
-    def _answer(
-        self,
-        browser: Browser,
-        status: HTTPStatus,
-        contents: bytes = b"",
-        kind: str = "text/plain; charset=utf-8",
-    ) -> None:
-        fields = {"Content-Type": kind, "Content-Length": str(len(contents))}
-        self._queue(browser, _head(status, fields) + contents)
+    async def _stream(self, reader: StreamReader, writer: StreamWriter) -> None:
+        """Send a browser every new picture until it goes."""
+        sent = None
+        while not reader.at_eof():
+            latest = self._picture
+            self._asked_at = time.monotonic()
+            if latest is not sent:
+                await _send(writer, b"data: " + self.picture() + b"\n\n")
+                sent = latest
+            await asyncio.sleep(PICTURE_S / 2)
 
-    def _queue(self, browser: Browser, answer: bytes) -> None:
-        browser.left += answer
-        browser.deadline = time.monotonic() + SLOW_S
-        self._selector.modify(browser.socket, selectors.EVENT_WRITE, browser)
 
-    def _send(self, browser: Browser) -> None:
-        sent = browser.socket.send(browser.left[:PIECE])
-        browser.left = browser.left[sent:]
-        browser.deadline = time.monotonic() + SLOW_S
-        if browser.left:
-            return
-        if browser.streams:
-            self._selector.modify(browser.socket, selectors.EVENT_READ, browser)
-            return
-        with suppress(OSError):  # it may have gone
-            browser.socket.shutdown(socket.SHUT_WR)
-        self._drop(browser)
+async def _send(writer: StreamWriter, data: bytes) -> None:
+    """Send data piece by piece.
 
-    def _stream(self) -> None:
-        """Give every stream that has taken its last picture the latest one."""
-        waiting = [b for b in self._browsers.values() if b.streams and not b.left]
-        if not waiting:
-            return
-        self._asked_at = time.monotonic()
-        behind = [b for b in waiting if b.seen != self._number]
-        event = b"data: " + self.picture() + b"\n\n" if behind else b""
-        for browser in waiting:
-            browser.deadline = time.monotonic() + SLOW_S
-            if browser.seen != self._number:
-                browser.seen = self._number
-                self._queue(browser, event)
+    Raises:
+        TimeoutError: the browser took too long for a piece.
+    """
+    for first in range(0, len(data), PIECE):
+        writer.write(data[first : first + PIECE])
+        async with asyncio.timeout(SLOW_S):
+            await writer.drain()
 
 
 def _parts(request: bytes) -> tuple[str, str, str]:
@@ -384,6 +310,16 @@ def _head(status: HTTPStatus, fields: Mapping[str, str]) -> bytes:
     lines = [f"HTTP/1.1 {status.value} {status.phrase}"]
     lines += [f"{name}: {value}" for name, value in {**HEADERS, **fields}.items()]
     return "\r\n".join([*lines, "", ""]).encode()
+
+
+def _answer(status: HTTPStatus, contents: bytes = b"", kind: str = TEXT) -> bytes:
+    """An answer with its contents."""
+    length = str(len(contents))
+    return _head(status, {"Content-Type": kind, "Content-Length": length}) + contents
+
+
+STREAM = _head(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
+"""Begins the answer that gets every new picture."""
 
 
 def _own_address() -> str:

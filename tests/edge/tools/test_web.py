@@ -216,7 +216,7 @@ def test_a_wrong_token_explains_itself(server):
     assert b"needs the link that the program printed" in ask(server, token="x")[2]
 
 
-def test_a_stream_gets_every_new_picture(server):
+def test_a_stream_gets_every_new_picture_and_ends_quietly(server, caplog):
     place = ("127.0.0.1", server.server_port)
     with socket.create_connection(place, timeout=5) as client:
         client.sendall(f"GET /events?token={server.token} HTTP/1.1\r\n\r\n".encode())
@@ -226,5 +226,7 @@ def test_a_stream_gets_every_new_picture(server):
             while b'data: {"t":%.1f}\n\n' % t not in received:
                 received += client.recv(1 << 16)
         assert server.watched
+        server.close()
+    assert caplog.text == ""
     assert received.startswith(b"HTTP/1.1 200 OK\r\n")
     assert b"Content-Type: text/event-stream" in received
