@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.recording import KEYS, Recording, checked, warn_of_another_unit
 from edge.touch.thresholds import doubt
+from edge.writing import write_whole
 
 LOG = logging.getLogger(__name__)
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from edge import __version__
-from edge.files import write_whole
 from edge.model.info import ModelInfo, Task
 from edge.model.model import Model
 from edge.touch.doubts import is_several
 from edge.touch.track import DEBOUNCE
+from edge.writing import write_whole
 from export import golden
 from export.graph import to_onnx
 from train.choose import TRIAL, Chosen

@@ -26,9 +26,9 @@ from onnx import TensorProto, numpy_helper
 
 from edge.cli import dispatch
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import load_arrays
+from edge.writing import write_whole
 
 ROUNDS = 7
 CALLS = 200

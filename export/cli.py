@@ -12,7 +12,6 @@ from joblib import cpu_count
 from edge.cli import dispatch
 from edge.commands.options import add_arm, open_arm, within
 from edge.errors import InputError
-from edge.files import check_writable
 from edge.model.model import Model
 from edge.recording import load
 from edge.saving import find
@@ -20,6 +19,7 @@ from edge.tools.replay import Summary, compared, decide
 from edge.tools.slips import counts_text
 from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
+from edge.writing import check_writable
 from export.api import measure, save
 from train.choose import LEAVE_OUT, TRIAL
 from train.dataset import read

@@ -22,9 +22,9 @@ from pathlib import Path
 from tqdm import tqdm
 
 from edge import demo
-from edge.leftovers import PREFIX
 from edge.recording import load
 from edge.saving import find
+from edge.writing import PREFIX
 from tests.bench import tables
 from train.touch_map import TouchMap
 

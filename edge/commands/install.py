@@ -15,11 +15,12 @@ from pathlib import Path
 
 from edge.commands.output import LOG, Output
 from edge.errors import EdgeError, InputError
-from edge.files import read_bytes, write_whole
+from edge.files import read_bytes
 from edge.model.model import LARGEST_BYTES, Model
 from edge.model.verify import verify
 from edge.skin.file import load
 from edge.touch.layout import differences
+from edge.writing import write_whole
 
 FORMER = ".former"
 """Ends the name of the model that was replaced, and of its golden file."""

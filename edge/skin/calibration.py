@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from edge.errors import InputError
-from edge.files import read_text, write_whole
+from edge.files import read_text
 from edge.skin.file import TaxelCalibration, parse
+from edge.writing import write_whole
 
 CALIBRATION = re.compile(
     r"^[ \t]*\[calibration\][ \t]*(#.*)?\n"

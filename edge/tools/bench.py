@@ -27,11 +27,11 @@ import numpy as np
 from edge import __version__
 from edge.classifier import Classifier
 from edge.commands.output import LOG, Output
-from edge.files import write_whole
 from edge.model.model import Model
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import first_contact
+from edge.writing import write_whole
 
 RATE_HZ = 100.0
 INSIDE = slice(1, -2)

@@ -12,7 +12,6 @@ from typing import Any
 from edge.commands.output import LOG
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
-from edge.files import check_writable
 from edge.model.novelty import UNKNOWN
 from edge.saving import save
 from edge.skin.file import SkinFile
@@ -21,6 +20,7 @@ from edge.tools.record import Trials, recording
 from edge.tools.review import UNSURE
 from edge.touch.arm import Chain
 from edge.touch.frame import Frame
+from edge.writing import check_writable
 
 REASONS = ("unsure", "unknown", "all")
 LONGEST_S = 10.0

@@ -20,12 +20,12 @@ from edge.commands.options import task_label
 from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
-from edge.files import parsing, read_text, refusing, write_whole
-from edge.leftovers import remove_leftovers
+from edge.files import parsing, read_text, refusing
 from edge.recording import Recording, load
 from edge.saving import find, save
 from edge.tools import review
 from edge.tools.slips import counts_text, slips
+from edge.writing import remove_leftovers, write_whole
 
 JOURNAL = ".edge-classify-labels.json"
 """Beside recordings whose labels are being changed."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
-from edge.files import read_bytes, refusing, write_whole
+from edge.files import read_bytes, refusing
 from edge.recording import LARGEST_BYTES, Recording, load
 from edge.saving import save
 from edge.skin.loop import Schedule
@@ -19,6 +19,7 @@ from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
+from edge.writing import write_whole
 
 PICTURE_S = 0.1
 """Between two pictures."""

@@ -26,7 +26,7 @@ from edge.commands.options import add_arm, add_reading, open_arm, task_label, wi
 from edge.commands.output import LOG
 from edge.commands.source import Opened, Reading, reading
 from edge.errors import InputError
-from edge.files import NameTaken, check_writable, refusing
+from edge.files import refusing
 from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import save
@@ -40,6 +40,7 @@ from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.still import WatchfulTracker
 from edge.touch.track import DEBOUNCE
+from edge.writing import NameTaken, check_writable
 
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes,

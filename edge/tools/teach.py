@@ -14,14 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from edge.commands.output import LOG, Output, counted
-from edge.files import write_whole
-from edge.leftovers import remove_leftovers
 from edge.model.model import Model
 from edge.model.verify import renew
 from edge.recording import load
 from edge.saving import find
 from edge.tools.replay import contact_of
 from edge.tools.teaching import joined, spelled_like, taught, unknown_labels
+from edge.writing import remove_leftovers, write_whole
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

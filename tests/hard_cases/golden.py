@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import Recording
 from edge.saving import save
+from edge.writing import write_whole
 from export import golden
 from export.__main__ import main as export
 from export.api import describe

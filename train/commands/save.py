@@ -20,9 +20,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.recording import Recording, load
 from edge.saving import find
+from edge.writing import write_whole
 from train.progress import bar
 
 FORMATS = ("parquet", "hdf5")

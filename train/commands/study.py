@@ -8,7 +8,7 @@ import argparse
 import os
 from pathlib import Path
 
-from edge.files import check_writable
+from edge.writing import check_writable
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

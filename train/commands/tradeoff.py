@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from edge.errors import InputError
-from edge.files import check_writable
 from edge.saving import find
+from edge.writing import check_writable
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

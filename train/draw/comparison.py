@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from edge.classifier import Classifier
 from edge.errors import InputError, about
 from edge.events import Decided
-from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
 from edge.touch.track import ContactTracker
+from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import contacts
 from train.draw.recording import UNITS, curves, units

@@ -10,12 +10,12 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.model.model import Model
 from edge.recording import Recording, load
 from edge.tools.explain import explanations
 from edge.touch.contact import FeatureSeries
 from edge.touch.layout import SkinLayout
+from edge.writing import write_whole
 from train.draw.comparison import contact_of
 from train.draw.recording import curves, units
 from train.report.figures import STROKES, STYLE

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from edge.errors import InputError
-from edge.files import parsing, write_whole
+from edge.files import parsing
 from edge.recording import Recording
 from edge.tools.arrows import region_shear
 from edge.touch.contact import FeatureSeries
@@ -16,6 +16,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import Region, largest_region
 from edge.touch.track import ContactTracker, first_contact
+from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import with_thresholds
 from train.draw.sketch import draw_side

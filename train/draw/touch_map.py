@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import write_whole
 from edge.model.info import ModelInfo
+from edge.writing import write_whole
 from train.draw.recording import UNITS
 from train.draw.sketch import link_positions
 from train.report.section import counted

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from edge.files import write_whole
+from edge.writing import write_whole
 from train.report.section import Figure, Section, Table
 
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from edge import saving
-from edge.files import check_writable
 from edge.recording import Recording
+from edge.writing import check_writable
 from train.cluster import on_cluster
 from train.simulate.arm import Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
-from edge.files import write_whole
+from edge.writing import write_whole
 from train.dataset import DataSet, read
 from train.report.page import write
 from train.report.section import Row, Section, counted
