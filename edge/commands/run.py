@@ -209,15 +209,14 @@ def _keeper(
     if arguments.keep is None:
         yield lambda frame, events: None
         return
-    from edge.tools.keep import Keeper, meta_of, reasons  # few runs keep touches
+    from edge.tools.keep import Keeper, reasons  # few runs keep touches
 
     keeper = Keeper(
         arguments.keep,
         reasons(arguments.keep_if),
         arguments.keep_mb,
-        opened.skin,
-        model.info.window_s,
-        meta_of(opened.skin.file, opened.source, model.info.chain),
+        opened,
+        model.info,
     )
     try:
         yield keeper.push

@@ -13,7 +13,6 @@ import json
 import math
 import os
 import platform
-import re
 import subprocess
 import sys
 import time
@@ -28,6 +27,7 @@ from edge import __version__
 from edge.classifier import Classifier
 from edge.commands.output import LOG, Output
 from edge.model.model import Model
+from edge.recording import Recording
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
 from edge.touch.track import first_contact
@@ -89,14 +89,18 @@ def measure(model: Model) -> dict[str, Any]:
     if waited > BUSY_SHARE:
         LOG.warning(
             f"this machine is busy: bench waited {waited:.0%} of the time, at a load "
-            f"of {load:g} "
-            f"on {os.cpu_count()} cores. Its figures are the fastest of {REPEATS} "
-            "rounds, and may "
-            "still be too high; end other programs and run it again"
+            f"of {load:g} on {os.cpu_count()} cores. Its figures are the fastest of "
+            f"{REPEATS} rounds, and may still be too high; end other programs and run "
+            "it again"
         )
     import resource  # only Linux and macOS have it
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    per_megabyte = 1 << 20 if sys.platform == "darwin" else 1 << 10
+    stages = {
+        stage: min((times[stage] for times in repeats), key=lambda t: t["median_us"])
+        for stage in repeats[0]
+    }
     return {
         "machine": {
             "name": platform.node(),
@@ -113,16 +117,8 @@ def measure(model: Model) -> dict[str, Any]:
             "features": list(model.info.features),
         },
         "rounds": REPEATS * ROUNDS,
-        "stages": {
-            stage: min(
-                (times[stage] for times in repeats),
-                key=lambda timing: timing["median_us"],
-            )
-            for stage in repeats[0]
-        },
-        "memory_mb": round(
-            peak / (1 << 20 if sys.platform == "darwin" else 1 << 10), 1
-        ),
+        "stages": stages,
+        "memory_mb": round(peak / per_megabyte, 1),
         "cold_start_ms": round(cold_start_ms(model.path), 1),
     }
 
@@ -134,24 +130,20 @@ def touch(model: Model, seconds: float) -> list[Frame]:
     dof = model.info.dof
     rows, cols = np.ogrid[: layout.rows, : layout.cols]
     distance = np.hypot(rows - layout.rows // 2, cols - layout.cols // 2)
-    frames = []
-    for i in range(math.ceil(seconds * RATE_HZ) + 1):
-        age = i / RATE_HZ
-        force = (layout.onset + 1) * (2.0 + 3.0 * age)
-        reach = 1.0 + 2.0 * age
-        counts = np.minimum(
-            force * np.maximum(0.0, 1.0 - distance / (reach + 1.0)), 65535
-        )
-        joints = None if dof is None else np.full(dof, 0.1 * age)
-        valid = np.ones(layout.shape, dtype=bool)
-        whole = counts.astype(np.uint16)
-        shear = np.stack([whole // 4] * 2, axis=2).astype(np.int16)
-        frames.append(
-            Frame(
-                age, whole, valid, joints=joints, shear=shear if layout.axes else None
-            )
-        )
-    return frames
+    t = np.arange(math.ceil(seconds * RATE_HZ) + 1) / RATE_HZ
+    age = t[:, None, None]
+    force = (layout.onset + 1) * (2.0 + 3.0 * age)
+    share = np.maximum(0.0, 1.0 - distance / (2.0 + 2.0 * age))
+    counts = np.minimum(force * share, 65535).astype(np.uint16)
+    shear = np.stack([counts // 4] * 2, axis=3).astype(np.int16)
+    recording = Recording(
+        t,
+        counts,
+        joints=None if dof is None else np.outer(0.1 * t, np.ones(dof)),
+        valid=np.ones(layout.shape, dtype=bool),
+        shear=shear if layout.axes else None,
+    )
+    return list(recording)
 
 
 def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
@@ -179,10 +171,8 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     few = max(rounds // 10, 4)
     stages = {
         "region": timed(
-            lambda i: largest_region(
-                counts[i % len(counts)], limit, wraps=layout.wraps
-            ),
-            calls,
+            lambda image: largest_region(image, limit, wraps=layout.wraps),
+            (counts * rounds)[:rounds],
         ),
         "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
         "features": timed(lambda _: info.vector(series), calls),
@@ -225,21 +215,17 @@ def summary(times: list[float]) -> Timings:
 def cold_start_ms(path: str) -> float:
     """Fewest milliseconds from the start of Python to a ready classifier."""
     command = [sys.executable, "-c", COLD, path]
-    return (
-        min(timed(lambda _: subprocess.run(command, check=True), range(REPEATS))) / 1e3
-    )
+    starts = timed(lambda _: subprocess.run(command, check=True), range(REPEATS))
+    return min(starts) / 1e3
 
 
 def kind() -> str:
     """The name of the board, or else of the processor."""
     with suppress(OSError):
-        return (
-            Path("/proc/device-tree/model").read_text(errors="replace").strip("\x00 \n")
-        )
+        board = Path("/proc/device-tree/model").read_text(errors="replace")
+        return board.strip("\x00 \n")
     with suppress(OSError):
-        named = re.search(
-            r"^model name\s*:(.*)", Path("/proc/cpuinfo").read_text(), re.M
-        )
-        if named:
-            return named[1].strip()
+        processor = Path("/proc/cpuinfo").read_text().partition("model name")[2]
+        if processor:
+            return processor.splitlines()[0].strip("\t: ")
     return platform.processor() or "unknown"

@@ -8,7 +8,7 @@ train show REC --model model.onnx` draws the curves.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from edge.commands.output import Output, counted, wrapped
@@ -63,14 +63,6 @@ def explanations(
         truth = labels.index(true_label) if true_label in labels else None
         space = Space.of(model, task)
         why = explain(space, vector, rows, answer, info.features, info.widths, truth)
-
-        def trial(near: Near, labels: tuple[str, ...] = labels) -> dict[str, Any]:
-            return {
-                **near._asdict(),
-                "label": labels[near.label],
-                "trial": info.trial(near.row),
-            }
-
         yield {
             "event": "explanation",
             "source": name,
@@ -78,11 +70,17 @@ def explanations(
             "label": decision.label,
             "confidence": decision.confidence,
             "votes": decision.votes,
-            "nearest": list(map(trial, why.voters)),
-            "rival": None if why.rival is None else trial(why.rival),
+            "nearest": [_trial(near, info, labels) for near in why.voters],
+            "rival": why.rival and _trial(why.rival, info, labels),
             "pulls": why.pulls,
             "changes": [{**c._asdict(), "label": labels[c.label]} for c in why.changes],
         }
+
+
+def _trial(near: Near, info: ModelInfo, labels: Sequence[str]) -> dict[str, Any]:
+    """A training trial near a touch, with its name and its label."""
+    names = {"label": labels[near.label], "trial": info.trial(near.row)}
+    return {**near._asdict(), **names}
 
 
 def text(line: dict[str, Any], info: ModelInfo) -> str:
@@ -92,10 +90,8 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
     rival = line["rival"]
     votes = round(line["votes"] * len(nearest))
     lines = [f"{line['task']}: {label}, by {votes} of {counted(len(nearest), 'vote')}"]
-    lines += [
-        "  The nearest training trials, each with its distance:",
-        *map(trial_text, nearest),
-    ]
+    lines.append("  The nearest training trials, each with its distance:")
+    lines += map(trial_text, nearest)
     if rival:
         lines += ["  The nearest one with another label:", trial_text(rival)]
         strongest = list(line["pulls"].items())[:MOST]
@@ -104,16 +100,14 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
         lines += wrapped(f"Features {compared}: {pulls}.", "  ")
     for change in line["changes"][:MOST]:
         unit = info.units[change["feature"]]
-        plural = (
-            f"{unit}s" if unit.isalpha() else unit.removesuffix("1")
-        )  # "1" is a ratio's
+        # The unit of a ratio is "1".
+        plural = f"{unit}s" if unit.isalpha() else unit.removesuffix("1")
         size = f"{change['size']:.2g} {plural}".rstrip()
         how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
         if abs(change["mean"]) <= DIRECTED * change["size"]:
             how = f"varied in another way, by {size} on average"
-        lines += wrapped(
-            f"It would be {change['label']} if {change['feature']} {how}.", "  "
-        )
+        sentence = f"It would be {change['label']} if {change['feature']} {how}."
+        lines += wrapped(sentence, "  ")
     return "\n".join(lines)
 
 

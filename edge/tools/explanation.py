@@ -6,9 +6,8 @@ scaled and cut off at the training data's reach. Its squared distance to a trial
 feature f brings the touch to the trial than its mean would.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,36 +62,28 @@ class Space(NamedTuple):
                 for node in model.contents.nodes
                 if f"{task}_neighbours" in node.inputs
             )
-            names = {
-                "mean": first["Sub"][1],
-                "gain": first["Mul"][1],
-                "weights": first["MatMul"][1],
-                "columns of rows": first["Gemm"][1],
-                "lengths": first["Gemm"][2],
-                "unit": graph.makers[f"{task}_distances"].inputs[1],
-                "labels": voters,
-                "reach": limits[0],
-                "limit": limits[1],
-            }
-            if "Gather" in first:
-                names["columns"] = first["Gather"][1]
             last = len(model.decision_points_s) - 1
-            inputs = {"decision_point": np.array([last])}
-            computed = graph.run(list(names.values()), inputs)
-            values = dict(zip(names, computed, strict=True))
-            unit = values["unit"]
+
+            def value(name: str) -> NDArray[Any]:
+                return graph.run([name], {"decision_point": np.array([last])})[0]
+
+            unit = value(graph.makers[f"{task}_distances"].inputs[1])
             components = model.info.tasks[task].components
-            rows = values["columns of rows"].T[:, :components] * (-0.5 * unit)
-            rows[np.isinf(values["lengths"])] = np.inf  # trials without a label
+            columns = np.arange(model.info.width)
+            if "Gather" in first:
+                columns = value(first["Gather"][1])
+            rows = value(first["Gemm"][1]).T[:, :components] * (-0.5 * unit)
+            # Trials without a label are infinitely far away.
+            rows[np.isinf(value(first["Gemm"][2]))] = np.inf
             return cls(
-                columns=values.get("columns", np.arange(model.info.width)),
-                mean=values["mean"],
-                gain=values["gain"],
-                weights=values["weights"][:, :components] * unit,
+                columns=columns,
+                mean=value(first["Sub"][1]),
+                gain=value(first["Mul"][1]),
+                weights=value(first["MatMul"][1])[:, :components] * unit,
                 rows=rows,
-                labels=values["labels"],
-                reach=float(values["reach"]),
-                limit=float(values["limit"]) * float(unit),
+                labels=value(voters),
+                reach=float(value(limits[0])),
+                limit=float(value(limits[1])) * float(unit),
             )
 
     def differences(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,9 +98,8 @@ class Space(NamedTuple):
 
     def vote(self, z: NDArray[np.float64], k: int) -> int:
         """The label of the k nearest trials; of tied ones that of the nearest."""
-        voters = self.labels[
-            np.argsort(((self.rows - z) ** 2).sum(axis=1), kind="stable")[:k]
-        ]
+        squares = ((self.rows - z) ** 2).sum(axis=1)
+        voters = self.labels[squares.argsort(kind="stable")[:k]]
         return int(voters[np.bincount(voters)[voters].argmax()])
 
 
@@ -181,7 +171,7 @@ def explain(
         widths: columns of each.
         truth: index of the label that is right, if it is known: the rival then has it.
     """
-    touch = _Touch.of(space, vector, features, widths)
+    touch = _Touch(space, vector, features, widths)
     nearest = tuple(map(touch.near, voters))
     answered = space.labels == label
     others = space.labels == truth
@@ -201,11 +191,11 @@ def explain(
     joins = touch.nearest(others & ~votes)
     direction = space.rows[leaves] - space.rows[joins]
     gap = min(touch.squares[leaves] - touch.squares[joins], 0.0)
-    changes = [
-        change
-        for name in touch.members
-        if (change := touch.change(name, direction, gap, len(voters), label))
-    ]
+    changes = []
+    for name in touch.members:
+        change = touch.change(name, direction, gap, len(voters), label)
+        if change is not None:
+            changes.append(change)
     changes.sort(key=lambda change: change.spread)
     ordered = tuple(change.least for change in changes)
     return Explanation(nearest, touch.near(rival), pulls, ordered)
@@ -218,7 +208,6 @@ class _Sized(NamedTuple):
     least: Change
 
 
-@dataclass(frozen=True)
 class _Touch:
     """A touch in a task's space.
 
@@ -231,30 +220,25 @@ class _Touch:
         squares: (n,) squared distances of the training trials.
     """
 
-    space: Space
-    members: Mapping[str, NDArray[np.bool_]]
-    differences: NDArray[np.float64]
-    shifts: NDArray[np.float64]
-    z: NDArray[np.float64]
-    squares: NDArray[np.float64]
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         space: Space,
         vector: NDArray[np.float64],
         features: Sequence[str],
         widths: Sequence[int],
-    ) -> Self:
-        """The touch of a feature vector (width,), with the features' names and
-        widths."""
+    ) -> None:
+        """Place a feature vector (width,), with the features' names and widths."""
         feature_of = np.repeat(features, widths)[space.columns]
-        members = {name: feature_of == name for name in features if name in feature_of}
-        differences = space.differences(vector)
-        shifts = [differences[c] @ space.weights[c] for c in members.values()]
-        z = space.coordinates(differences)
-        squares = ((space.rows - z) ** 2).sum(axis=1)
-        return cls(space, members, differences, np.array(shifts), z, squares)
+        self.space = space
+        self.members = {
+            name: feature_of == name for name in features if name in feature_of
+        }
+        self.differences = space.differences(vector)
+        self.shifts = np.array(
+            [self.differences[c] @ space.weights[c] for c in self.members.values()]
+        )
+        self.z = space.coordinates(self.differences)
+        self.squares = ((space.rows - self.z) ** 2).sum(axis=1)
 
     def pulls(self, towards: NDArray[np.float64]) -> dict[str, float]:
         """{feature: how much it pulls in a direction (c,)}, the strongest first."""

@@ -32,16 +32,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the description, or the differences."""
     output = Output.of(arguments)
     model = Model(arguments.model)
+    about = described(model)
     if arguments.other is None:
-        about = described(model)
         output.event(about, description(model.info, about))
         return 0
-    changes = differences(described(model), described(Model(arguments.other)))
-    lines = [
-        line
-        for key, pair in changes.items()
-        for line in wrapped(change_text(key, *pair))
-    ]
+    changes = differences(about, described(Model(arguments.other)))
+    lines = []
+    for key, pair in changes.items():
+        lines += wrapped(change_text(key, *pair))
     text = "\n".join(lines) or "the models do not differ"
     output.event({"event": "comparison", "changes": changes}, text)
     return 0
@@ -73,22 +71,16 @@ def change_text(key: str, a: Any, b: Any) -> str:
     """A difference for a person: of names, which only one of the models has."""
     if key in COARSE:
         return f"{key}: differs"
-    if key == "trials":
-        return _list_change(key, _file_names(a or []), _file_names(b or []))
-    if isinstance(a, list) or isinstance(b, list):
-        return _list_change(key, a or [], b or [])
-    return f"{key}: {_value_text(key, a)} -> {_value_text(key, b)}"
-
-
-def _list_change(key: str, a: list[Any], b: list[Any]) -> str:
-    """The values that only one of two lists holds, as text."""
-    only_a = [value for value in a if value not in b]
-    only_b = [value for value in b if value not in a]
+    if not isinstance(a, list) and not isinstance(b, list):
+        return f"{key}: {_value_text(key, a)} -> {_value_text(key, b)}"
+    a = _names(key, a)
+    b = _names(key, b)
     texts = []
-    if only_a:
-        texts.append(f"- {_some(only_a)}")
-    if only_b:
-        texts.append(f"+ {_some(only_b)}")
+    for sign, names, others in (("-", a, b), ("+", b, a)):
+        only = [name for name in names if name not in others]
+        if only:
+            more = f" and {len(only) - NAMED} more" if len(only) > NAMED else ""
+            texts.append(f"{sign} {', '.join(only[:NAMED])}{more}")
     return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
 
 
@@ -98,16 +90,12 @@ def _value_text(key: str, value: Any) -> str:
     return "a table" if isinstance(value, dict) else str(value)
 
 
-def _file_names(trials: list[str]) -> list[str]:
-    """Names of trials without the folders that several data sets put before them."""
-    return [trial.rpartition("/")[2] for trial in trials]
-
-
-def _some(values: list[Any]) -> str:
-    rest = len(values) - NAMED
-    return ", ".join(map(str, values[:NAMED])) + (
-        f" and {rest} more" if rest > 0 else ""
-    )
+def _names(key: str, values: list[Any] | None) -> list[str]:
+    """The names in a list; of trials without the folders of several data sets."""
+    names = list(map(str, values or []))
+    if key == "trials":
+        return [name.rpartition("/")[2] for name in names]
+    return names
 
 
 def description(info: ModelInfo, about: dict[str, Any]) -> str:

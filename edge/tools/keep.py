@@ -1,24 +1,22 @@
 """Touches that `run` keeps as recordings, with their decisions, to learn from."""
 
-import math
 import queue
 import threading
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from edge.commands.output import LOG
+from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
+from edge.model.info import ModelInfo
 from edge.model.novelty import UNKNOWN
 from edge.saving import save
-from edge.skin.file import SkinFile
-from edge.skin.skin import Skin
-from edge.tools.record import Trials, recording
+from edge.tools.record import Trials, recording, shared_meta
 from edge.tools.review import UNSURE
-from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.writing import check_writable
 
@@ -46,9 +44,8 @@ class Keeper:
         folder: Path,
         reasons: Sequence[str],
         megabytes: float,
-        skin: Skin,
-        window_s: float,
-        meta: Mapping[str, Any],
+        opened: Opened,
+        info: ModelInfo,
     ) -> None:
         """Keep touches of a skin in a folder.
 
@@ -56,9 +53,8 @@ class Keeper:
             folder: for the recordings; made where it is missing.
             reasons: some of `REASONS`.
             megabytes: most that the kept files may take together.
-            skin: whose frames are pushed.
-            window_s: of the model, after which a touch is decided.
-            meta: of every recording.
+            opened: the skin whose frames are pushed.
+            info: of the model that decides.
 
         Raises:
             InputError: the folder cannot be written.
@@ -69,9 +65,11 @@ class Keeper:
         self._folder = folder
         self._reasons = frozenset(reasons)
         self._most_bytes = 1e6 * megabytes
-        self._window_s = window_s
-        self._meta = dict(meta)
-        self._trials = Trials(skin, LONGEST_S)
+        self._window_s = info.window_s
+        self._meta = shared_meta(opened, info.chain)
+        if info.chain is not None:
+            self._meta["joint_names"] = list(info.chain.names)
+        self._trials = Trials(opened.skin, LONGEST_S)
         self._complete: deque[list[Frame]] = deque()
         """The frames of touches that wait for their decisions."""
         self._decided: list[Decided] = []
@@ -92,7 +90,9 @@ class Keeper:
     def close(self) -> None:
         """Save the complete touches, and wait until all are written."""
         rest = self._trials.rest()
-        for frames in [*self._complete, *([rest] if rest else [])]:
+        if rest is not None:
+            self._complete.append(rest)
+        for frames in self._complete:
             self._hand_over(frames)
         self._queue.put(None)
         self._thread.join()
@@ -162,30 +162,16 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
 
 def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
     """{task: its answer} for the metadata of a kept touch."""
-    answers = {}
-    for decision in decided:
-        sure = decision.confidence
-        answers[decision.task] = {
+    return {
+        decision.task: {
             "label": decision.label,
-            "confidence": None if sure is None or math.isnan(sure) else sure,
+            "confidence": decision.confidence,
             "flags": list(decision.flags),
             "window_s": decision.window_s,
             "model": decision.model,
         }
-    return answers
-
-
-def meta_of(file: SkinFile, source: str, chain: Chain | None) -> dict[str, Any]:
-    """The metadata that all kept touches of a skin share."""
-    meta = {
-        "skin": file.layout.to_dict(),
-        "skin_name": file.name,
-        "source": source,
-        "rate_hz": file.reading.rate_hz,
+        for decision in decided
     }
-    if chain is not None:
-        meta |= {"arm": chain.to_dict(), "joint_names": list(chain.names)}
-    return meta
 
 
 def reasons(text: str) -> tuple[str, ...]:

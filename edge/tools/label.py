@@ -12,7 +12,7 @@ import json
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,54 +42,43 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "data", nargs="+", metavar="REC", help=".npz recordings or folders of them"
     )
-    for option, metavar, text in (
+    for option, metavar, kind, text in (
         (
             "--set",
             "TASK=LABEL",
+            task_label,
             "give every recording named this label; repeat it for more tasks",
         ),
         (
             "--rename",
             "OLD=NEW",
+            task_label,
             "rename a task where a recording has it; repeat it for more",
+        ),
+        (
+            "--unset",
+            "TASK",
+            str,
+            "take this task's label away; repeat it for more",
+        ),
+        (
+            "--only",
+            "WHICH",
+            review.kind_or_task,
+            "only recordings that are unsure, wrong or unlabelled, or that have a task; "
+            "repeat it for recordings that are all of these",
         ),
     ):
         parser.add_argument(
-            option,
-            action="append",
-            default=[],
-            type=task_label,
-            metavar=metavar,
-            help=text,
+            option, action="append", default=[], type=kind, metavar=metavar, help=text
         )
-    parser.add_argument(
-        "--unset",
-        action="append",
-        default=[],
-        metavar="TASK",
-        help="take this task's label away; repeat it for more",
-    )
-    parser.add_argument(
-        "--only",
-        action="append",
-        default=[],
-        type=review.kind_or_task,
-        metavar="WHICH",
-        help="only recordings that are unsure, wrong or unlabelled, or that have a task; "
-        "repeat it for recordings that are all of these",
-    )
-    parser.add_argument(
-        "--accept",
-        action="store_true",
-        help="label kept touches as they were decided",
-    )
-    parser.add_argument("--delete", action="store_true", help="delete the recordings")
-    parser.add_argument(
-        "--undo", action="store_true", help="take the last change in a folder back"
-    )
-    parser.add_argument(
-        "--yes", action="store_true", help="change the recordings without a question"
-    )
+    for option, text in {
+        "--accept": "label kept touches as they were decided",
+        "--delete": "delete the recordings",
+        "--undo": "take the last change in a folder back",
+        "--yes": "change the recordings without a question",
+    }.items():
+        parser.add_argument(option, action="store_true", help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -103,8 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         output.text(f"none of {counted(len(every), 'recording')} is of this kind")
         return 1
     if arguments.delete:
-        paths = [path for path, _ in recordings]
-        return _delete(output, paths, agreed=arguments.yes)
+        return _delete(arguments, output, [path for path, _ in recordings])
     if arguments.accept or arguments.rename or arguments.set or arguments.unset:
         return _relabel(arguments, output, recordings)
     _print(output, recordings)
@@ -131,36 +119,40 @@ def _relabel(
     recordings: Sequence[tuple[Path, Recording]],
 ) -> int:
     """Show what labels become, ask, and change them."""
-    change = Change(dict(arguments.rename), dict(arguments.set), tuple(arguments.unset))
-    differing = []
+    changes = {}
     for path, recording in recordings:
-        meta = recording.meta
-        labels = review.accepted(meta) if arguments.accept else {}
-        relabelled = replace(change, labels={**labels, **change.labels})
-        after = changed(str(path), meta, relabelled)
-        if recording.labels != after.get("labels", {}):
-            differing.append((path, after))
-    if not differing:
+        labels = review.accepted(recording.meta) if arguments.accept else {}
+        labels |= arguments.set
+        after = changed(
+            str(path),
+            recording.meta,
+            labels,
+            names=dict(arguments.rename),
+            without=arguments.unset,
+        )
+        if recording.labels != after:
+            changes[path] = after
+    if not changes:
         output.text("every recording has these labels already")
         return 0
-    former = {path: recording.labels for path, recording in recordings}
-    for path, after in differing:
-        old = _text(former[path])
-        output.text(f"{path}: {old} becomes {_text(after.get('labels', {}))}")
-    if not (arguments.yes or _agreed(output, len(differing))):
-        output.text("nothing is changed")
+    for path, recording in recordings:
+        if path in changes:
+            old = _text(recording.labels)
+            output.text(f"{path}: {old} becomes {_text(changes[path])}")
+    if not _agreed(arguments, output, len(changes)):
         return 1
-    change_all(differing)
+    change_all(changes)
     _print(output, [(path, load(path)) for path, _ in recordings])
     return 0
 
 
-def _delete(output: Output, paths: Sequence[Path], *, agreed: bool) -> int:
+def _delete(
+    arguments: argparse.Namespace, output: Output, paths: Sequence[Path]
+) -> int:
     """Delete recordings, so that they can be brought back."""
     for path in paths:
         output.text(f"{path}: is deleted")
-    if not (agreed or _agreed(output, len(paths))):
-        output.text("nothing is changed")
+    if not _agreed(arguments, output, len(paths)):
         return 1
     for folder in sorted({path.parent for path in paths}):
         bin_ = folder / DELETED
@@ -187,7 +179,7 @@ def undo(data: Sequence[str], output: Output) -> int:
         if not folder.is_dir():
             raise InputError(f"{folder}: --undo takes the folder of the recordings")
         brought += _brought_back(folder)
-        brought += _labelled_back(folder / UNDO)
+        brought += _carry_out(folder / UNDO)
     if not brought:
         where = ", ".join(map(str, folders))
         raise InputError(f"{where}: there is no change to take back")
@@ -212,19 +204,17 @@ def _brought_back(folder: Path) -> list[Path]:
     return places
 
 
-def _labelled_back(file: Path) -> list[Path]:
-    """Give recordings the labels that a file of former ones holds, and remove it."""
-    brought = _relabelled(file) if file.is_file() else []
-    file.unlink(missing_ok=True)
-    return brought
+def _carry_out(journal: Path) -> list[Path]:
+    """Give recordings the labels that a journal names, if there is one, and remove it.
 
-
-def _relabelled(journal: Path) -> list[Path]:
-    """Give recordings the labels that a journal names; those that changed.
+    Returns:
+        The recordings whose labels changed.
 
     Raises:
         InputError: the journal is damaged, or a recording cannot be written.
     """
+    if not journal.is_file():
+        return []
     entries = parse_json(read_text(journal), str(journal))
     with parsing(str(journal), "a list of files and labels", "; delete it"):
         changes = [(Path(name), dict(labels)) for name, labels in entries]
@@ -233,57 +223,53 @@ def _relabelled(journal: Path) -> list[Path]:
         if path.is_file():
             recording = load(path)
             if recording.labels != labels:
-                meta = {**recording.meta, "labels": labels}
-                save(path, replace(recording, meta=meta))
+                save(path, with_labels(recording, labels))
                 relabelled.append(path)
+    journal.unlink()
     return relabelled
 
 
-def change_all(metas: Sequence[tuple[Path, Mapping[str, Any]]]) -> None:
-    """Write recordings anew with other metadata: all of them, or a later start does.
+def change_all(changes: Mapping[Path, Mapping[str, str]]) -> None:
+    """Give each recording its new labels: all of them, or a later start does.
 
     A journal beside the first file says what is to be done, until it is.
     """
-    journal = metas[0][0].parent / JOURNAL
-    entries = [[str(path.absolute()), meta["labels"]] for path, meta in metas]
-    with write_whole(journal) as file:
-        file.write(json.dumps(entries).encode())
-    former = []
-    for path, meta in metas:
-        recording = load(path)
-        former.append([str(path.absolute()), recording.labels])
-        save(path, replace(recording, meta=dict(meta)))
-    with write_whole(journal.with_name(UNDO)) as file:
-        file.write(json.dumps(former).encode())
-    shutil.rmtree(journal.with_name(DELETED), ignore_errors=True)
-    journal.unlink()
+    folder = next(iter(changes)).parent
+    former = {path: load(path).labels for path in changes}
+    for name, all_labels in ((JOURNAL, changes), (UNDO, former)):
+        entries = [[str(path.absolute()), all_labels[path]] for path in changes]
+        with write_whole(folder / name) as file:
+            file.write(json.dumps(entries).encode())
+    shutil.rmtree(folder / DELETED, ignore_errors=True)
+    _carry_out(folder / JOURNAL)
 
 
 def finish_interrupted(folder: Path) -> None:
     """Finish a change of labels that was interrupted, where a journal tells of one."""
     remove_leftovers(folder)
-    journal = folder / JOURNAL
-    if not journal.is_file():
-        return
-    finished = len(_relabelled(journal))
-    journal.unlink()
-    LOG.warning(
-        f"{folder}: finished a change of labels that was interrupted: "
-        f"{counted(finished, 'recording')}"
-    )
+    if (folder / JOURNAL).is_file():
+        finished = len(_carry_out(folder / JOURNAL))
+        LOG.warning(
+            f"{folder}: finished a change of labels that was interrupted: "
+            f"{counted(finished, 'recording')}"
+        )
 
 
-def _agreed(output: Output, count: int) -> bool:
+def _agreed(arguments: argparse.Namespace, output: Output, count: int) -> bool:
     """Whether a person at the terminal agrees; a program has to say --yes.
 
     Raises:
         InputError: nobody can be asked.
     """
+    recordings = counted(count, "recording")
+    if arguments.yes:
+        return True
     if output.as_json or not sys.stdin.isatty():
-        raise InputError(
-            f"{counted(count, 'recording')} would change, as shown; add --yes to do it"
-        )
-    return input(f"Change {counted(count, 'recording')}? [y/N] ").lower() == "y"
+        raise InputError(f"{recordings} would change, as shown; add --yes to do it")
+    agreed = input(f"Change {recordings}? [y/N] ").lower() == "y"
+    if not agreed:
+        output.text("nothing is changed")
+    return agreed
 
 
 def _text(labels: Mapping[str, str]) -> str:
@@ -327,42 +313,44 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
         output.text(f"probably a slip: {sentence}")
 
 
-@dataclass(frozen=True)
-class Change:
-    """A change of labels.
+def with_labels(recording: Recording, labels: Mapping[str, str]) -> Recording:
+    """The recording with other labels."""
+    return replace(recording, meta={**recording.meta, "labels": dict(labels)})
 
-    Attributes:
-        names: {task: its new name}.
+
+def changed(
+    name: str,
+    meta: Mapping[str, Any],
+    labels: Mapping[str, str],
+    *,
+    names: Mapping[str, str] | None = None,
+    without: Sequence[str] = (),
+) -> dict[str, str]:
+    """A recording's labels after a change.
+
+    Args:
+        name: of the recording.
+        meta: its metadata.
         labels: {task: its new label}.
+        names: {task: its new name}.
         without: tasks whose label is taken away.
-    """
-
-    names: Mapping[str, str] = field(default_factory=dict)
-    labels: Mapping[str, str] = field(default_factory=dict)
-    without: Sequence[str] = ()
-
-
-def changed(name: str, meta: Mapping[str, Any], change: Change) -> dict[str, Any]:
-    """A recording's metadata with other labels.
 
     Raises:
         InputError: the recording has a task of the new name, or its contacts have their
             own labels.
     """
     current = meta.get("labels", {})
-    names = change.names
+    names = names or {}
     for old, new in names.items():
         if old in current and new in current:
             raise InputError(
                 f"{name}: has a label for {new} already; {old} cannot take its name"
             )
-    if meta.get("contacts") and (names or change.labels or change.without):
+    if meta.get("contacts") and (names or labels or without):
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` "
             "makes a recording of each"
         )
     renamed = {names.get(task, task): label for task, label in current.items()}
-    labels = {**renamed, **change.labels}
-    for task in change.without:
-        labels.pop(task, None)
-    return {**meta, "labels": labels}
+    after = {**renamed, **labels}
+    return {task: after[task] for task in after if task not in without}

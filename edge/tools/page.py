@@ -1,11 +1,13 @@
 """The live page of a skin: its pictures, and the actions that a person can take
 there."""
 
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
@@ -14,7 +16,8 @@ from edge.recording import LARGEST_BYTES, Recording, load
 from edge.saving import save
 from edge.skin.loop import Schedule
 from edge.tools import review
-from edge.tools.label import Change, changed
+from edge.tools.label import changed, with_labels
+from edge.tools.web import WebServer
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -70,10 +73,6 @@ class Page:
             InputError: the address cannot be used, or a trial in the folder cannot be
                 read.
         """
-        from edge.tools.web import (
-            WebServer,
-        )  # commands without a page start sooner without it
-
         self._folder = folder
         self.labels = dict(labels or {})
         self.recording = bool(self.labels)
@@ -83,9 +82,7 @@ class Page:
         """Number of changes of the list of trials."""
         self._undo: tuple[str, bytes] | None = None
         """The file that the last action changed or deleted, as it was before."""
-        if folder is not None:
-            for path in sorted(folder.glob("*.npz"))[-LAST_TRIALS:]:
-                self._show_trial(path)
+        self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
         self._decisions: dict[str, dict[str, Any]] = {}
@@ -122,16 +119,14 @@ class Page:
         self._contact = next(iter(self._tracker.push(frame)), self._contact)
         if frame.t < self._due:
             return
-        self._due = frame.t + PICTURE_S * (
-            1.0 - 1e-6
-        )  # the times of frames are rounded
+        # The times of frames are rounded.
+        self._due = frame.t + PICTURE_S * (1.0 - 1e-6)
+        valid = True if frame.valid is None else frame.valid
         picture = {
             **self._fixed,
             "t": frame.t,
             "counts": frame.counts.ravel().tolist(),
-            "invalid": []
-            if frame.valid is None
-            else (~frame.valid).ravel().nonzero()[0].tolist(),
+            "invalid": np.flatnonzero(np.logical_not(valid)).tolist(),
             "contact": self._curves(),
             "decisions": list(self._decisions.values()),
             "labels": dict(self.labels),
@@ -153,12 +148,11 @@ class Page:
 
     def saved(self, path: Path, trial: Recording) -> None:
         """Add a trial that has been recorded."""
-        decided = review.decisions(trial.meta)
         self._trials[path.name] = {
             "labels": trial.labels,
             "seconds": round(float(trial.t[-1] - trial.t[0]), 2),
             "curve": review.curve(trial),
-            "decided": decided,
+            "decided": review.decisions(trial.meta),
             "kinds": review.kinds(trial.meta),
         }
         self._version += 1
@@ -173,20 +167,19 @@ class Page:
     def _curves(self) -> dict[str, Any] | None:
         """The last contact: its taxels, and its features since onset."""
         contact = self._contact
-        region = self._tracker.region
         if contact is None:
             return None
+        region = self._tracker.region
         series = contact.series()
         return {
             "ended": contact.ended,
-            "taxels": []
-            if region is None
-            else region.mask.ravel().nonzero()[0].tolist(),
+            "taxels": [] if region is None else np.flatnonzero(region.mask).tolist(),
             "t": series.t.round(4).tolist(),
             "force": (series.peak / self._scale).round(4).tolist(),
             "area": series.area.tolist(),
             "motion": [
-                None if value != value else round(value, 5) for value in series.motion
+                None if math.isnan(metres) else round(metres, 5)
+                for metres in series.motion.tolist()
             ],
         }
 
@@ -214,7 +207,10 @@ class Page:
         if self._folder is None:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
-            return self._list()
+            if not self._fixed["records"]:
+                self.look()
+            trials = list(self._trials.items())
+            return [{"file": name, **trial} for name, trial in trials]
         if kind == "labels":
             self.labels = _labels(action)
         elif kind == "record":
@@ -226,13 +222,6 @@ class Page:
         else:
             raise InputError(f"{kind!r} is no action")
         return None
-
-    def _list(self) -> list[dict[str, Any]]:
-        """The trials, as the page shows them."""
-        if not self._fixed["records"]:
-            self.look()
-        trials = list(self._trials.items())
-        return [{"file": name, **trial} for name, trial in trials]
 
     def _switch(self, on: bool) -> None:
         """Begin or stop saving trials.
@@ -260,30 +249,14 @@ class Page:
                 path.unlink(missing_ok=True)
             del self._trials[path.name]
             self._version += 1
-        elif action["do"] == "accept":
-            self._relabel(path, self._accepted(path))
         else:
-            self._relabel(path, _labels(action))
+            trial = load(path)
+            accepts = action["do"] == "accept"
+            labels = _accepted(path.name, trial) if accepts else _labels(action)
+            trial = with_labels(trial, changed(str(path), trial.meta, labels))
+            save(path, trial)
+            self.saved(path, trial)
         self._undo = path.name, before
-
-    def _accepted(self, path: Path) -> dict[str, str]:
-        """The labels that accept a kept touch's decisions.
-
-        Raises:
-            InputError: it has none.
-        """
-        labels = review.accepted(load(path).meta)
-        if not labels:
-            raise InputError(f"{path.name}: no decision names a label to accept")
-        return labels
-
-    def _relabel(self, path: Path, labels: dict[str, str]) -> None:
-        """Give a trial labels beside those that it has for other tasks."""
-        trial = load(path)
-        meta = changed(str(path), trial.meta, Change(labels=labels))
-        trial = replace(trial, meta=meta)
-        save(path, trial)
-        self.saved(path, trial)
 
     def _take_back(self, folder: Path) -> None:
         """Bring back the file that the last action changed or deleted."""
@@ -298,17 +271,23 @@ class Page:
 
 def _decision(event: Decided) -> dict[str, Any]:
     """A decision for the page, with the nearest training trials."""
-    line = event.to_dict()
-    distances = (
-        [] if event.decision is None else event.decision.distances.round(3).tolist()
-    )
-    return {
-        **{
-            key: line[key]
-            for key in ("task", "label", "confidence", "flags", "window_s")
-        },
-        "neighbours": list(zip(event.nearest, distances, strict=True)),
-    }
+    neighbours: list[tuple[str, float]] = []
+    if event.decision is not None:
+        distances = event.decision.distances.round(3).tolist()
+        neighbours = list(zip(event.nearest, distances, strict=True))
+    return {**event.to_dict(), "neighbours": neighbours}
+
+
+def _accepted(name: str, trial: Recording) -> dict[str, str]:
+    """The labels that accept a kept touch's decisions.
+
+    Raises:
+        InputError: it has none.
+    """
+    labels = review.accepted(trial.meta)
+    if not labels:
+        raise InputError(f"{name}: no decision names a label to accept")
+    return labels
 
 
 def _labels(action: dict[str, Any]) -> dict[str, str]:

@@ -10,21 +10,22 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
 from edge.commands.output import LOG
-from edge.commands.source import Opened, Reading, reading
+from edge.commands.source import Opened, reading
 from edge.errors import InputError
 from edge.files import refusing
 from edge.output.event_writer import Lines
@@ -34,13 +35,15 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
 from edge.skin.skin import Skin
 from edge.tools import terminal
-from edge.tools.page import Page
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.still import WatchfulTracker
 from edge.touch.track import DEBOUNCE
 from edge.writing import NameTaken, check_writable
+
+if TYPE_CHECKING:
+    from edge.tools.page import Page
 
 LONGEST_STEM = 60
 """Most characters of a file's name that come from labels. A name has at most 255 bytes,
@@ -113,17 +116,17 @@ class Trials:
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
         contact = next(iter(self._tracker.push(frame)), None)
-        if self._frames is None:
+        if self._frames is not None:
+            self._frames.append(frame)
+        else:
             self._before.append(frame)
             if contact is None or contact is self._saved:
                 return None
             self._saved = contact
             self._frames = list(self._before)
-        else:
-            self._frames.append(frame)
         over = contact is None or contact.ended
-        onset_s = math.inf if self._saved is None else self._saved.onset_s
-        return self.rest() if over or frame.t - onset_s >= self._length else None
+        lasts_s = math.inf if self._saved is None else frame.t - self._saved.onset_s
+        return self.rest() if over or lasts_s >= self._length else None
 
     @property
     def under_way(self) -> bool:
@@ -142,32 +145,36 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
     # A skin's frames always say which taxels are valid.
     valid = np.array([frame.valid for frame in frames])
+    shear = [frame.shear for frame in frames if frame.shear is not None]
     return Recording(
         t=np.array([frame.t - frames[0].t for frame in frames]),
         frames=np.array([frame.counts for frame in frames]),
         joints=_angles(frames),
         valid=None if valid.all() else valid,
         meta=meta,
-        shear=_shear(frames),
+        shear=np.array(shear) if shear else None,
     )
-
-
-def _shear(frames: list[Frame]) -> NDArray[np.int16] | None:
-    """(n, rows, cols, 2) shear of a skin of three axes."""
-    shear = [frame.shear for frame in frames if frame.shear is not None]
-    return np.array(shear) if shear else None
 
 
 def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:
     """(n, dof) joint angles; None where no frame has any."""
-    dof = next((len(f.joints) for f in frames if f.joints is not None), None)
-    if dof is None:
+    known = [frame.joints for frame in frames if frame.joints is not None]
+    if not known:
         return None
-    angles = np.full((len(frames), dof), np.nan)
-    for row, frame in zip(angles, frames, strict=True):
-        if frame.joints is not None:
-            row[:] = frame.joints
-    return angles
+    unknown = np.full(len(known[0]), np.nan)
+    return np.array([unknown if f.joints is None else f.joints for f in frames])
+
+
+def shared_meta(opened: Opened, arm: Chain | None) -> dict[str, Any]:
+    """The metadata that all trials of a skin share."""
+    file = opened.skin.file
+    meta = {
+        "skin": file.layout.to_dict(),
+        "skin_name": file.name,
+        "source": opened.source,
+        "rate_hz": file.reading.rate_hz,
+    }
+    return meta if arm is None else {**meta, "arm": arm.to_dict()}
 
 
 def trial_path(out: Path, labels: dict[str, str]) -> Path:
@@ -176,14 +183,13 @@ def trial_path(out: Path, labels: dict[str, str]) -> Path:
     Raises:
         InputError: `out` names a file that exists, or that no folder can hold.
     """
-    # A listing of the folder omits names that begin with a dot.
+    # Searches of a folder omit names that begin with a dot.
     plain = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")
     stem = plain[:LONGEST_STEM] or "trial"
     with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
         if out.suffix != ".npz":
-            present = {path.name for path in out.glob(f"{stem}-*.npz")}
-            names = (f"{stem}-{number:03}.npz" for number in count(1))
-            return out / next(name for name in names if name not in present)
+            paths = (out / f"{stem}-{number:03}.npz" for number in count(1))
+            return next(path for path in paths if not os.path.lexists(path))
         with suppress(FileNotFoundError):
             out.lstat()
             raise InputError(f"{out}: exists already; choose another name or remove it")
@@ -212,21 +218,30 @@ def run(arguments: argparse.Namespace) -> int:
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
     ):
-        names = _joint_names(arguments, live.opened, arm)
-        meta = _metadata(live.opened, arm)
-        recorder = Recorder(arguments.out, labels, meta, names, lines, live.page)
+        recorder = Recorder(
+            arguments.out,
+            labels,
+            {**shared_meta(live.opened, arm), "wire_s": wire_s(live.skin.file)},
+            _joint_names(arguments, live.opened, arm),
+            lines,
+            live.page,
+            arguments.label if by_key else [],
+        )
         LOG.info("waiting for a contact" + (KEYS if by_key else ""))
-        choices = arguments.label if by_key else []
-        for digit, (task, label) in zip(DIGITS, choices, strict=False):
+        for digit, (task, label) in zip(DIGITS, recorder.choices, strict=False):
             LOG.info(f"  {digit}  {task}={label}")
-
-        def press() -> None:
-            keys = typed()
-            for key in keys if by_key else "":
-                recorder.press(key, choices)
-
+        trials = Trials(live.skin, arguments.length)
         most = arguments.trials if folder else 1
-        _record(live, recorder, Trials(live.skin, arguments.length), press, most)
+        for frame, faults in live.frames():
+            lines.write(faults)
+            for key in typed():
+                recorder.press(key)
+            live.show(frame, faults)
+            recorder.follow(trials)
+            recorder.save(trials.push(frame), complete=True)
+            if recorder.count == most:
+                break
+        recorder.save(trials.rest(), complete=False)
     return _status(arguments, recorder, live.skin)
 
 
@@ -242,33 +257,6 @@ def _dof(arguments: argparse.Namespace, arm: Chain | None) -> int | None:
             "--joints needs --arm, or --dof, the number of angles in each line"
         )
     return dof
-
-
-def _record(
-    live: Reading,
-    recorder: Recorder,
-    trials: Trials,
-    press: Callable[[], None],
-    most: int | None,
-) -> None:
-    """Save trials until there are enough, or the skin's reading ends.
-
-    Args:
-        live: the reading of the skin.
-        recorder: saves the trials.
-        trials: cuts the frames into trials.
-        press: takes in the keys that were pressed.
-        most: how many trials are enough; None for any number.
-    """
-    for frame, faults in live.frames():
-        recorder.lines.write(faults)
-        press()
-        live.show(frame, faults)
-        recorder.follow(trials)
-        recorder.save(trials.push(frame), complete=True)
-        if recorder.count == most:
-            return
-    recorder.save(trials.rest(), complete=False)
 
 
 def _labels(
@@ -329,19 +317,6 @@ def _joint_names(
     return None if arm is None else arm.names
 
 
-def _metadata(opened: Opened, arm: Chain | None) -> dict[str, Any]:
-    """The metadata that all trials share."""
-    file = opened.skin.file
-    meta = {
-        "skin": opened.skin.layout.to_dict(),
-        "skin_name": file.name,
-        "source": opened.source,
-        "rate_hz": file.reading.rate_hz,
-        "wire_s": wire_s(file),
-    }
-    return meta if arm is None else {**meta, "arm": arm.to_dict()}
-
-
 def wire_s(file: SkinFile) -> float:
     """Seconds that a frame takes on the skin's wires, from the drivers' own
     transactions."""
@@ -376,6 +351,7 @@ class Recorder:
         lines: where the `saved` and `deleted` events go.
         page: the live page, which then gives the labels and says whether to save; or
             None.
+        choices: the labels that keys choose, with their tasks.
         paths: the trials saved so far and not deleted.
         recording: whether the touch under way, or the next one, is to be saved.
         any_joints: whether a saved frame had joint angles.
@@ -387,14 +363,17 @@ class Recorder:
     names: Sequence[str] | None
     lines: Lines
     page: Page | None = None
+    choices: Sequence[tuple[str, str]] = ()
     paths: list[Path] = field(default_factory=list)
     recording: bool = True
     any_joints: bool = False
 
-    def press(self, key: str, choices: Sequence[tuple[str, str]]) -> None:
+    def press(self, key: str) -> None:
         """Take a key: a number chooses its label, d deletes the last trial."""
-        if key in DIGITS[: len(choices)]:
-            task, label = choices[DIGITS.index(key)]
+        if self.page is not None:
+            return
+        if key in DIGITS[: len(self.choices)]:
+            task, label = self.choices[DIGITS.index(key)]
             self.labels = {**self.labels, task: label}
             texts = [f"{task}={label}" for task, label in self.labels.items()]
             LOG.info(f"next: {', '.join(texts)}")
@@ -416,19 +395,17 @@ class Recorder:
             self.recording = self.page.recording
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
-        """Save the frames of a trial, if there is one and it is to be saved."""
+        """Save the frames of a trial, if there is one and it is to be saved, under the
+        next free name."""
         if frames is None:
             return
-        if self.recording:
-            self._save(frames, complete)
-        elif self.page is not None and self.page.recording:
-            LOG.warning(
-                "recording was switched on during the touch, whose onset is missing: "
-                "it is not saved"
-            )
-
-    def _save(self, frames: list[Frame], complete: bool) -> None:
-        """Save the frames of a trial under the next free name."""
+        if not self.recording:
+            if self.page is not None and self.page.recording:
+                LOG.warning(
+                    "recording was switched on during the touch, whose onset is "
+                    "missing: it is not saved"
+                )
+            return
         unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
         if self.names is not None and unposed < len(frames):

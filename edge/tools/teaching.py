@@ -86,7 +86,7 @@ def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str
 
 def unknown_labels(
     info: ModelInfo, labels: Sequence[Mapping[str, str]]
-) -> dict[str, Counter[str]]:
+) -> dict[str, dict[str, int]]:
     """{task: {label that the model does not know: its number of trials}}, sorted.
 
     Args:
@@ -95,11 +95,12 @@ def unknown_labels(
     """
     unknown = {}
     for task, entry in info.tasks.items():
-        counts: Counter[str] = Counter()
-        for trial in labels:
-            if task in trial and trial[task] not in entry.labels:
-                counts[trial[task]] += 1
-        unknown[task] = Counter(dict(sorted(counts.items())))
+        counts = Counter(trial[task] for trial in labels if task in trial)
+        unknown[task] = {
+            label: count
+            for label, count in sorted(counts.items())
+            if label not in entry.labels
+        }
     return unknown
 
 
@@ -132,9 +133,8 @@ def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> Mo
             if counts and task in (product, *factors):
                 raise InputError(
                     f"{task} {next(iter(counts))!r} is new, but each {product} is a "
-                    "pair of known "
-                    f"labels of {' and '.join(factors)}; correct it, or export a model "
-                    "with it"
+                    f"pair of known labels of {' and '.join(factors)}; correct it, or "
+                    "export a model with it"
                 )
         entry = tasks[task]
         k = min([entry.k, *counts.values()])
@@ -180,14 +180,13 @@ def taught(
         graph = Graph(model.contents)
         for task, entry in info.tasks.items():
             indices = label_indices(entry.labels, task, labels)
-            z = coordinates(graph, task, vectors)
-            inside = within_reach(graph, task, z)
-            for name, trial_inside, index in zip(names, inside, indices, strict=True):
-                if index >= 0 and not trial_inside:
-                    raise _far_outside(name)
-            further = _rows(graph, task, z, indices)
-            further |= _votes(model, graph, entry, task, further)
-            changed |= further
+            z = _values(graph, coordinates_of(graph, task), vectors)
+            outside = (indices >= 0) & ~within_reach(graph, task, z)
+            if outside.any():
+                raise _far_outside(names[int(outside.argmax())])
+            rows = _rows(graph, task, z, indices)
+            changed |= rows
+            changed |= _votes(model, graph, entry, task, rows)
         if NOVELTY_COLUMNS in graph.constants:
             changed |= _novelty_rows(graph, vectors)
     digest = hashlib.sha256(info.data_digest.encode() + vectors.tobytes()).hexdigest()
@@ -208,7 +207,7 @@ def _check_reach(model: Model, name: str, trial: NDArray[np.float64]) -> None:
     for point, vector in enumerate(trial):
         with about(name):
             decisions = model.decide(vector, point)
-        if next(iter(decisions.values())).out_of_range:
+        if any(decision.out_of_range for decision in decisions.values()):
             raise _far_outside(name)
 
 
@@ -226,15 +225,11 @@ def within_reach(graph: Graph, task: str, z: NDArray[np.float64]) -> NDArray[np.
     of training may be: half of what the coordinates of a query are clipped at, see
     `train.projection.coordinate_bits`.
     """
-    clip = graph.makers[coordinates_of(graph, task)]
-    clipped_at = clip.inputs[2]
-    longest = []
-    for point in range(len(z)):
-        inputs = {"decision_point": np.array([point])}
-        longest.append(0.5 * graph.run([clipped_at], inputs)[0])
+    clipped_at = graph.makers[coordinates_of(graph, task)].inputs[2]
+    limits = [_value(graph, clipped_at, point) for point in range(len(z))]
+    longest = 0.5 * np.reshape(limits, (len(z), 1))
     lengths = (z**2).sum(axis=2)
-    most = np.square(np.reshape(longest, (len(z), 1)))
-    return np.asarray((lengths <= most).all(axis=0))
+    return np.asarray((lengths <= longest**2).all(axis=0))
 
 
 def _check_labels(info: ModelInfo, name: str, labels: Mapping[str, str]) -> None:
@@ -289,22 +284,19 @@ def _sources(graph: Graph, node: Node) -> set[str]:
     return sources
 
 
-def coordinates(
-    graph: Graph, task: str, vectors: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(points, m, components) whole coordinates of vectors (points, m, width)."""
-    return _values(graph, coordinates_of(graph, task), vectors)
-
-
 def _values(
     graph: Graph, name: str, vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(points, m, ...) a value of the graph for vectors (points, m, width)."""
-    points = []
-    for point, x in enumerate(vectors):
-        inputs = {"features": x, "decision_point": np.array([point])}
-        points.append(graph.run([name], inputs)[0])
-    return np.stack(points)
+    points = enumerate(vectors)
+    return np.stack([_value(graph, name, point, features=x) for point, x in points])
+
+
+def _value(
+    graph: Graph, name: str, point: int, **inputs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A value of the graph at a decision point."""
+    return graph.run([name], {"decision_point": np.array([point]), **inputs})[0]
 
 
 def _rows(

@@ -114,17 +114,14 @@ def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
 
     monkeypatch.setattr(label, "save", save_two)
     with pytest.raises(KeyboardInterrupt):
-        label.change_all(
-            [
-                (path, {**load(path).meta, "labels": {"object": "brick"}})
-                for path in sorted(tmp_path.glob("*.npz"))
-            ]
-        )
+        label.change_all({path: {"object": "brick"} for path in find([str(tmp_path)])})
     monkeypatch.setattr(label, "save", save)
     status, lines, err = edge("label", tmp_path)
     assert status == 0
     assert [line["labels"] for line in lines] == [{"object": "brick"}] * 4
     assert "finished a change of labels that was interrupted: 2 recordings" in err
+    edge("label", tmp_path, "--undo")
+    assert load(tmp_path / "0.npz").labels["object"] == "hard 0"
     assert list(tmp_path.glob(".*")) == []
 
 

@@ -93,14 +93,7 @@ def test_decisions_stay_until_the_next_onset(page, pictures):
     page.push(third, [Onset(0.4)])
 
     assert [len(picture["decisions"]) for picture in pictures] == [1, 1, 0]
-    assert pictures[0]["decisions"][0] == {
-        "task": "mobility",
-        "label": "fixed",
-        "confidence": 0.8,
-        "flags": ["tie"],
-        "window_s": 1.2,
-        "neighbours": [],
-    }
+    assert pictures[0]["decisions"] == [{**decided.to_dict(), "neighbours": []}]
 
 
 def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(
