@@ -4,10 +4,11 @@ import os
 import platform
 import statistics
 import tempfile
-import time
-from collections.abc import Mapping
+import timeit
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +20,12 @@ from edge.touch.track import DEBOUNCE
 from edge.writing import write_whole
 from export import golden
 from export.graph import to_onnx
-from train.choose import TRIAL, Chosen
+from train.choose import TRIAL
 from train.dataset import DataSet
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import ContactClassifier
 from train.report.summary import names
-from train.stopping import SequentialClassifier
 
 CALLS = 60
 """Decisions of which each candidate's time is the median."""
@@ -46,16 +46,7 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     Raises:
         InputError: the files cannot be written.
     """
-    info = describe(
-        fitted.dataset,
-        fitted.classifier,
-        fitted.chosen,
-        fitted.window_s,
-        fitted.samples,
-        fitted.sequential,
-        name,
-    )
-    data = to_onnx(fitted.sequential or fitted.classifier, info)
+    data = to_onnx(fitted.sequential or fitted.classifier, describe(fitted, name))
     target = Path(path)
     with write_whole(target) as file:
         file.write(data)
@@ -65,37 +56,22 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     return len(data)
 
 
-def describe(
-    dataset: DataSet,
-    classifier: ContactClassifier,
-    chosen: Mapping[str, Chosen],
-    window_s: float,
-    samples: int,
-    sequential: SequentialClassifier | None = None,
-    name: str | None = None,
-) -> ModelInfo:
+def describe(fitted: Fitted, name: str | None = None) -> ModelInfo:
     """The metadata that makes the model file describe itself.
 
     Args:
-        dataset: measured for the features of the model.
-        classifier: fitted on it.
-        chosen: of each task, for its accuracy; 0 for a task that has no entry.
-        window_s: of the full decision.
-        samples: values of a feature.
-        sequential: of which `classifier` is the last.
+        fitted: a task that has no entry in its `chosen` has the accuracy 0.
         name: of the model; that of the recordings' folder where None.
     """
+    dataset = fitted.dataset
     folder, trials = names(dataset)
-
+    packages = ("numpy", "scikit-learn", "skl2onnx", "onnx")
     return ModelInfo(
-        tasks={
-            task: _task(dataset, classifier, task, chosen.get(task))
-            for task in classifier.choices
-        },
+        tasks={task: _task(fitted, task) for task in fitted.classifier.choices},
         layout=dataset.layout,
         debounce=DEBOUNCE,
-        window_s=window_s,
-        samples=samples,
+        window_s=fitted.window_s,
+        samples=fitted.samples,
         features=dataset.names,
         units=dataset.units,
         motion_frame="skin" if dataset.chain is None else "world",
@@ -107,31 +83,37 @@ def describe(
         versions={
             "edge-classify": __version__,
             "python": platform.python_version(),
-            **{
-                name: version(name)
-                for name in ("numpy", "scikit-learn", "skl2onnx", "onnx")
-            },
+            **{package: version(package) for package in packages},
         },
-        decision_points_s=()
-        if sequential is None
-        else tuple(sequential.decision_points_s),
-        stopping={} if sequential is None else sequential.stopping_,
-        novelty=None if sequential is None else sequential.novelty_,
-        several=several_share(dataset, window_s),
-        usual={} if sequential is None else usual_ranges(dataset, window_s, samples),
+        several=several_share(dataset, fitted.window_s),
         name=folder if name is None else name,
         trials=trials if sum(map(len, trials)) <= MOST_NAMES else (),
+        **_calibration(fitted),
     )
 
 
-def _task(
-    dataset: DataSet, classifier: ContactClassifier, task: str, chosen: Chosen | None
-) -> Task:
+def _calibration(fitted: Fitted) -> dict[str, Any]:
+    """What the metadata say of decision points, where the model has them."""
+    sequential = fitted.sequential
+    if sequential is None:
+        return {}
+    return {
+        "decision_points_s": tuple(sequential.decision_points_s),
+        "stopping": sequential.stopping_,
+        "novelty": sequential.novelty_,
+        "usual": usual_ranges(fitted.dataset, fitted.window_s, fitted.samples),
+    }
+
+
+def _task(fitted: Fitted, task: str) -> Task:
     """What the metadata say of a task, whose settings need not have been chosen."""
+    classifier = fitted.classifier
     choice = classifier.choices[task]
-    labels = {*classifier.classes_[task], *dataset.untouched_labels(task)}
+    chosen = fitted.chosen.get(task)
+    classes = classifier.classes_[task]
+    labels = {*classes, *fitted.dataset.untouched_labels(task)}
     return Task(
-        labels=tuple(map(str, classifier.classes_[task])),
+        labels=tuple(map(str, classes)),
         k=choice.k,
         components=classifier.components_[task],
         scaling=choice.scaling,
@@ -171,28 +153,26 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
-    dataset = fitted.measured.of(
-        [name for c in choices.values() for name in c.features]
-    )
-    tasks = {
-        *choices,
-        *(target for choice in choices.values() for target in choice.targets),
-    }
+    tasks = set(choices)
+    features: list[str] = []
+    for choice in choices.values():
+        tasks.update(choice.targets)
+        features += choice.features
+    dataset = fitted.measured.of(features)
     y = {task: dataset.labels(task) for task in tasks}
     X = dataset.features(fitted.window_s, fitted.samples)
     widths = dataset.widths(fitted.samples)
     classifier = ContactClassifier(choices, dataset.names, widths).fit(X, y)
-    data = to_onnx(
-        classifier, describe(dataset, classifier, {}, fitted.window_s, fitted.samples)
+    of_candidate = replace(
+        fitted, dataset=dataset, classifier=classifier, chosen={}, sequential=None
     )
+    data = to_onnx(classifier, describe(of_candidate))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"
         path.write_bytes(data)
         model = Model(path)
     series = fitted.measured.trials[0].series
-    seconds = []
-    for _ in range(CALLS):
-        began = time.perf_counter()
-        model.decide(model.info.vector(series))
-        seconds.append(time.perf_counter() - began)
-    return 1e6 * statistics.median(seconds), len(data) / 1024
+    times = timeit.repeat(
+        lambda: model.decide(model.info.vector(series)), number=1, repeat=CALLS
+    )
+    return 1e6 * statistics.median(times), len(data) / 1024

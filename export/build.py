@@ -25,16 +25,16 @@ class Builder:
         self._scope = scope
         self._container = container
         self.decision_point = decision_point
-        self._constants: dict[tuple[str, str, tuple[int, ...], bytes], str] = {}
+        self._constants: dict[tuple[Any, ...], str] = {}
         self._made: dict[tuple[Any, ...], str] = {}
 
-    def constant(self, value: Any, dtype: Any = np.float64, name: str = "") -> str:
-        """Name of a constant; equal ones are stored once, but for those that are given
-        a name.
+    def constant(self, value: Any, name: str = "") -> str:
+        """Name of a constant of the value's type; equal ones are stored once, but for
+        those that are given a name.
 
         `edge.tools.teaching` changes these.
         """
-        array = np.asarray(value, dtype=dtype)
+        array = np.asarray(value)
         key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self._constants:
             stored_name = name or self._scope.get_unique_variable_name("constant")
@@ -51,20 +51,13 @@ class Builder:
             self._constants[key] = stored_name
         return self._constants[key]
 
-    def ints(self, *values: int) -> str:
-        """Name of a constant (n,) of axes, places or counts."""
-        return self.constant(values, np.int64)
-
-    def by_decision_point(
-        self, values: Sequence[Any], dtype: Any = np.float64, name: str = ""
-    ) -> str:
+    def by_decision_point(self, values: Sequence[Any], name: str = "") -> str:
         """Name of the value, at the decision point that is asked for, of a constant."""
-        if len(values) == 1 or (
-            not name and all(np.array_equal(value, values[0]) for value in values)
-        ):
-            return self.constant(values[0], dtype, name)
-        stack = self.constant(np.stack(values), dtype, name)
-        return self.node("Gather", [stack, self.decision_point], axis=0)
+        same = all(np.array_equal(value, values[0]) for value in values)
+        if len(values) == 1 or (same and not name):
+            return self.constant(values[0], name)
+        stack = self.constant(np.stack(values), name)
+        return self.node("Gather", stack, self.decision_point, axis=0)
 
     def by_decision_point_small(self, values: Sequence[Any], name: str = "") -> str:
         """As `by_decision_point`, stored in float32 where that holds all values
@@ -76,51 +69,68 @@ class Builder:
         with np.errstate(over="ignore"):
             small = [np.asarray(value).astype(np.float32) for value in values]
         if not all(map(np.array_equal, small, values)):
-            return self.by_decision_point(values, name=name)
-        stored = self.by_decision_point(small, np.float32, name)
-        return self.node("Cast", [stored], to=TensorProto.DOUBLE)
+            return self.by_decision_point(values, name)
+        return self.stored(values, np.float32, name)
 
     def stored(self, values: Sequence[Any], dtype: Any, name: str = "") -> str:
-        """As `by_decision_point`, of whole numbers that are stored in a smaller
-        type."""
-        small = [np.asarray(value).astype(dtype) for value in values]
-        stored = self.by_decision_point(small, dtype, name)
-        return self.node("Cast", [stored], to=TensorProto.DOUBLE)
+        """As `by_decision_point`, of values that a smaller type holds."""
+        with np.errstate(over="ignore"):
+            small = [np.asarray(value).astype(dtype) for value in values]
+        stored = self.by_decision_point(small, name)
+        return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
-    def shifted(self, operator: str, inputs: list[str], shifts: Sequence[int]) -> str:
+    def shifted(self, operator: str, x: str, y: str, shifts: Sequence[int]) -> str:
         """Name of an operator's whole result, divided by 2^shift and rounded."""
         parts = self.by_decision_point([2.0**-shift for shift in shifts])
-        product = self.node(operator, inputs)
-        return self.node("Round", [self.node("Mul", [product, parts])])
+        product = self.node(operator, x, y)
+        return self.node("Round", self.node("Mul", product, parts))
+
+    def squared_length(self, x: str) -> str:
+        """Name of the squared lengths (n, 1) of vectors x (n, p)."""
+        return self.node("ReduceSumSquare", x, [1], keepdims=1)
 
     def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
         """Name of some columns of x (n, width); of x itself where they are all."""
-        if len(columns) == width:
-            return x
-        return self.node("Gather", [x, self.constant(columns, np.int64)], axis=1)
+        return x if len(columns) == width else self.node("Gather", x, columns, axis=1)
 
     def node(
-        self, operator: str, inputs: list[str], output: str = "", **attributes: Any
+        self, operator: str, *inputs: Any, output: str = "", **attributes: Any
     ) -> str:
         """Add an operator of one output and return its name; an equal one is not added
-        again."""
-        key = (operator, *inputs, *sorted(attributes.items()))
+        again.
+
+        Args:
+            operator: ONNX's.
+            inputs: names of values, and numbers or arrays, which become constants.
+            output: its name; one of its own where it is empty.
+            attributes: of the operator.
+        """
+        names = self._names(inputs)
+        key = (operator, *names, *sorted(attributes.items()))
         if output or key not in self._made:
-            self._made[key] = self.nodes(operator, inputs, [output], **attributes)[0]
+            self._made[key] = self.nodes(operator, names, [output], **attributes)[0]
         return self._made[key]
 
     def nodes(
-        self, operator: str, inputs: list[str], outputs: list[str], **attributes: Any
+        self,
+        operator: str,
+        inputs: Sequence[Any],
+        outputs: Sequence[str],
+        **attributes: Any,
     ) -> list[str]:
-        """Add an operator; an output named "" gets a name of its own."""
+        """Add an operator, as `node`; returns the names of its outputs."""
+        taken = self._names(inputs)
         names = [
             o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs
         ]
         label = self._scope.get_unique_operator_name(operator)
         self._container.add_node(
-            operator, inputs, names, op_version=OPSET, name=label, **attributes
+            operator, taken, names, op_version=OPSET, name=label, **attributes
         )
         return names
+
+    def _names(self, inputs: Sequence[Any]) -> list[str]:
+        return [i if isinstance(i, str) else self.constant(i) for i in inputs]
 
     def clipped(self, x: str, limits: Sequence[float]) -> tuple[str, str]:
         """Whole numbers (n, m) cut off at plus and minus a limit for each decision
@@ -133,9 +143,9 @@ class Builder:
         low, high = (
             self.by_decision_point([sign * x for x in limits]) for sign in (-1.0, 1.0)
         )
-        inside = self.node("Clip", [x, low, high])
-        excess = self.node("Sub", [x, inside])
-        return inside, self.node("ReduceL1", [excess, self.ints(1)], keepdims=1)
+        inside = self.node("Clip", x, low, high)
+        excess = self.node("Sub", x, inside)
+        return inside, self.node("ReduceL1", excess, [1], keepdims=1)
 
 
 def project(
@@ -151,28 +161,21 @@ def project(
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
-        to get
-        them (n, 1): 0 within the training set's reach, not finite where a feature is
-            not.
+        to get them (n, 1): 0 within the training set's reach, not finite where a
+        feature is not.
     """
     grids = [p.grid_ for p in decision_points]
-    d = build.node(
-        "Sub", [x, build.by_decision_point([p.mean_ for p in decision_points])]
-    )
+    means = build.by_decision_point([p.mean_ for p in decision_points])
+    centred = build.node("Sub", x, means)
     gains = [p.gain_ / p.grid_.step for p in decision_points]
-    steps = build.node(
-        "Round", [build.node("Mul", [d, build.by_decision_point(gains)])]
-    )
-    steps, far = build.clipped(steps, [MOST_STEPS] * len(grids))
+    scaled = build.node("Mul", centred, build.by_decision_point(gains))
+    steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS] * len(grids))
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
-    product = build.node(
-        "MatMul", [steps, build.by_decision_point_small(widened(weights))]
-    )
-    z, farther = build.clipped(
-        build.node("Round", [product]), [grid.limit for grid in grids]
-    )
-    return z, build.node("Add", [far, farther])
+    columns = build.by_decision_point_small(widened(weights))
+    rounded = build.node("Round", build.node("MatMul", steps, columns))
+    z, farther = build.clipped(rounded, [grid.limit for grid in grids])
+    return z, build.node("Add", far, farther)
 
 
 def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:

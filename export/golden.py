@@ -1,7 +1,7 @@
 """golden.npz: see `edge.model.verify` for the format."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from edge.recording import Recording
 from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet
+from train.parts import part
 
 TRIALS = 24
 """Trials whose frames a golden file holds."""
@@ -38,19 +39,11 @@ def trials_of(dataset: DataSet, count: int) -> list[int]:
 
 def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     """A quarter second before onset to two frames past the window."""
-    first, last = np.searchsorted(
-        recording.t, (onset_s - 0.25, onset_s + model.info.window_s)
-    )
-    window = slice(first, last + 2)
+    times = (onset_s - 0.25, onset_s + model.info.window_s)
+    first, last = np.searchsorted(recording.t, times)
     valid = np.array(True) if recording.valid is None else recording.valid
-    return replace(
-        recording,
-        t=recording.t[window],
-        frames=recording.frames[window],
-        joints=None if recording.joints is None else recording.joints[window],
-        shear=None if recording.shear is None else recording.shear[window],
-        valid=np.broadcast_to(valid, recording.frames.shape)[window],
-    )
+    whole = replace(recording, valid=np.broadcast_to(valid, recording.frames.shape))
+    return part(whole, slice(first, last + 2))
 
 
 def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
@@ -59,64 +52,44 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     Vectors are the trials' own, training vectors (distance exactly 0), others between
     and beyond them, and two that are not finite (label -1).
     """
-    contacts = _contacts(model, dataset)
-    recordings = [contact.recording for contact in contacts]
-    series = [contact.series for contact in contacts]
-    arrays = {
-        **_frames(model, recordings),
-        "onset_s": np.array([contact.onset_s for contact in contacts]),
-        "series_start": _starts([len(course.t) for course in series]),
-        "series_t": np.concatenate([course.t for course in series]),
-        "series_counts": np.concatenate([course.integers for course in series]),
-        "vectors": _vectors(model, series, X),
-    }
-    if model.info.decision_points_s:
-        arrays["decision_point_vectors"] = _early_vectors(model, series)
-    meta = {
-        "skin": recordings[0].meta.get("skin", {}),
-        "bounds": BOUNDS,
-        "model": model.info.data_digest,
-    }
-    save_arrays(path, arrays | answers(model, arrays), meta, compress=True)
-
-
-@dataclass(frozen=True)
-class _Contact:
-    """The first contact of a trial that a golden file holds."""
-
-    recording: Recording
-    onset_s: float
-    series: FeatureSeries
-
-
-def _contacts(model: Model, dataset: DataSet) -> list[_Contact]:
-    contacts = []
+    info = model.info
+    recordings = []
+    onsets_s = []
+    series = []
     for i in trials_of(dataset, TRIALS):
         trial = dataset.trials[i]
         recording = trimmed(trial.recording, trial.onset_s, model)
         first = first_series(recording, model)
         if first is not None:
-            contacts.append(_Contact(recording, *first))
-    return contacts
-
-
-def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
-    """Where parts of some lengths start and end that are laid end to end."""
-    return np.cumsum([0, *lengths])
-
-
-def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, NDArray[Any]]:
-    """The frames of recordings, end to end, with the angles and the shear that the
-    model needs."""
+            recordings.append(recording)
+            onsets_s.append(first[0])
+            series.append(first[1])
+    arrays = {"start": _starts(recording.t for recording in recordings)}
     keys = ["t", "frames", "valid"]
-    if model.info.dof is not None:
+    if info.dof is not None:
         keys.append("joints")
-    if model.info.layout.axes:
+    if info.layout.axes:
         keys.append("shear")
-    arrays = {"start": _starts([len(recording.t) for recording in recordings])}
     for key in keys:
         arrays[key] = np.concatenate([vars(recording)[key] for recording in recordings])
-    return arrays
+    arrays["onset_s"] = np.array(onsets_s)
+    arrays["series_start"] = _starts(course.t for course in series)
+    arrays["series_t"] = np.concatenate([course.t for course in series])
+    arrays["series_counts"] = np.concatenate([course.integers for course in series])
+    arrays["vectors"] = _vectors(model, series, X)
+    if info.decision_points_s:
+        arrays["decision_point_vectors"] = _early_vectors(model, series)
+    meta = {
+        "skin": recordings[0].meta.get("skin", {}),
+        "bounds": BOUNDS,
+        "model": info.data_digest,
+    }
+    save_arrays(path, arrays | answers(model, arrays), meta, compress=True)
+
+
+def _starts(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
+    """Where parts start and end that are laid end to end."""
+    return np.cumsum([0, *map(len, parts)])
 
 
 def _vectors(
@@ -142,10 +115,7 @@ def _early_vectors(
     between them."""
     info = model.info
     early = np.array(
-        [
-            [info.vector(course, window_s) for course in series]
-            for window_s in info.decision_points_s
-        ]
+        [[info.vector(c, s) for c in series] for s in info.decision_points_s]
     )
     between = 0.5 * (early + np.roll(early, 1, axis=1))
     return np.concatenate([early, between], axis=1)

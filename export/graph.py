@@ -10,7 +10,6 @@ finite with label -1.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from train.stopping import SequentialClassifier
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
+Fitted = ContactClassifier | SequentialClassifier
 
 
 def _squares(
@@ -49,102 +49,75 @@ def _squares(
     - 2 b.z cancels nothing. Of more coordinates than `components` the others count as
     0: the tasks of a space share its rows.
     """
-    if components < rows[0].shape[1]:
-        mask = (np.arange(rows[0].shape[1]) < components).astype(np.float64)
-        z = build.node("Mul", [z, build.constant(mask)])
+    width = rows[0].shape[1]
+    if components < width:
+        z = build.node("Mul", z, (np.arange(width) < components).astype(np.float64))
     columns = build.by_decision_point_small(
         [-2.0 * r.T for r in rows], f"columns of {task}"
     )
     lengths = build.by_decision_point(
         [np.where(absent, np.inf, (r[:, :components] ** 2).sum(axis=1)) for r in rows],
-        name=f"lengths of {task}",
+        f"lengths of {task}",
     )
-    length = build.node("ReduceSumSquare", [z, build.ints(1)], keepdims=1)
-    return build.node("Gemm", [z, columns, lengths]), length
+    length = build.squared_length(z)
+    return build.node("Gemm", z, columns, lengths), length
 
 
-@dataclass(frozen=True)
-class _Voters:
-    """The training trials of a task, which vote.
-
-    Attributes:
-        labels: (n,) of the trials; -1 where one has none.
-        classes: how many labels there are.
-        k: how many neighbours vote.
-    """
-
-    labels: NDArray[np.int64]
-    classes: int
-    k: int
-
-
-def _decide(
+def _vote(
     build: Builder,
     task: str,
-    voting: _Voters,
-    nearest: tuple[str, str, str],
-    units: Sequence[float],
+    labels: NDArray[np.int64],
+    classes: int,
+    neighbours: str,
+    k: int,
     off: str,
 ) -> None:
-    """Nodes from a task's neighbours to its outputs.
+    """Nodes from a task's neighbours to its label and its scores.
 
     Args:
         build: takes the nodes.
         task: its name.
-        voting: its training trials.
-        nearest: names of the neighbours' squared distances (n, k) less a length, of
-            their rows (n, k), and of that length (n, 1).
-        units: of the distances, for each decision point.
+        labels: (rows,) of the training trials; -1 where one has none.
+        classes: how many labels there are.
+        neighbours: name of the rows (n, k) of the neighbours.
+        k: how many they are.
         off: name of the excess over the limits (n, 1).
     """
-    squares, rows, length = nearest
-    classes = voting.classes
-    k = voting.k
-    roots = build.node("Sqrt", [build.node("Add", [squares, length])])
-    build.node("Mul", [roots, build.by_decision_point(units)], f"{task}_distances")
-    trial_labels = build.constant(voting.labels, np.int64, f"labels of {task}")
-    voters = build.node("Gather", [trial_labels, rows])
+    trial_labels = build.constant(labels, f"labels of {task}")
+    voters = build.node("Gather", trial_labels, neighbours)
     # A vector that is not finite has no votes: class -1, whose row of the votes (the
     # last) is 0.
-    finite = build.node("LessOrEqual", [off, build.constant(LARGEST)])
-    voters = build.node("Where", [finite, voters, build.constant(-1, np.int64)])
-    ballots = build.constant(np.eye(classes + 1, classes), name=f"ballots of {task}")
+    finite = build.node("LessOrEqual", off, LARGEST)
+    voters = build.node("Where", finite, voters, -1)
+    ballots = build.constant(np.eye(classes + 1, classes), f"ballots of {task}")
+    label = f"{task}_label"
+    scores = f"{task}_scores"
     if k <= 2:
         # Two neighbours agree or tie: either way the nearest decides.
-        first = [voters, build.constant(0, np.int64)]
-        label = build.node("Gather", first, f"{task}_label", axis=1)
+        build.node("Gather", voters, 0, output=label, axis=1)
     if k == 1:
-        build.node("Gather", [ballots, label], f"{task}_scores")
+        build.node("Gather", ballots, label, output=scores)
         return
-    cast = build.node("Gather", [ballots, voters])
-    votes = build.node(
-        "ReduceMean", [cast, build.ints(1)], f"{task}_scores", keepdims=0
-    )
-    if k == 2:
-        return
-    # The first neighbour whose class has the most votes is the nearest of the tied.
-    votes_of_voters = build.node("GatherElements", [votes, voters], axis=1)
-    winner = build.node("ArgMax", [votes_of_voters], axis=1, keepdims=1)
-    build.node("GatherND", [voters, winner], f"{task}_label", batch_dims=1)
-
-
-def _decision_points(
-    model: ContactClassifier | SequentialClassifier,
-) -> list[ContactClassifier]:
-    return (
-        model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
-    )
+    cast = build.node("Gather", ballots, voters)
+    build.node("ReduceMean", cast, [1], output=scores, keepdims=0)
+    if k > 2:
+        # The first neighbour whose class has the most votes is the nearest of the tied.
+        votes_of_voters = build.node("GatherElements", scores, voters, axis=1)
+        winner = build.node("ArgMax", votes_of_voters, axis=1, keepdims=1)
+        build.node("GatherND", voters, winner, output=label, batch_dims=1)
 
 
 def _convert(scope: Any, operator: Any, container: Any) -> None:
-    model: ContactClassifier | SequentialClassifier = operator.raw_operator
-    points = _decision_points(model)
+    model: Fitted = operator.raw_operator
+    points = (
+        model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
+    )
     last = points[-1]
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
     if isinstance(model, SequentialClassifier):
-        build.decision_point = build.node("Squeeze", [operator.inputs[1].full_name])
+        build.decision_point = build.node("Squeeze", operator.inputs[1].full_name)
     projected = {
         space: project(
             build,
@@ -153,8 +126,7 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         )
         for space in last.projections_
     }
-    off = [off for _, off in projected.values()]
-    _out_of_range(build, off, names["out_of_range"])
+    _out_of_range(build, [off for _, off in projected.values()], names["out_of_range"])
     if isinstance(model, SequentialClassifier):
         _novelty(build, x, model.space_, names["novelty"])
     for task in model.choices:
@@ -179,10 +151,8 @@ def _task(
     """
     last = points[-1]
     space = last.spaces_[task]
-    k = last.choices[task].k
-    classes = len(last.classes_[task])
-    units = [point.projections_[space].grid_.unit for point in points]
     members = last.members_[space]
+    units = [point.projections_[space].grid_.unit for point in points]
     rows = []
     for point, unit in zip(points, units, strict=True):
         of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
@@ -190,27 +160,31 @@ def _task(
         rows.append(of_all)
     labels = np.full(last.n_trials_, -1)
     labels[members] = last.labels_[task]
+    classes = len(last.classes_[task])
+    k = last.choices[task].k
     output = names[f"{task}_label"].removesuffix("_label")
     # Trials span fewer components at some decision points: there, the rest are always
     # 0.
     components = max(point.components_[task] for point in points)
     z, off = projected
     squares, length = _squares(build, output, z, widened(rows), components, labels < 0)
-    voters = build.constant([k], np.int64, f"k of {output}")
+    voters = build.constant([k], f"k of {output}")
     outputs = ["", names[f"{task}_neighbours"]]
-    values, places = build.nodes(
+    nearest, neighbours = build.nodes(
         "TopK", [squares, voters], outputs, largest=0, sorted=1
     )
-    nearest = values, places, length
-    _decide(build, output, _Voters(labels, classes, k), nearest, units, off)
+    roots = build.node("Sqrt", build.node("Add", nearest, length))
+    scales = build.by_decision_point(units)
+    build.node("Mul", roots, scales, output=f"{output}_distances")
+    _vote(build, output, labels, classes, neighbours, k, off)
     if f"{task}_label_distances" in names:
-        all_squares = build.node("Add", [squares, length])
+        all_squares = build.node("Add", squares, length)
         slopes = [point.slopes_[task] for point in points]
         scales = build.by_decision_point(
             [u * s for u, s in zip(units, slopes, strict=True)]
         )
         roots = _label_distances(build, output, all_squares, labels, classes)
-        build.node("Mul", [roots, scales], names[f"{task}_label_distances"])
+        build.node("Mul", roots, scales, output=names[f"{task}_label_distances"])
 
 
 def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
@@ -219,10 +193,10 @@ def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
     The excess (n, 1) itself is a sum of fractions, whose last bits depend on the order
     of summation. Whether it is above 0 does not.
     """
-    most = excesses[0] if len(excesses) == 1 else build.node("Max", list(excesses))
-    within = build.node("LessOrEqual", [most, build.constant(0.0)])
-    answers = [within, build.constant(0.0), build.constant(1.0)]
-    build.node("Squeeze", [build.node("Where", answers), build.ints(1)], output)
+    most = excesses[0] if len(excesses) == 1 else build.node("Max", *excesses)
+    within = build.node("LessOrEqual", most, 0.0)
+    beyond = build.node("Where", within, 0.0, 1.0)
+    build.node("Squeeze", beyond, [1], output=output)
 
 
 def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
@@ -230,32 +204,30 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     `train.novelty`."""
     points = space.points
     means = build.by_decision_point_small([p.mean for p in points])
-    centred = build.node("Sub", [x, means])
+    centred = build.node("Sub", x, means)
     gains = build.by_decision_point_small([p.gain for p in points])
-    rounded = build.node("Round", [build.node("Mul", [centred, gains])])
+    rounded = build.node("Round", build.node("Mul", centred, gains))
     steps, _ = build.clipped(rounded, [CLIP * 2.0**STEP_BITS] * len(points))
     weights = build.stored([space.weights], np.int16)
-    z = build.shifted("MatMul", [steps, weights], [space.shift] * len(points))
-    squares = build.node("ReduceSumSquare", [steps, build.ints(1)], keepdims=1)
-    inside = build.node("ReduceSumSquare", [z, build.ints(1)], keepdims=1)
-    outside = build.node("Sub", [squares, inside])
-    outside = build.node("Max", [outside, build.constant(1.0)])
+    z = build.shifted("MatMul", steps, weights, [space.shift] * len(points))
+    squares = build.squared_length(steps)
+    outside = build.node("Sub", squares, build.squared_length(z))
+    outside = build.node("Max", outside, 1.0)
     whitening = build.by_decision_point_small([p.whitening for p in points])
-    y = build.shifted("MatMul", [z, whitening], [p.shift for p in points])
+    y = build.shifted("MatMul", z, whitening, [p.shift for p in points])
     y, _ = build.clipped(y, [FARTHEST] * len(points))
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
     columns = build.stored([-2.0 * p.rows.T for p in points], np.int16, NOVELTY_COLUMNS)
     lengths = build.by_decision_point(
-        [(p.rows**2).sum(axis=1) for p in points], name=NOVELTY_LENGTHS
+        [(p.rows**2).sum(axis=1) for p in points], NOVELTY_LENGTHS
     )
-    length = build.node("ReduceSumSquare", [y, build.ints(1)], keepdims=1)
-    distances = build.node("Gemm", [y, columns, lengths])
-    nearest, _ = build.nodes("TopK", [distances, build.ints(1)], ["", ""], largest=0)
-    root = build.node("Sqrt", [build.node("Add", [nearest, length])])
-    product = build.node("Mul", [build.node("Sqrt", [outside]), root])
+    length = build.squared_length(y)
+    distances = build.node("Gemm", y, columns, lengths)
+    nearest, _ = build.nodes("TopK", [distances, [1]], ["", ""], largest=0)
+    root = build.node("Sqrt", build.node("Add", nearest, length))
+    product = build.node("Mul", build.node("Sqrt", outside), root)
     units = build.by_decision_point([p.unit for p in points])
-    scaled = build.node("Mul", [product, units])
-    build.node("Squeeze", [scaled, build.ints(1)], output)
+    build.node("Squeeze", build.node("Mul", product, units), [1], output=output)
 
 
 def _label_distances(
@@ -263,66 +235,63 @@ def _label_distances(
 ) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
     rows)."""
-    tables = label_tables(labels, classes)
     rows, most, taken, counts = (
-        build.constant(table, table.dtype, f"{name} of {task}")
-        for name, table in tables.items()
+        build.constant(table, f"{name} of {task}")
+        for name, table in label_tables(labels, classes).items()
     )
-    wider = build.node("Pad", [squares, build.ints(0, 0, 0, 1), build.constant(np.inf)])
-    squares_of_label = build.node("Gather", [wider, rows], axis=1)
+    wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
+    squares_of_label = build.node("Gather", wider, rows, axis=1)
     nearest, _ = build.nodes(
         "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0, sorted=1
     )
-    roots = build.node("Round", [build.node("Sqrt", [nearest])])
-    counted = build.node("Where", [taken, roots, build.constant(0.0)])
-    total = build.node("ReduceSum", [counted, build.ints(2)], keepdims=0)
-    return build.node("Div", [total, counts])
+    roots = build.node("Round", build.node("Sqrt", nearest))
+    counted = build.node("Where", taken, roots, 0.0)
+    total = build.node("ReduceSum", counted, [2], keepdims=0)
+    return build.node("Div", total, counts)
 
 
-def _outputs(model: ContactClassifier | SequentialClassifier) -> list[tuple[str, Any]]:
-    """Name and type of each output.
+def _outputs(model: Fitted) -> dict[str, Any]:
+    """{output: its type}.
 
     ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching`
     enlarges.
     """
-    outputs: list[tuple[str, Any]] = []
-    for task in model.choices:
-        outputs += [
-            (f"{task}_label", Int64TensorType([None])),
-            (f"{task}_scores", DoubleTensorType([None, None])),
-            (f"{task}_distances", DoubleTensorType([None, None])),
-            (f"{task}_neighbours", Int64TensorType([None, None])),
-        ]
-        if isinstance(model, SequentialClassifier) or model.products_:
-            outputs.append((f"{task}_label_distances", DoubleTensorType([None, None])))
-    outputs.append(("out_of_range", DoubleTensorType([None])))
-    if isinstance(model, SequentialClassifier):
-        outputs.append(("novelty", DoubleTensorType([None])))
+    sequential = isinstance(model, SequentialClassifier)
+    parts = {
+        "label": Int64TensorType([None]),
+        "scores": DoubleTensorType([None, None]),
+        "distances": DoubleTensorType([None, None]),
+        "neighbours": Int64TensorType([None, None]),
+    }
+    if sequential or model.products_:
+        parts["label_distances"] = DoubleTensorType([None, None])
+    outputs = {
+        f"{task}_{part}": kind for task in model.choices for part, kind in parts.items()
+    }
+    outputs["out_of_range"] = DoubleTensorType([None])
+    if sequential:
+        outputs["novelty"] = DoubleTensorType([None])
     return outputs
 
 
 def _parse(
-    scope: Any,
-    model: ContactClassifier | SequentialClassifier,
-    inputs: list[Any],
-    custom_parsers: Any = None,
+    scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
 ) -> list[Any]:
     operator = scope.declare_local_operator(type(model).__name__, model)
     for variable in inputs:
         operator.inputs.append(variable)
-    for name, kind in _outputs(model):
+    for name, kind in _outputs(model).items():
         operator.outputs.append(scope.declare_local_variable(name, kind))
     return list(operator.outputs)
 
 
 def _shapes(operator: Any) -> None:
-    for variable, (_, kind) in zip(
-        operator.outputs, _outputs(operator.raw_operator), strict=True
-    ):
+    kinds = _outputs(operator.raw_operator).values()
+    for variable, kind in zip(operator.outputs, kinds, strict=True):
         variable.set_type(kind)
 
 
-def to_onnx(model: ContactClassifier | SequentialClassifier, info: ModelInfo) -> bytes:
+def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     """The fitted tasks and the metadata as a checked, self-contained ONNX file.
 
     A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), whose

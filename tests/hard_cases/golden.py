@@ -16,14 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.model.model import Model
 from edge.recording import Recording
 from edge.saving import save
-from edge.writing import write_whole
-from export import golden
 from export.__main__ import main as export
-from export.api import describe
-from export.graph import to_onnx
+from export.api import save as save_model
 from tests.conftest import FOREARM, touch
 from tests.hard_cases.models import Array, features, labels_for
 from tests.hard_cases.neighbours import (
@@ -34,6 +30,7 @@ from tests.hard_cases.neighbours import (
     offset_data,
 )
 from train.dataset import DataSet, load_trials
+from train.fitting import Fitted
 from train.pipeline import Choice, ContactClassifier
 
 
@@ -126,15 +123,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         dataset = hard_trials(Path(trials))
         for name, (X, choice) in vectors(dataset).items():
             labels = labels_for(X, 80 if name == MANY_LABELS else 5)
-            fitted = ContactClassifier({"t": choice}).fit(X, {"t": labels})
-            info = describe(dataset, fitted, {}, 1.2, X.shape[1] // 3)
-            folder = arguments.out / name
-            with write_whole(folder / "model.onnx") as file:
-                file.write(to_onnx(fitted, info))
-            golden.write(
-                folder / "golden.npz", Model(folder / "model.onnx"), dataset, X
+            fitted = Fitted(
+                dataset=dataset,
+                measured=dataset,
+                window_s=1.2,
+                samples=X.shape[1] // 3,
+                X=X,
+                chosen={},
+                candidates=(),
+                classifier=ContactClassifier({"t": choice}).fit(X, {"t": labels}),
             )
-            print(folder)
+            save_model(arguments.out / name / "model.onnx", fitted)
+            print(arguments.out / name)
         # Decisions before the full window.
         out = str(arguments.out / "decision_points")
         points = ("--decision-points", "0.6:1.2:0.3", "--jobs", "1")

@@ -17,6 +17,7 @@ from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 from train.dataset import read
 from train.labels import labels_of
+from train.parts import part
 from train.progress import bar
 
 LEAD_S = 0.25
@@ -55,24 +56,13 @@ def split(recording: Recording) -> list[Recording]:
     labels = labels_of(recording, len(ends_s))
     if len(labels) < len(ends_s):
         labels = [recording.labels] * len(ends_s)
-    t = recording.t
-    valid = recording.valid
-    joints = recording.joints
     meta = {key: value for key, value in recording.meta.items() if key != "contacts"}
     contacts = []
     previous_end_s = -np.inf
     for (contact, end_s), contact_labels in zip(ends_s.items(), labels, strict=True):
         start_s = max(contact.onset_s - LEAD_S, previous_end_s)
-        span = slice(*np.searchsorted(t, (start_s, end_s), side="right"))
-        contacts.append(
-            Recording(
-                t=t[span],
-                frames=recording.frames[span],
-                joints=None if joints is None else joints[span],
-                valid=valid[span] if valid is not None and valid.ndim == 3 else valid,
-                meta={**meta, "labels": contact_labels},
-                shear=None if recording.shear is None else recording.shear[span],
-            )
-        )
+        span = slice(*np.searchsorted(recording.t, (start_s, end_s), side="right"))
+        of_contact = {**meta, "labels": contact_labels}
+        contacts.append(part(recording, span, meta=of_contact))
         previous_end_s = end_s
     return contacts

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from edge.recording import Recording
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose import Chosen
 from train.dataset import DataSet, Recordings
 from train.evaluate import finest, stratified_folds
+from train.parts import part
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser
@@ -58,20 +58,6 @@ class Change:
     fewer: bool = False
 
 
-def every_nth(recording: Recording, n: int) -> Recording:
-    """The recording as a wire that carries only every n-th frame would have made it."""
-    joints = recording.joints
-    valid = recording.valid
-    return replace(
-        recording,
-        t=recording.t[::n],
-        frames=recording.frames[::n],
-        joints=None if joints is None else joints[::n],
-        valid=valid[::n] if valid is not None and valid.ndim == 3 else valid,
-        shear=None if recording.shear is None else recording.shear[::n],
-    )
-
-
 def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     """The changes for which a choice is made again; the shorter windows are measured
     anyway.
@@ -95,7 +81,8 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         price = (
             f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
         )
-        source = replace(raw, recordings=tuple(every_nth(r, n) for r in raw.recordings))
+        fewer = slice(None, None, n)
+        source = replace(raw, recordings=tuple(part(r, fewer) for r in raw.recordings))
         cases.append(Change(f"{rate_hz / n:.0f} frames a second", price, source))
     full = _slowest(wires(dataset.layout))
     for skin, recordings in coarser(dataset.layout, raw.recordings):
@@ -114,11 +101,13 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     if dataset.layout.axes:
         cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    for part in PARTS:
-        part_of_set = dataset.part(stratified_folds(y[finest(y)], part) == 0)
-        if len(part_of_set.trials) >= FEWEST:
-            name = f"{len(part_of_set.trials)} of {len(dataset.trials)} trials"
-            price = f"{counted(len(dataset.trials) - len(part_of_set.trials), 'recording')} fewer"
+    count = len(dataset.trials)
+    for folds in PARTS:
+        part_of_set = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
+        left = len(part_of_set.trials)
+        if left >= FEWEST:
+            name = f"{left} of {count} trials"
+            price = f"{counted(count - left, 'recording')} fewer"
             cases.append(Change(name, price, part_of_set, fewer=True))
     return cases
 

@@ -149,13 +149,6 @@ def test_a_point_that_cannot_be_exported_is_one_sentence(
 
 
 class TestCosts:
-    def test_every_other_frame_is_left_of_half_the_rate(self, make_touch):
-        touch = make_touch()
-        half = costs.every_nth(touch, 2)
-        assert half.t.tolist() == touch.t[::2].tolist()
-        assert (half.frames == touch.frames[::2]).all()
-        assert len(half.joints) == len(half.t)
-
     def test_a_contact_no_longer_noticed_is_wrong_but_a_trial_left_out_is_not_counted(
         self,
     ):
