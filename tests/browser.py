@@ -6,10 +6,8 @@ the dependency group `browser`; tests are skipped with a reason where they are m
 
 import importlib.util
 import shutil
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,14 +27,14 @@ return [...document.images].filter(image => !image.complete || image.naturalWidt
 LINKS = "return [...document.links].map(link => link.getAttribute('href'));"
 
 
-def available() -> bool:
+def available():
     """Whether Chromium, its driver and selenium are installed."""
     programs = all(map(shutil.which, ("chromium", "chromedriver")))
     return programs and importlib.util.find_spec("selenium") is not None
 
 
 @contextmanager
-def chromium(width: int, address: str) -> Iterator[Any]:
+def chromium(width, address):
     """A headless browser with a window of that width, which shows a page."""
     webdriver = pytest.importorskip(
         "selenium.webdriver", reason="needs the group `browser`"
@@ -69,7 +67,7 @@ def chromium(width: int, address: str) -> Iterator[Any]:
         browser.quit()
 
 
-def violations(browser: Any) -> list[str]:
+def violations(browser):
     """What axe-core finds against the rules for accessible pages, a line for each."""
     package = pytest.importorskip("axe_core_python", reason="needs the group `browser`")
     script = (Path(package.__file__).parent / "axe.min.js").read_text()
@@ -84,7 +82,7 @@ def violations(browser: Any) -> list[str]:
     ]
 
 
-def faults(report: Path) -> list[str]:
+def faults(report):
     """A line for each fault of a report, at each of `WIDTHS`."""
     lines = []
     for width in WIDTHS:

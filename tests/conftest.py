@@ -46,15 +46,15 @@ FOREARM = SkinLayout(
 
 def touch(  # noqa: PLR0913 - independent properties of a touch
     *,
-    kind: str = "hard",
-    seed: int = 0,
-    seconds: float = 1.6,
-    lead_s: float = 0.2,
-    layout: SkinLayout = FOREARM,
-    arm: bool = True,
-    rate: float = 100.0,
-    labels: dict[str, str] | None = None,
-) -> Recording:
+    kind="hard",
+    seed=0,
+    seconds=1.6,
+    lead_s=0.2,
+    layout=FOREARM,
+    arm=True,
+    rate=100.0,
+    labels=None,
+):
     """A contact that grows: a hard one in force, a soft one in area. It imitates no
     physics."""
     rng = np.random.default_rng([seed, len(kind)])
@@ -96,7 +96,7 @@ def make_touch():
     return touch
 
 
-def save_touches(folder: Path, count: int, **more) -> Path:
+def save_touches(folder, count, **more):
     """The folder, with so many hard and so many soft touches, in the order of their
     seeds."""
     digits = len(str(count - 1))
@@ -110,19 +110,19 @@ def save_touches(folder: Path, count: int, **more) -> Path:
 
 
 @pytest.fixture(scope="session")
-def forearm() -> SkinLayout:
+def forearm():
     """A skin of 16 x 24 taxels on a cylinder, 1000 counts per newton."""
     return FOREARM
 
 
 @pytest.fixture(scope="session")
-def recordings(tmp_path_factory) -> Path:
+def recordings(tmp_path_factory):
     """A folder of 16 labelled recordings, 4 objects in 2 categories, with joint
     angles."""
     return save_touches(tmp_path_factory.mktemp("recordings"), 8)
 
 
-def in_a_row(*touches: Recording, rest: int = 50) -> Recording:
+def in_a_row(*touches, rest=50):
     """Touches one after another at 100 Hz, each with so many frames of rest after
     it."""
     still = np.zeros((rest, *touches[0].frames.shape[1:]), np.uint16)
@@ -137,7 +137,7 @@ def in_a_row(*touches: Recording, rest: int = 50) -> Recording:
     return replace(touches[0], t=t, frames=frames, joints=np.concatenate(joints))
 
 
-def full_pipe() -> tuple[int, int]:
+def full_pipe():
     """The ends of a pipe, to read and to write, that takes no further byte until it is
     read."""
     reading, writing = os.pipe()
@@ -150,12 +150,12 @@ def full_pipe() -> tuple[int, int]:
     return reading, writing
 
 
-def lines(text: str) -> list[dict]:
+def lines(text):
     """The JSON objects of a text, one a line."""
     return [json.loads(line) for line in text.splitlines()]
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
+def rows_of(path):
     """The rows of a CSV file, by their columns."""
     return list(csv.DictReader(path.read_text().splitlines()))
 
@@ -172,7 +172,7 @@ def edge(capsys):
     return run
 
 
-def python(*arguments, **options) -> subprocess.CompletedProcess:
+def python(*arguments, **options):
     """A process of its own that ran Python in the project's folder, with its output as
     text."""
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
@@ -184,14 +184,14 @@ PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
 choice."""
 
 
-def export(out: Path, *options: object) -> Path:
+def export(out, *options):
     """Run `make export`, with `--data` among the options; the model's folder."""
     assert export_main(["--out", str(out), "--jobs", "1", *map(str, options)]) == 0
     return out
 
 
 @pytest.fixture(scope="session")
-def exported(recordings, tmp_path_factory) -> Path:
+def exported(recordings, tmp_path_factory):
     """A folder with the model.onnx and golden.npz of those recordings."""
     return export(tmp_path_factory.mktemp("exported"), "--data", recordings, *PAPER)
 
@@ -204,7 +204,7 @@ def fitted(recordings):
 
 
 @pytest.fixture(scope="session")
-def real() -> Path:
+def real():
     """The folder of real recordings; tests that need it are skipped without it."""
     if not REAL.is_dir():
         pytest.skip(

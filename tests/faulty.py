@@ -3,7 +3,7 @@
 import errno
 import math
 import random
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -61,14 +61,12 @@ class Route(NamedTuple):
 class FaultyBus(FakeBus):
     """A fake bus with a script of faults; `inject` starts one."""
 
-    def __init__(
-        self, *arguments, faults: Sequence[Fault] = (), seed: int = 0, **options
-    ):
+    def __init__(self, *arguments, faults=(), seed=0, **options):
         super().__init__(*arguments, **options)
         self._held = {}
         self.inject(faults, seed)
 
-    def inject(self, faults: Sequence[Fault], seed: int = 0) -> None:
+    def inject(self, faults, seed=0):
         """Start another script, which counts transactions from 0."""
         self.faults = [fault for fault in faults if fault.bus in (None, self.name)]
         self.met = 0
@@ -78,7 +76,7 @@ class FaultyBus(FakeBus):
         # threads.
         self.random = random.Random(f"faults/{seed}/{self.name}")
 
-    def reopen(self) -> None:
+    def reopen(self):
         """Open it, unless a fault keeps the adapter away."""
         gone = [
             f
@@ -89,7 +87,7 @@ class FaultyBus(FakeBus):
             raise bus_error(errno.ENODEV, self.name)
         super().reopen()
 
-    def transfer(self, prepared: Transfer) -> None:
+    def transfer(self, prepared):
         """Carry the messages, with the fault that is due."""
         first = prepared.messages[0]
         into = prepared.messages[-1]
@@ -163,7 +161,7 @@ class FaultyBus(FakeBus):
         return Route(address)
 
 
-def _another(control: bytes) -> bytes:
+def _another(control):
     """A mux's control byte that selects the next channel."""
     return bytes([control[0] << 1 & 0xFF or 1])
 

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,7 +55,7 @@ class Victim:
     finished: Callable[[Path, str], str]
 
 
-def called(*words: object) -> subprocess.CompletedProcess[str]:
+def called(*words):
     """Run a command to its end."""
     return subprocess.run(
         list(map(str, words)),
@@ -66,7 +66,7 @@ def called(*words: object) -> subprocess.CompletedProcess[str]:
     )
 
 
-def loadable(folder: Path) -> str:
+def loadable(folder):
     """All recordings of a folder are whole, or the sentence of the first that is not."""
     for path in folder.glob("**/*.npz"):
         if path.name != "golden.npz":
@@ -74,7 +74,7 @@ def loadable(folder: Path) -> str:
     return ""
 
 
-def copied(folder: Path, count: int = 12) -> None:
+def copied(folder, count=12):
     """Fill a folder with the recordings of the demo, over and over."""
     recordings = demo.recordings()
     for i in range(count):
@@ -82,35 +82,35 @@ def copied(folder: Path, count: int = 12) -> None:
         shutil.copy(source, folder / f"{source.stem}-{i:02d}.npz")
 
 
-def touches(folder: Path) -> Path:
+def touches(folder):
     """A folder of recordings within a folder."""
     (folder / "touches").mkdir()
     copied(folder / "touches")
     return folder / "touches"
 
 
-def recorded(folder: Path) -> Sequence[object]:
+def recorded(folder):
     fake = demo.recordings()[0]
     words = ["--loop", "--trials", 5, "--label", "object=box", "--out", folder / "out"]
     return [*EDGE, "record", "--fake", fake, *words]
 
 
-def all_recorded(folder: Path, printed: str) -> str:
+def all_recorded(folder, printed):
     count = len(find([folder / "out"]))
     return "" if 5 <= count <= 10 else f"{count} recordings instead of 5 to 10"
 
 
-def relabelled(folder: Path) -> Sequence[object]:
+def relabelled(folder):
     return [*EDGE, "label", "--set", "object=crate", "--yes", folder]
 
 
-def all_or_none(folder: Path, printed: str) -> str:
+def all_or_none(folder, printed):
     """The next start finished the change of labels: all have it."""
     changed = [load(path).labels["object"] == "crate" for path in find([folder])]
     return "" if all(changed) else f"{sum(changed)} of {len(changed)} files changed"
 
 
-def together(folder: Path) -> str:
+def together(folder):
     """The model and its golden file agree, or `verify` says that they do not belong
     together."""
     model = folder / "model.onnx"
@@ -120,14 +120,14 @@ def together(folder: Path) -> str:
     return f"verify blames the machine: {done.stdout}{done.stderr}"
 
 
-def agreeing(folder: Path, printed: str) -> str:
+def agreeing(folder, printed):
     """The model and its golden file belong together after a whole run."""
     model = folder / "model.onnx"
     done = called(*EDGE, "verify", "--model", model, "--golden", folder / "golden.npz")
     return done.stderr if done.returncode else ""
 
 
-def before_teaching(folder: Path) -> None:
+def before_teaching(folder):
     touches(folder)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(GOLDEN / name, folder / name)
@@ -136,19 +136,19 @@ def before_teaching(folder: Path) -> None:
         shutil.copy(GOLDEN / name, folder / "source" / name)
 
 
-def teaching(folder: Path) -> Sequence[object]:
+def teaching(folder):
     model = folder / "source" / "model.onnx"
     words = ["--model", model, "--out", folder, "--new-labels", folder / "touches"]
     return [*EDGE, "teach", *words]
 
 
-def mapping(folder: Path) -> Sequence[object]:
+def mapping(folder):
     fake = demo.recordings()[0]
     words = ["--model", demo.MODEL, "--fake", fake, "--loop", "--seconds", 3]
     return [*EDGE, "run", *words, "--map", folder / "map.jsonl"]
 
 
-def readable_map(folder: Path) -> str:
+def readable_map(folder):
     path = folder / "map.jsonl"
     if path.exists():
         for line in path.read_bytes().split(b"\n")[:-1]:
@@ -158,23 +158,23 @@ def readable_map(folder: Path) -> str:
     return ""
 
 
-def longer_map(folder: Path, printed: str) -> str:
+def longer_map(folder, printed):
     path = folder / "map.jsonl"
     return "" if any(True for _ in TouchMap(path)) else "the map holds no touch"
 
 
-def before_exporting(folder: Path) -> None:
+def before_exporting(folder):
     touches(folder)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(GOLDEN / name, folder / name)
 
 
-def exporting(folder: Path) -> Sequence[object]:
+def exporting(folder):
     words = ["--features", "paper", "--projection", "pca", "--components", 4, "-k", 1]
     return [*EXPORT, "--data", folder / "touches", "--out", folder, "--jobs", 1, *words]
 
 
-VICTIMS: Mapping[str, Victim] = {
+VICTIMS = {
     "record": Victim(lambda folder: None, recorded, loadable, all_recorded),
     "label --set": Victim(copied, relabelled, loadable, all_or_none),
     "teach": Victim(before_teaching, teaching, together, agreeing),
@@ -183,7 +183,7 @@ VICTIMS: Mapping[str, Victim] = {
 }
 
 
-def listing(folder: Path) -> dict[str, int]:
+def listing(folder):
     """When each file of a folder changed."""
     seen = {}
     for path in folder.glob("**/*"):
@@ -207,7 +207,7 @@ class Moment:
     delay_s: float
 
 
-def killed(command: Sequence[object], folder: Path, moment: Moment) -> bool:
+def killed(command, folder, moment):
     """Start a command, kill it, and say whether it was still alive.
 
     Args:
@@ -236,7 +236,7 @@ def killed(command: Sequence[object], folder: Path, moment: Moment) -> bool:
     return False
 
 
-def temporaries(folder: Path) -> list[Path]:
+def temporaries(folder):
     """Temporary files, made old enough for the next start to remove them."""
     old = time.time() - 60.0
     paths = list(folder.glob(f"**/{PREFIX}*"))
@@ -245,7 +245,7 @@ def temporaries(folder: Path) -> list[Path]:
     return paths
 
 
-def tried(victim: Victim, moment: Moment) -> tuple[bool, bool, str]:
+def tried(victim, moment):
     """Kill a victim once.
 
     Returns:
@@ -268,7 +268,7 @@ def tried(victim: Victim, moment: Moment) -> tuple[bool, bool, str]:
         return alive, bool(left), complaint
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv=None):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
     parser = argparse.ArgumentParser(prog="kills", description=__doc__)
     parser.add_argument("--count", type=int, default=60, help="kills of each command")

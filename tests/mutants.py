@@ -20,7 +20,7 @@ MUTMUT = (sys.executable, "-m", "mutmut")
 UNNOTICED = ("survived", "no tests")
 
 
-def output(*arguments: str) -> str:
+def output(*arguments):
     """The output of a mutmut command; its errors pass through."""
     done = subprocess.run(
         [*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True
@@ -28,13 +28,13 @@ def output(*arguments: str) -> str:
     return done.stdout
 
 
-def statuses() -> dict[str, str]:
+def statuses():
     """{name of a mutant: its status}, "not checked" where it was not tried yet."""
     lines = output("results", "--all", "true").splitlines()
     return dict(line.strip().rsplit(": ", 1) for line in lines if "__mutmut_" in line)
 
 
-def generate() -> None:
+def generate():
     """Make all mutants, and measure which tests reach which function.
 
     Raises:
@@ -49,7 +49,7 @@ def generate() -> None:
         raise SystemExit(done.stdout + done.stderr)
 
 
-def run(names: list[str], minutes: float) -> None:
+def run(names, minutes):
     """Try these mutants until the time is over."""
     process = subprocess.Popen([*MUTMUT, "run", *names], stdout=subprocess.DEVNULL)
     try:
@@ -59,7 +59,7 @@ def run(names: list[str], minutes: float) -> None:
         process.wait()
 
 
-def main() -> None:
+def main():
     """Try a sample of mutants; print those that no test notices, and a count of each
     status."""
     parser = argparse.ArgumentParser(

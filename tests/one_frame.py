@@ -5,12 +5,9 @@
 
 import ast
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import CodeType, FrameType
-from typing import Any
 
 from edge import demo
 from edge.classifier import Classifier
@@ -19,7 +16,6 @@ from edge.fake.player import play, skin_file
 from edge.model.model import Model
 from edge.recording import load
 from edge.skin.loop import Loop
-from edge.touch.frame import Frame
 
 ROOT = Path(__file__).parents[1]
 EDGE = str(ROOT / "edge")
@@ -48,7 +44,7 @@ class Step:
     name: str
 
 
-def _step(code: CodeType) -> Step | None:
+def _step(code):
     """The function of a code object, if it belongs to the program and has a name."""
     inside = code.co_filename.startswith(EDGE)
     if not inside or "/fake/" in code.co_filename or "<" in code.co_qualname:
@@ -57,11 +53,11 @@ def _step(code: CodeType) -> Step | None:
     return Step(path, code.co_qualname)
 
 
-def traced(work: Callable[[], Any]) -> tuple[Any, list[Step]]:
+def traced(work):
     """What a call returns, and the functions that it passes, in order of first call."""
-    steps: dict[Step, None] = {}
+    steps = {}
 
-    def note(frame: FrameType, event: str, _: Any) -> None:
+    def note(frame, event, _):
         step = _step(frame.f_code) if event == "call" else None
         if step is not None:
             steps.setdefault(step)
@@ -74,19 +70,19 @@ def traced(work: Callable[[], Any]) -> tuple[Any, list[Step]]:
     return result, list(steps)
 
 
-def ways() -> dict[str, list[Step]]:
+def ways():
     """The way of a frame in contact, and of the one that decides."""
     recording = load(demo.FOLDER / "cardboard-box-movable.npz")
     skin, playback = play(skin_file(recording.layout), recording)
     # The buses are read in this thread, one after another, so that a trace sees it.
     skin._threads.map = map  # type: ignore[method-assign, assignment]
     classifier = Classifier(Model(demo.MODEL), skin.layout)
-    traces: dict[str, list[Step]] = {}
+    traces = {}
     with skin:
         frames = Loop(skin, joints=playback, lasts_s=playback.ends).frames()
 
-        def step() -> list[Any] | None:
-            frame: Frame | None = next(frames, None)
+        def step():
+            frame = next(frames, None)
             return None if frame is None else classifier.push(frame)
 
         while "decision" not in traces:
@@ -103,11 +99,11 @@ def ways() -> dict[str, list[Step]]:
 
 
 @cache
-def _docstrings(path: str) -> dict[str, str]:
+def _docstrings(path):
     """{function with its class: the first line of its docstring}."""
-    lines: dict[str, str] = {}
+    lines = {}
 
-    def visit(node: ast.AST, prefix: str) -> None:
+    def visit(node, prefix):
         for child in ast.iter_child_nodes(node):
             if isinstance(child, ast.ClassDef | ast.FunctionDef):
                 name = f"{prefix}{child.name}"
@@ -118,12 +114,12 @@ def _docstrings(path: str) -> dict[str, str]:
     return lines
 
 
-def files(steps: list[Step]) -> list[str]:
+def files(steps):
     """The files that a frame visits, in order."""
     return list(dict.fromkeys(step.path for step in steps))
 
 
-def page() -> str:
+def page():
     """The page as Markdown."""
     traces = ways()
     decision = traces["decision"]

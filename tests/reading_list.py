@@ -27,7 +27,7 @@ finally:
 """
 
 
-def loaded(*arguments: str, environment: dict[str, str] | None = None) -> list[Path]:
+def loaded(*arguments, environment=None):
     """Paths, below the checkout, of the modules of edge that a command loads."""
     command = [sys.executable, "-c", PROGRAM, *arguments]
     done = subprocess.run(
@@ -42,15 +42,15 @@ def loaded(*arguments: str, environment: dict[str, str] | None = None) -> list[P
     return sorted(paths, key=lambda path: (_room(path), path.name))
 
 
-def _room(path: Path) -> int:
+def _room(path):
     return ROOMS.index(path.parent.name)
 
 
-def lines_of_code(path: Path) -> int:
+def lines_of_code(path):
     """Lines of a module without blank lines, comments and docstrings."""
     text = (ROOT / path).read_text()
     tree = ast.parse(text)
-    docstrings: set[int] = set()
+    docstrings = set()
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         for child in body if isinstance(body, list) else []:
@@ -64,7 +64,7 @@ def lines_of_code(path: Path) -> int:
     return count
 
 
-def main() -> None:
+def main():
     """Print the list; the skin's buses need not be there."""
     skin = str(skinfile.shipped("cody"))
     paths = loaded("run", "--model", str(demo.MODEL), "--skin", skin)

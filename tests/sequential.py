@@ -6,11 +6,10 @@ from edge.model.info import Task
 from edge.model.model import Model
 from export.graph import to_onnx
 from train.evaluate import stratified_folds
-from train.pipeline import Choice
 from train.stopping import SequentialClassifier
 
 
-def fitted_model(path, info, choices: dict[str, Choice], X, y):
+def fitted_model(path, info, choices, X, y):
     """The estimator, and its model, which is written to a path.
 
     `info` is the metadata of a model of the same features; X has a set of vectors for

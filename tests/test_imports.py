@@ -4,7 +4,6 @@ import ast
 import sys
 from functools import cache
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 
@@ -17,12 +16,12 @@ FORBIDDEN = {"pickle", "joblib.dump", "marshal", "shelve"}
 
 
 @cache
-def parsed(path: Path) -> ast.Module:
+def parsed(path):
     return ast.parse(path.read_text())
 
 
 @cache
-def imported(path: Path) -> set[str]:
+def imported(path):
     names = set()
     for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
@@ -32,13 +31,13 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-def at_the_top(path: Path) -> set[str]:
+def at_the_top(path):
     """What a module imports when it is loaded."""
     nodes = [node for node in parsed(path).body if isinstance(node, ast.ImportFrom)]
     return {node.module or "edge" for node in nodes}
 
 
-def modules(package: str) -> list[Path]:
+def modules(package):
     return sorted((ROOT / package).rglob("*.py"))
 
 

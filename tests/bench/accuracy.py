@@ -5,73 +5,59 @@ whole choice, on trials that took no part in it, with the interval of the export
 on other trials, or on other objects or kinds where entire groups are left out.
 """
 
-import argparse
-import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import train
 from tests.bench import tables
+from tests.bench.program import start
 from train.__main__ import main as train_command
 from train.progress import bar
 
 SCENES = tables.ROOT / "train" / "scenes"
 
 
-def simulated(folder: Path) -> Iterator[tuple[str, Path, dict[str, Any]]]:
-    """Sets of recordings that are simulated: name, folder, options of the fit."""
+def recorded(folder, grasps):
+    """Sets of recordings, which are simulated or imported into a folder: name, folder,
+    options of the fit."""
     for scene in ("cody18", "household"):
         out = folder / scene
         train_command(["simulate", str(SCENES / f"{scene}.toml"), "--out", str(out)])
         yield f"`{scene}`, simulated", out, {}
+    if grasps:
+        out = folder / "sdh2"
+        train_command(["import", "sdh2", grasps, "--out", str(out)])
+        touch = {"features": ["moments"], "projection": "lda"}
+        yield "SDH-2 grasps, by touch alone", out, touch
+        yield "SDH-2 grasps, with joint angles, which leak", out, {}
 
 
-def real(grasps: Path, folder: Path) -> Iterator[tuple[str, Path, dict[str, Any]]]:
-    """Sets of recordings of the SDH-2 hand, by touch alone and with joint angles."""
-    out = folder / "sdh2"
-    train_command(["import", "sdh2", str(grasps), "--out", str(out)])
-    touch = {"features": ["moments"], "projection": "lda"}
-    yield "SDH-2 grasps, by touch alone", out, touch
-    yield "SDH-2 grasps, with joint angles, which leak", out, {}
-
-
-def accuracies(
-    name: str, folder: Path, options: dict[str, Any]
-) -> list[dict[str, Any]]:
+def accuracies(name, folder, options):
     """A row for each task of a set of recordings."""
     fitted = train.fit(folder, **options)
-    rows = []
+    dataset = fitted.dataset
     for task, chosen in fitted.chosen.items():
         low, high = chosen.accuracy.interval
-        row = {"recordings": name, "trials": len(fitted.dataset.trials), "task": task}
-        row["labels"] = len(set(fitted.dataset.labels(task)))
-        row["left out"] = chosen.left_out
-        row["accuracy"] = f"{chosen.accuracy.accuracy:.0%}"
-        row["95 % interval"] = f"{low:.0%} to {high:.0%}"
-        rows.append(row)
-    return rows
+        yield {
+            "recordings": name,
+            "trials": len(dataset.trials),
+            "task": task,
+            "labels": len(set(dataset.labels(task))),
+            "left out": chosen.left_out,
+            "accuracy": f"{chosen.accuracy.accuracy:.0%}",
+            "95 % interval": f"{low:.0%} to {high:.0%}",
+        }
 
 
-def main() -> int:
+def measure(grasps):
     """Fit the sets, print and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--grasps", type=Path, metavar="FOLDER", help="of the published SDH-2 grasps"
-    )
-    arguments = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        sets = list(simulated(folder))
-        if arguments.grasps is not None:
-            sets += real(arguments.grasps, folder)
+        sets = list(recorded(Path(name), grasps))
         for label, recordings, options in bar(sets, desc="sets"):
             rows += accuracies(label, recordings, options)
     tables.write("accuracy", [rows])
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(measure, __doc__, ("--grasps", "", "folder of the published SDH-2 grasps"))

@@ -23,7 +23,7 @@ WIRE_S = (12 * 255 + 3 * 20) / 400_000
 longest."""
 
 
-def measure() -> float:
+def measure():
     """Seconds of one full frame over three buses, one after another: processor time of
     all threads in the best round, without the share of other programs."""
     with Skin.open(calibrated(skinfile.load(skinfile.shipped("cody")))) as skin:

@@ -1,12 +1,11 @@
 """What each set of features costs: a frame in contact, and the vector at the end."""
 
-from collections.abc import Sequence
 from functools import partial
 
 import pytest
 
 from edge.demo import FOLDER
-from edge.recording import Recording, load
+from edge.recording import load
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S, feature_vector
 from edge.touch.kernels import BIASES, kernel_channels
@@ -19,12 +18,12 @@ WHOLE = "moments contact kernels zone_kernels joints"
 NUMBERS = dict(zip(("taxel_kernels", "zone_kernels"), BIASES, strict=True))
 
 
-def together(names: str) -> Sequence[str]:
+def together(names):
     """The features of some sets."""
     return [feature for name in names.split() for feature in SETS[name]]
 
 
-def tracker(recording: Recording, features: Sequence[str]) -> ContactTracker:
+def tracker(recording, features):
     arm = {"chain": Chain.cody(), "joints": recording.joints.shape[1]}
     return ContactTracker(recording.layout, features=features, **arm)
 

@@ -10,10 +10,7 @@ by some 17 degrees in that time, until it lies askew over the face's end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.bench import mujoco_touch, tables
 from tests.bench.mujoco_touch import LEAD_S, RATE_HZ, THRESHOLD_COUNTS, Thing, Touch
@@ -53,104 +50,85 @@ TO_S = 1.2
 STEP_S = 0.00125
 
 
-@dataclass(frozen=True)
-class Run:
-    """One touch in one engine.
-
-    Attributes:
-        frames: (n, rows, cols) counts.
-        shear: (n, rows, cols, 2) counts.
-        force: (n,) newtons.
-        moved: (n,) metres.
-    """
-
-    frames: NDArray
-    shear: NDArray
-    force: NDArray
-    moved: NDArray
-
-
-def theirs(thing: Thing, fixed: bool) -> Run:
-    """The touch in MuJoCo."""
+def theirs(thing, fixed):
+    """The touch in MuJoCo: counts (n, rows, cols), shear (n, rows, cols, 2), and
+    newtons and metres moved (n,)."""
     touch = Touch(thing, fixed, tuple(np.radians(UPRIGHT_DEG)), place_m=MIDDLE_M)
     recording, force, moved_m = mujoco_touch.simulate(touch)
-    assert recording.shear is not None
-    return Run(recording.frames, recording.shear, force, moved_m)
+    return recording.frames, recording.shear, force, moved_m
 
 
-def ours(thing: Thing, fixed: bool) -> Run:
-    """The touch in our simulator."""
-    condition = "fixed" if fixed else "movable"
-    item = {"name": "thing", "family": "rigid", "conditions": [condition]}
-    item |= {
+def ours(thing, fixed):
+    """The touch in our simulator, likewise."""
+    item = {
+        "name": "thing",
+        "family": "rigid",
+        "conditions": ["fixed" if fixed else "movable"],
         "width_m": thing.height_m,
         "breadth_m": thing.breadth_m,
         "mass_kg": thing.mass_kg,
+        "friction_static": thing.floor,
+        "friction_kinetic": thing.floor,
+        "skin_friction": thing.skin,
     }
-    item |= {"friction_static": thing.floor, "friction_kinetic": thing.floor}
-    item |= {"skin_friction": thing.skin}
     if thing.soft:
-        item |= {
-            "family": "foam",
-            "modulus_pa": thing.modulus_pa,
-            "depth_m": thing.thick_m,
-        }
-        item |= {"relax_ratio": 0.6, "relax_s": 0.06}
-    start = [a + b for a, b in zip(mujoco_touch.START_DEG, UPRIGHT_DEG, strict=True)]
-    tables = {"trials": {"count": 1, "lead_s": LEAD_S, "after_s": mujoco_touch.TOUCH_S}}
-    tables |= {
-        "skin": {"axes": 3},
-        "motion": {"start_deg": start, "place_m": MIDDLE_M},
-        "step_s": {"base": STEP_S},
-    }
+        item |= {"family": "foam", "relax_ratio": 0.6, "relax_s": 0.06}
+        item |= {"modulus_pa": thing.modulus_pa, "depth_m": thing.thick_m}
+    start_deg = np.add(mujoco_touch.START_DEG, UPRIGHT_DEG).tolist()
     scene = from_dict(
-        {**tables, "effects": {"add": ["tilt", "inertia"]}, "object": [item]}
+        {
+            "trials": {"count": 1, "lead_s": LEAD_S, "after_s": mujoco_touch.TOUCH_S},
+            "skin": {"axes": 3},
+            "motion": {"start_deg": start_deg, "place_m": MIDDLE_M},
+            "step_s": {"base": STEP_S},
+            "effects": {"add": ["tilt", "inertia"]},
+            "object": [item],
+        }
     )
     batch = run_physics(scene, tuple(next(iter(kinds(scene).values()))))
     slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
     seen = next(readings(batch))
-    shear = seen.shear()
-    assert shear is not None
-    return Run(seen.frames(), shear, batch.force[0], slide[0])
+    return seen.frames(), seen.shear(), batch.force[0], slide[0]
 
 
-def measured(run: Run) -> dict[str, float]:
+def measured(frames, shear, force, moved_m):
     """The quantities of one engine."""
-    onset = int(np.argmax(run.frames.max(axis=(1, 2)) > 60))
+    onset = int(np.argmax(frames.max(axis=(1, 2)) > 60))
     window = slice(onset + round(FROM_S * RATE_HZ), onset + round(TO_S * RATE_HZ))
-    counts = run.frames[window]
-    shear = run.shear[window].astype(float)
-    touching = counts.max(axis=(1, 2)) > THRESHOLD_COUNTS
+    counts = frames[window]
+    along, around = np.moveaxis(shear[window].astype(float), -1, 0)
+    areas = (counts > THRESHOLD_COUNTS).sum(axis=(1, 2))
     return {
-        "total force, N": float(run.force[window].mean()),
-        "pull along, N": float(shear[..., 0].sum(axis=(1, 2)).mean() / 1e3),
-        "shear around, N": float(np.abs(shear[..., 1]).sum(axis=(1, 2)).mean() / 1e3),
-        "peak taxel, N": float(counts.max(axis=(1, 2)).mean() / 1e3),
-        "area, taxels": float(
-            (counts > THRESHOLD_COUNTS).sum(axis=(1, 2))[touching].mean()
-        ),
-        "motion, mm": 1e3 * float(run.moved[window.stop]),
+        "total force, N": force[window].mean(),
+        "pull along, N": along.sum(axis=(1, 2)).mean() / 1e3,
+        "shear around, N": np.abs(around).sum(axis=(1, 2)).mean() / 1e3,
+        "peak taxel, N": counts.max(axis=(1, 2)).mean() / 1e3,
+        "area, taxels": areas[areas > 0].mean(),
+        "motion, mm": 1e3 * moved_m[window.stop],
     }
 
 
-def main() -> None:
+def main():
     """Print the four touches, a row a quantity."""
     rows = []
-    for name, (thing, fixed) in SCENES.items():
-        peer = measured(theirs(thing, fixed))
-        mine = measured(ours(thing, fixed))
-        for quantity in peer:
-            still = abs(peer[quantity]) <= NOTHING.get(quantity, 0.0)
-            row = {"touch": name, "quantity": quantity}
-            row["MuJoCo"] = f"{peer[quantity]:.3g}"
-            row["ours"] = f"{mine[quantity]:.3g}"
-            row["difference"] = "-"
-            if not still:
-                ratio = mine[quantity] / peer[quantity]
-                row["difference"] = f"{100 * (ratio - 1):+.0f} %"
+    for name, touch in SCENES.items():
+        peer = measured(*theirs(*touch))
+        mine = measured(*ours(*touch))
+        for quantity, value in peer.items():
+            difference = "-"
+            if abs(value) > NOTHING.get(quantity, 0.0):
+                difference = f"{100 * (mine[quantity] / value - 1):+.0f} %"
             allowed = ALLOWED.get(quantity)
-            row["allowed"] = "-" if allowed is None else f"{allowed} %"
-            rows.append(row)
+            rows.append(
+                {
+                    "touch": name,
+                    "quantity": quantity,
+                    "MuJoCo": f"{value:.3g}",
+                    "ours": f"{mine[quantity]:.3g}",
+                    "difference": difference,
+                    "allowed": "-" if allowed is None else f"{allowed} %",
+                }
+            )
     tables.write("matched", [rows])
 
 

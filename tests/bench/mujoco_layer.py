@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 ABOVE_FLOOR_M = 0.30
 """Height of the middle of the contact."""
@@ -22,15 +19,13 @@ SHEAR_NS_M = 15.0
 """The skin's stretch along the forearm: its stiffness and its loss."""
 
 
-def beneath_n_m(modulus_pa: float) -> float:
+def beneath_n_m(modulus_pa):
     """Stiffness of the layer beneath one taxel, finer than its net: 2 E times the net's
     pitch."""
     return 2.0 * modulus_pa * NET_M
 
 
-def layer_xml(
-    height_m: float, breadth_m: float, modulus_pa: float, thick_m: float
-) -> tuple[str, str]:
+def layer_xml(height_m, breadth_m, modulus_pa, thick_m):
     """An elastic layer: a net of sprung knots, and both the springs between neighbours
     (together a Pasternak foundation) and the face stretched over the net.
 
@@ -105,7 +100,7 @@ class Rub:
     bear loads of no real net.
     """
 
-    def __init__(self, model: Any, friction: float) -> None:
+    def __init__(self, model, friction):
         self.model = model
         self.friction = friction
         self.stretch = 0.0
@@ -116,7 +111,7 @@ class Rub:
         ]
         self.arm, self.thing = model.body_parentid[self.pads[0]], model.body("thing").id
 
-    def hold(self, data: Any, loads: NDArray[np.float64]) -> None:
+    def hold(self, data, loads):
         """Set the pull of this step on arm and thing, from the pads' loads (n,)."""
         data.qfrc_applied[:] = 0.0
         most = self.friction * float(loads.sum())
@@ -139,9 +134,7 @@ class Rub:
                 self.model, data, force, np.zeros(3), point, body, data.qfrc_applied
             )
 
-    def _speed(
-        self, data: Any, body: int, point: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _speed(self, data, body, point):
         """(3,) m/s of a point of a body."""
         spatial = np.zeros(6)
         mujoco.mj_objectVelocity(

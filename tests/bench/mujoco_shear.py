@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from tests.bench.mujoco_layer import Rub
 from train.simulate.scene import CODY_SKIN
 
 
@@ -22,9 +18,9 @@ class Tangents:
         where: (row, column) of each pad.
     """
 
-    def __init__(self, model: Any, where: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, model, where):
         self._model = model
-        self._pad_of_geom: dict[int, int] = {}
+        self._pad_of_geom = {}
         for number in range(len(where)):
             body = model.body(f"pad{number}").id
             self._pad_of_geom[int(model.body_geomadr[body])] = number
@@ -38,9 +34,7 @@ class Tangents:
         turn = (columns[1] - columns[0] + 180.0) % 360.0 - 180.0
         self._sign = math.copysign(1.0, turn)
 
-    def read(
-        self, data: Any, loads: NDArray[np.float64], rub: Rub | None
-    ) -> NDArray[np.float64]:
+    def read(self, data, loads, rub):
         """(pads, 2) newtons on each pad along the rows and around the columns.
 
         The pull of a soft layer's skin friction is shared by the pads' loads.

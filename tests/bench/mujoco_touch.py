@@ -14,11 +14,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -87,12 +85,12 @@ class Thing:
     joint: str = "<freejoint/>"
 
     @property
-    def soft(self) -> bool:
+    def soft(self):
         """Whether it yields."""
         return self.kind not in RIGID_KINDS
 
     @property
-    def layered(self) -> bool:
+    def layered(self):
         """Whether it has an elastic layer."""
         return self.soft and self.kind != "plant"
 
@@ -124,7 +122,7 @@ class Touch:
     noise: tuple[float, np.random.Generator] | None = None
 
     @property
-    def pad_n_m(self) -> float:
+    def pad_n_m(self):
         """Stiffness of a pad, in series with the layer beneath it where there is a
         layer."""
         if not self.thing.layered:
@@ -134,12 +132,12 @@ class Touch:
         )
 
     @property
-    def rate_rad_s(self) -> NDArray[np.float64]:
+    def rate_rad_s(self):
         """(dof,) speed of the equilibrium point: the first joint swings."""
         return np.eye(ARM.dof)[0] * math.radians(RATE_DEG_S * self.speed)
 
     @property
-    def lag_rad(self) -> NDArray[np.float64]:
+    def lag_rad(self):
         """(dof,) by which each joint trails its equilibrium point in free motion."""
         seconds = (
             np.array(CODY_DAMPING)
@@ -149,12 +147,12 @@ class Touch:
         return seconds * self.rate_rad_s
 
 
-def joined(numbers: Any) -> str:
+def joined(numbers):
     """Numbers as MuJoCo reads them."""
     return " ".join(map(str, numbers))
 
 
-def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]]:
+def arm_xml(facing_deg, touch):
     """The arm's bodies, and the (row, column) of each pad."""
     links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
     pads = ""
@@ -184,7 +182,7 @@ def arm_xml(facing_deg: float, touch: Touch) -> tuple[str, list[tuple[int, int]]
     return xml + pads + "</body>" * ARM.dof, where
 
 
-def stems_xml(thing: Thing) -> str:
+def stems_xml(thing):
     """The stems of a plant, which bend along the push."""
     rng = np.random.default_rng(thing.seed)
     hinge = thing.stem_n_m * (ABOVE_FLOOR_M - 0.02) ** 2
@@ -201,7 +199,7 @@ def stems_xml(thing: Thing) -> str:
     return xml
 
 
-def upper_xml(thing: Thing) -> tuple[str, str]:
+def upper_xml(thing):
     """What stands on the thing's foot, and the springs and the face of a layer."""
     if thing.layered:
         return mujoco_layer.layer_xml(
@@ -220,7 +218,7 @@ def upper_xml(thing: Thing) -> tuple[str, str]:
     return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
 
-def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, int]]]:
+def model_of(touch):
     """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
@@ -271,8 +269,8 @@ def model_of(touch: Touch) -> tuple[Any, NDArray[np.float64], list[tuple[int, in
 
 
 def simulate(
-    touch: Touch,
-) -> tuple[Recording, NDArray[np.float64], NDArray[np.float64]]:
+    touch,
+):
     """One touch, as the board would have recorded it.
 
     Returns:
@@ -289,7 +287,7 @@ def simulate(
     mujoco.mj_forward(model, data)
     rub = mujoco_layer.Rub(model, thing.skin) if thing.layered else None
 
-    def pressed() -> NDArray[np.float64]:
+    def pressed():
         """(pads,) newtons; the pads' joints follow the arm's."""
         return np.maximum(-touch.pad_n_m * data.qpos[dof : dof + len(where)], 0.0)
 

@@ -23,43 +23,38 @@ for; in brackets, what four fifths of the sets give.
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import chain
 
 import numpy as np
-from joblib import Parallel, delayed
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from edge.cli import dispatch
-from edge.commands.options import within
 from edge.touch.features import SAMPLES, WINDOW_S
 from tests.bench import tables
+from tests.bench.program import start
 from train.candidates import candidates
-from train.choose import Chosen
 from train.dataset import DataSet, load_trials
 from train.feature_sets import expand
 from train.fitting import fit
-from train.progress import bar
+from train.parts import part
+from train.report.work import Workers
 from train.rules import RISK
 from train.simulate import scene as scenes
 from train.simulate.run import write
 from train.stopping import answers, unlike
 from train.tradeoff.front import NAMES, ParetoFront
 
-SCENE = Path(__file__).parents[2] / "train" / "scenes" / "cody18.toml"
+SCENE = tables.ROOT / "train" / "scenes" / "cody18.toml"
 POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 ERRORS = (0.05, 0.1, 0.2)
 LATE_S = 0.05
 OUTSIDE = 0.05
 """Share of the data sets whose accuracy may lie outside the interval of the front."""
 BINS = 10
-SHOWN = (*NAMES, "export")
 SEEDS = 5
 COUNT = 20
 """Batches, each of a seed of its own; trials of each object and condition in a
@@ -81,56 +76,39 @@ class DrawnSet(DataSet):
     pool: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.int64]]
 
-    def others(
-        self, labels: NDArray[np.str_]
-    ) -> tuple[NDArray[np.int64], dict[str, NDArray[np.str_]]]:
+    def others(self, labels):
         """The rows of the pool that were not drawn, and their labels for each task."""
         rows = np.setdiff1d(np.arange(labels.shape[1]), self.rows)
         return rows, dict(zip(self.tasks, labels[:, rows], strict=True))
 
-    def vectors(
-        self, windows_s: Sequence[float], rows: NDArray[np.int64], names: Sequence[str]
-    ) -> NDArray[np.float64]:
+    def vectors(self, windows_s, rows, names):
         """(windows, m, features * samples) vectors of some rows of the pool."""
         columns = np.concatenate([self.columns[name] for name in names])
         return np.stack(
             [self.pool[POINTS_S.index(w)][rows[:, None], columns] for w in windows_s]
         )
 
-    def features(
-        self,
-        window_s: float = WINDOW_S,
-        samples: int = SAMPLES,
-        names: Sequence[str] | None = None,
-    ) -> NDArray[np.float64]:
+    def features(self, window_s=WINDOW_S, samples=SAMPLES, names=None):
         """(n, features * samples) vectors at one of `POINTS_S`."""
-        return self.vectors(
-            [window_s], self.rows, self.names if names is None else names
-        )[0]
+        return self.vectors([window_s], self.rows, names or self.names)[0]
 
 
-def simulated(seed: int) -> tuple[DataSet, NDArray[np.float64]]:
+def simulated(seed):
     """A batch's trials without their frames, and their vectors (windows, n, p)."""
-    names = [
-        name for each in candidates({}, joints=True, quick=True) for name in each.sets
-    ]
+    tried = candidates({}, joints=True, quick=True)
+    names = [name for candidate in tried for name in candidate.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(replace(scenes.load(SCENE, count=COUNT), seed=seed), folder)
         dataset = load_trials([folder], features=expand(names), horizon_s=POINTS_S[-1])
     trials = []
     for trial in dataset.trials:
-        full = trial.recording
-        ends = replace(
-            full, t=full.t[[0, -1]], frames=full.frames[[0, -1]], joints=None
-        )
-        trials.append(replace(trial, recording=ends))
+        ends = part(trial.recording, slice(None, None, len(trial.recording.t) - 1))
+        trials.append(replace(trial, recording=replace(ends, joints=None)))
     X = np.stack([dataset.features(window) for window in POINTS_S])
     return replace(dataset, trials=tuple(trials)), X
 
 
-def judged(
-    drawn: DrawnSet, labels: NDArray[np.str_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def judged(drawn, labels):
     """Fit a data set, and judge its promises on the trials that were not drawn.
 
     Args:
@@ -138,15 +116,12 @@ def judged(
         labels: (tasks, trials) of the pool.
 
     Returns:
-        (tasks, 1 + errors, 4) certified error, share wrong, promised and realised mean
-        seconds, NaN where the request is refused; the first request is the smallest
-        error that is certified. (tasks, `SHOWN`, 5) window, accuracy, its interval and
-        the realised accuracy of each point of the front. (tasks, 5) of `trust` at the
-        full window.
+        Rows of `certificates`, of `shown` and of `trust` at the full window, for each
+        task.
     """
     others, y = drawn.others(labels)
-    points: dict[float, dict[str, Chosen]] = {}
-    right: dict[float, dict[str, float]] = {}
+    points = {}
+    right = {}
     for window in POINTS_S:
         decided = POINTS_S if window == WINDOW_S else ()
         fitted = fit(
@@ -155,172 +130,150 @@ def judged(
         vectors = drawn.vectors([window], others, fitted.dataset.names)
         answered = answers([fitted.classifier], vectors)
         points[window] = fitted.chosen
-        right[window] = {
-            task: float((answered[task][0][0] == y[task]).mean()) for task in y
-        }
+        for task in y:
+            right[task, window] = (answered[task][0][0] == y[task]).mean()
     model = fitted.sequential
-    seconds = np.array(POINTS_S)
-    assert model is not None
-    outcomes = np.full((len(y), 1 + len(ERRORS), 4), np.nan)
     new = drawn.vectors(POINTS_S, others, fitted.dataset.names)
     hits, confidences, courses = model.judged(new, y)
     unknown = unlike(model.novelty_, model.space_.scores(new))[-1]
-    doubts = [trust(hits[task][-1], confidences[task][-1], unknown) for task in y]
-    for task, out in zip(y, outcomes, strict=True):
-        stopping = model.stopping_[task]
-        for place, error in zip(out, (stopping.smallest_error, *ERRORS), strict=True):
-            rule = stopping.rule(error)
-            if rule is not None:
-                at, wrong = courses[task].under(rule)
-                place[:] = error, wrong.mean(), rule.mean_s, seconds[at].mean()
+    certified = []
     fronts = []
+    trusted = []
     for task in y:
-        front = ParetoFront.of(points, task)
-        full = front.of({WINDOW_S: points[WINDOW_S]}, task).points
-        for point in (*map(front.pick, NAMES), *full):
-            realised = right[point.window_s][task]
-            fronts.append(
-                (point.window_s, point.accuracy, point.low, point.high, realised)
-            )
-    return outcomes, np.array(fronts).reshape(len(y), len(SHOWN), 5), np.array(doubts)
+        certified += certificates(task, model.stopping_[task], courses[task])
+        fronts += shown(task, points, right)
+        doubts = trust(hits[task][-1], confidences[task][-1], unknown)
+        trusted.append({"task": task, **doubts})
+    return certified, fronts, trusted
 
 
-def trust(
-    right: NDArray[np.bool_],
-    confidence: NDArray[np.float64],
-    unknown: NDArray[np.bool_],
-) -> tuple[float, ...]:
+def certificates(task, stopping, course):
+    """A row for each request: the certified error, the share wrong, and the promised
+    and the realised mean seconds, which are missing where the request is refused. The
+    first request is the smallest error that is certified."""
+    asked = {"the smallest": stopping.smallest_error}
+    asked |= {f"{error:g}": error for error in ERRORS}
+    for name, error in asked.items():
+        row = {"task": task, "asked": name, "error": error}
+        row |= dict.fromkeys(("wrong", "promised", "realised"), np.nan)
+        rule = stopping.rule(error)
+        if rule is not None:
+            at, wrong = course.under(rule)
+            row["wrong"] = wrong.mean()
+            row["promised"] = rule.mean_s
+            row["realised"] = np.take(POINTS_S, at).mean()
+        yield row
+
+
+def shown(task, points, right):
+    """A row for each point of the front and for the export: its window, its accuracy,
+    the ends of its interval, and the realised accuracy."""
+    front = ParetoFront.of(points, task)
+    export = front.of({WINDOW_S: points[WINDOW_S]}, task).points
+    picked = [*map(front.pick, NAMES), *export]
+    for name, point in zip((*NAMES, "export"), picked, strict=True):
+        realised = right[task, point.window_s]
+        yield {"task": task, "front": name, **asdict(point), "realised": realised}
+
+
+def trust(right, confidence, unknown):
     """Of new trials of known objects (m,): their mean confidence, the share that is
     right, the expected calibration error in ten ranges, the Brier score, and the share
     that counts as unknown."""
     ranges = np.minimum((confidence * BINS).astype(int), BINS - 1)
     gaps = np.bincount(ranges, confidence - right)
-    return (
-        float(confidence.mean()),
-        float(right.mean()),
-        float(np.abs(gaps).sum() / len(right)),
-        float(((confidence - right) ** 2).mean()),
-        float(unknown.mean()),
-    )
-
-
-def run(arguments: argparse.Namespace) -> int:
-    """Simulate, fit, count; 1 where a promise is broken more often than chance
-    explains."""
-
-    def work(
-        function: Callable[..., Any], cases: Sequence[Any], what: str
-    ) -> list[Any]:
-        done = Parallel(n_jobs=arguments.jobs, return_as="generator")(
-            delayed(function)(*case) for case in cases
-        )
-        return list(bar(done, total=len(cases), desc=what))
-
-    seeds = np.random.SeedSequence(arguments.seed).generate_state(SEEDS).tolist()
-    batches = work(simulated, [(seed,) for seed in seeds], "batches of trials")
-    trials = np.array(
-        [trial for dataset, _ in batches for trial in dataset.trials], dtype=object
-    )
-    X = np.concatenate([x for _, x in batches], axis=1)
-    first = batches[0][0]
-    y = np.array([[trial.labels[task] for trial in trials] for task in first.tasks])
-    rng = np.random.default_rng(arguments.seed)
-    ends = np.cumsum(first.widths())
-    columns = dict(
-        zip(first.names, np.split(np.arange(ends[-1]), ends[:-1]), strict=True)
-    )
-    cases = []
-    for _ in range(arguments.sets):
-        rows = np.sort(rng.permutation(len(trials))[: arguments.trials])
-        drawn = {**vars(first), "trials": tuple(trials[rows])}
-        cases.append((DrawnSet(**drawn, rows=rows, pool=X, columns=columns), y))
-    results = work(judged, cases, "data sets")
-    outcomes, fronts, doubts = map(np.array, zip(*results, strict=True))
-    return int(report(first.tasks, outcomes, fronts, doubts) > 0)
-
-
-def report(
-    tasks: Sequence[str],
-    outcomes: NDArray[np.float64],
-    fronts: NDArray[np.float64],
-    doubts: NDArray[np.float64],
-) -> int:
-    """Print and write what `judged` gave; the number of promises broken too often."""
-    certified = []
-    shown = []
-    failed = 0
-    for task, of_task in zip(tasks, outcomes.swapaxes(0, 1), strict=True):
-        names = ("the smallest", *(f"{error:g}" for error in ERRORS))
-        for asked, rows in zip(names, of_task.swapaxes(0, 1), strict=True):
-            row = certificate(rows)
-            failed += row["above"] > binom.ppf(0.99, len(rows), RISK)
-            certified.append({"task": task, "asked": asked, **row})
-    for task, of_task in zip(tasks, fronts.swapaxes(0, 1), strict=True):
-        for name, rows in zip(SHOWN, of_task.swapaxes(0, 1), strict=True):
-            row = interval(rows)
-            outside = row["below the interval"] + row["above it"]
-            failed += outside > binom.ppf(0.99, len(rows), OUTSIDE)
-            shown.append({"task": task, "front": name, **row})
-    trusted = []
-    for task, rows in zip(tasks, doubts.swapaxes(0, 1), strict=True):
-        confidence, right, error, brier, flagged = rows.T
-        low, high = np.quantile(flagged, (0.1, 0.9))
-        trusted.append(
-            {
-                "task": task,
-                "mean confidence": f"{confidence.mean():.3f}",
-                "right": f"{right.mean():.3f}",
-                "calibration error": f"{error.mean():.3f}",
-                "Brier score": f"{brier.mean():.3f}",
-                "flagged unknown": f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})",
-            }
-        )
-    tables.write("risk", [certified, shown, trusted])
-    return failed
-
-
-def certificate(rows: NDArray[np.float64]) -> dict[str, Any]:
-    """How often a requested error (sets, 4) is certified, exceeded and late."""
-    able = rows[~np.isnan(rows[:, 1])]
-    row = {"sets": len(rows), "certified": len(able)}
-    row["above"] = int((able[:, 1] > able[:, 0]).sum())
-    row |= {"wrong": "", "promised, s": "", "realised, s": ""}
-    if len(able):
-        _, wrong, promised_s, mean_s = able.mean(axis=0)
-        row["wrong"] = f"{wrong:.1%}"
-        row["promised, s"] = f"{promised_s:.2f}"
-        row["realised, s"] = f"{mean_s:.2f}"
-    row["late"] = int((able[:, 3] > able[:, 2] + LATE_S).sum())
-    return row
-
-
-def interval(rows: NDArray[np.float64]) -> dict[str, Any]:
-    """How often the accuracy lies outside the interval of a point of the front."""
-    window, accuracy, low, high, realised = rows.T
     return {
-        "window, s": f"{window.mean():.2f}",
-        "shown": f"{accuracy.mean():.1%}",
-        "realised": f"{realised.mean():.1%}",
-        "below the interval": int((realised < low).sum()),
-        "above it": int((realised > high).sum()),
+        "mean confidence": confidence.mean(),
+        "right": right.mean(),
+        "calibration error": np.abs(gaps).sum() / len(right),
+        "Brier score": ((confidence - right) ** 2).mean(),
+        "flagged unknown": unknown.mean(),
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    top = argparse.ArgumentParser(prog="tests.bench.risk", description=__doc__)
-    count = within(int, 1, 1e5)
-    top.add_argument(
-        "--sets", type=count, default=140, help="data sets drawn (%(default)s)"
-    )
-    top.add_argument(
-        "--trials", type=count, default=140, help="trials of each (%(default)s)"
-    )
-    top.add_argument("--seed", type=int, default=0)
-    top.add_argument("--jobs", type=count, default=2, help="processes (%(default)s)")
-    top.set_defaults(run=run)
-    return dispatch(top, argv)
+def measure(sets, trials, seed, jobs):
+    """Simulate, fit, count; 1 where a promise is broken more often than chance
+    explains."""
+    workers = Workers(jobs)
+    seeds = np.random.SeedSequence(seed).generate_state(SEEDS).tolist()
+    batches = workers.map("batches of trials", simulated, [(s,) for s in seeds])
+    pool = np.array([t for batch, _ in batches for t in batch.trials], dtype=object)
+    X = np.concatenate([vectors for _, vectors in batches], axis=1)
+    first = batches[0][0]
+    y = np.array([[trial.labels[task] for trial in pool] for task in first.tasks])
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(first.widths())
+    parts = np.split(np.arange(ends[-1]), ends[:-1])
+    columns = dict(zip(first.names, parts, strict=True))
+    cases = []
+    for _ in range(sets):
+        rows = np.sort(rng.permutation(len(pool))[:trials])
+        fields = {**vars(first), "trials": tuple(pool[rows])}
+        cases.append((DrawnSet(**fields, rows=rows, pool=X, columns=columns), y))
+    results = workers.map("data sets", judged, cases)
+    return int(report(*map(chain.from_iterable, zip(*results, strict=True))) > 0)
+
+
+def report(certified, fronts, trusted):
+    """Print and write the rows of `judged`, of all data sets; the number of promises
+    broken too often."""
+    written = {"certified": [], "fronts": [], "trusted": []}
+    failed = 0
+    for (task, asked), rows in grouped(certified, ["task", "asked"]):
+        row = certificate(rows)
+        failed += row["above"] > binom.ppf(0.99, len(rows), RISK)
+        written["certified"].append({"task": task, "asked": asked, **row})
+    for (task, name), rows in grouped(fronts, ["task", "front"]):
+        row = interval(rows)
+        outside = row["below the interval"] + row["above it"]
+        failed += outside > binom.ppf(0.99, len(rows), OUTSIDE)
+        written["fronts"].append({"task": task, "front": name, **row})
+    for (task,), rows in grouped(trusted, ["task"]):
+        means = rows.drop(columns="task").mean()
+        row = {"task": task, **{name: f"{mean:.3f}" for name, mean in means.items()}}
+        flagged = rows["flagged unknown"]
+        low, high = flagged.quantile((0.1, 0.9))
+        row[flagged.name] = f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})"
+        written["trusted"].append(row)
+    tables.write("risk", list(written.values()))
+    return failed
+
+
+def grouped(rows, keys):
+    """The rows of each group, in the order in which the groups first come."""
+    return pd.DataFrame(rows).groupby(keys, sort=False)
+
+
+def certificate(rows):
+    """How often a requested error is certified, exceeded and late."""
+    able = rows.dropna()
+    row = {"sets": len(rows), "certified": len(able)}
+    row["above"] = int((able["wrong"] > able["error"]).sum())
+    shown = {"wrong": ".1%", "promised": ".2f", "realised": ".2f"}
+    for name, form in shown.items():
+        column = name if name == "wrong" else f"{name}, s"
+        row[column] = format(able[name].mean(), form) if len(able) else ""
+    row["late"] = int((able["realised"] > able["promised"] + LATE_S).sum())
+    return row
+
+
+def interval(rows):
+    """How often the accuracy lies outside the interval of a point of the front."""
+    return {
+        "window, s": f"{rows['window_s'].mean():.2f}",
+        "shown": f"{rows['accuracy'].mean():.1%}",
+        "realised": f"{rows['realised'].mean():.1%}",
+        "below the interval": int((rows["realised"] < rows["low"]).sum()),
+        "above it": int((rows["realised"] > rows["high"]).sum()),
+    }
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--sets", 140, "data sets drawn"),
+        ("--trials", 140, "trials of each"),
+        ("--seed", 0, "of the trials and the sets"),
+        ("--jobs", 2, "processes"),
+    )

@@ -7,23 +7,15 @@ tangential forces are those of its own contacts.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Sequence
-from itertools import cycle, islice
 from pathlib import Path
 
-from joblib import Parallel, cpu_count, delayed
-
-from edge.cli import dispatch
-from edge.commands.options import within
 from edge.model.model import Model
 from edge.tools.replay import Summary, decide
 from export.api import save
 from tests.bench import tables
-from tests.bench.transfer import HABITS, TASKS, touch_object
+from tests.bench.program import start
+from tests.bench.transfer import judged_tasks, touches
 from train.fitting import fit
-from train.progress import bar
 from train.simulate import run, scene
 
 SCENE = tables.ROOT / "train" / "scenes" / "household_shear.toml"
@@ -33,7 +25,7 @@ CHOICES = {
 }
 
 
-def models(out: Path, jobs: int) -> dict[str, Model]:
+def models(out, jobs):
     """The two models, fitted on the same simulated touches."""
     data = out / "simulated"
     run.write(scene.load(SCENE), data, jobs=jobs)
@@ -45,47 +37,35 @@ def models(out: Path, jobs: int) -> dict[str, Model]:
     return fitted
 
 
-def measure(arguments: argparse.Namespace) -> int:
+def measure(seeds, trials, jobs, out):
     """Fit, simulate the other engine's touches, and write the table."""
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    both = models(arguments.out, arguments.jobs)
-    habits = list(islice(cycle(HABITS), arguments.trials // 2))
+    out.mkdir(parents=True, exist_ok=True)
+    both = models(out, jobs)
     rows = []
-    for seed in range(1, arguments.seeds + 1):
-        touches = Parallel(n_jobs=cpu_count(), return_as="generator")(
-            delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
-        )
-        shown = bar(touches, total=len(habits), unit=" objects", desc="MuJoCo")
-        recordings = [recording for pair in shown for recording in pair]
+    for seed in range(1, seeds + 1):
+        recordings = [
+            recording for _, pair in touches(seed, trials) for recording in pair
+        ]
         for name, model in both.items():
-            tasks = {t: task for t, task in model.info.tasks.items() if t in TASKS}
-            summary = Summary(tasks)
+            summary = Summary(judged_tasks(model))
             for number, recording in enumerate(recordings):
                 events = decide(model, recording, f"touch {number}")
                 summary.add(recording.labels, events)
-            row: dict[str, object] = {"MuJoCo seed": seed, "features": name}
+            row = {"MuJoCo seed": seed, "features": name}
             row["trials"] = summary.recordings
-            for task in tasks:
+            for task in judged_tasks(model):
                 right, count = summary.right(task)
                 row[f"{task} right, %"] = f"{100.0 * right / count:.1f}"
             rows.append(row)
     tables.write("shear_transfer", [rows], "make shear-transfer")
-    return 0
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    top = argparse.ArgumentParser(
-        prog="tests.bench.shear_transfer", description=__doc__.split("\n\n")[0]
-    )
-    count = within(int, 1, 1000)
-    top.add_argument("--seeds", type=count, default=3, help="test sets (%(default)s)")
-    top.add_argument("--trials", type=count, default=96, help="of each (%(default)s)")
-    top.add_argument("--jobs", type=count, default=2, help="processes (%(default)s)")
-    top.add_argument("--out", type=Path, default=Path("build/shear_transfer"))
-    top.set_defaults(run=measure)
-    return dispatch(top, argv)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--seeds", 3, "test sets"),
+        ("--trials", 96, "of each"),
+        ("--jobs", 2, "processes"),
+        ("--out", Path("build/shear_transfer"), "folder"),
+    )

@@ -13,9 +13,6 @@ on touches that are not shifted.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,14 +21,14 @@ import numpy as np
 from edge.classifier import Classifier
 from edge.events import Decided
 from edge.model.model import Model
-from edge.recording import Recording
 from tests.bench import tables
+from tests.bench.program import start
+from train.parts import part
 from train.progress import bar
 from train.simulate import scene as scenes
 from train.simulate.run import simulate
 
-ROOT = Path(__file__).parents[2]
-SCENE = ROOT / "train" / "scenes" / "cody18.toml"
+SCENE = tables.ROOT / "train" / "scenes" / "cody18.toml"
 FRESH_SEED = 77
 ENOUGH = 0.6
 """Share of a shift's touches that are in doubt, at the least."""
@@ -39,67 +36,55 @@ WORSE = 0.05
 """By so much the answers without a doubt may be worse than those on usual touches."""
 UNSURE = 0.5
 SURE = 0.95
-Shift = Callable[[Recording], Recording]
 
 
-def counts(change: Callable[[np.ndarray], np.ndarray]) -> Shift:
+def counts(change):
     """A change of the counts (frames, rows, cols), which stay within 16 bits."""
 
-    def shift(recording: Recording) -> Recording:
+    def shift(recording):
         changed = np.rint(change(recording.frames.astype(np.float64)))
         return replace(recording, frames=np.clip(changed, 0, 65535).astype(np.uint16))
 
     return shift
 
 
-def joints(change: Callable[[np.ndarray], np.ndarray]) -> Shift:
+def joints(change):
     """A change of the joint angles (frames, dof)."""
     return lambda recording: replace(recording, joints=change(recording.joints))
 
 
-def half_dead(frames: np.ndarray) -> np.ndarray:
+def half_dead(frames):
     alive = np.random.default_rng(5).random(frames.shape[1:]) < 0.5
     return frames * alive
 
 
-def stuck(frames: np.ndarray) -> np.ndarray:
-    frames = frames.copy()
+def stuck(frames):
     frames[:, 3, 5] = 2000.0
     return frames
 
 
-def late(recording: Recording) -> Recording:
-    """Two of three frames are lost."""
-    kept = slice(None, None, 3)
-    return replace(
-        recording,
-        t=recording.t[kept],
-        frames=recording.frames[kept],
-        joints=recording.joints[kept],
-    )
+def touched_from(recording):
+    """The tenth frame after the first with a taxel above the onset."""
+    felt = recording.frames.max(axis=(1, 2)) > recording.layout.onset
+    return int(felt.argmax()) + 10
 
 
-def touched_from(recording: Recording) -> int:
-    """The first frame with a taxel above the onset."""
-    return int((recording.frames.max(axis=(1, 2)) > recording.layout.onset).argmax())
-
-
-def paused(recording: Recording) -> Recording:
+def paused(recording):
     """A quarter of a second without frames, a tenth after the touch began."""
     t = recording.t.copy()
-    t[touched_from(recording) + 10 :] += 0.25
+    t[touched_from(recording) :] += 0.25
     return replace(recording, t=t)
 
 
-def frozen(recording: Recording) -> Recording:
+def frozen(recording):
     """The frames of the touch repeat its tenth."""
     frames = recording.frames.copy()
-    first = touched_from(recording) + 10
-    frames[first:] = frames[first]
+    tenth = touched_from(recording)
+    frames[tenth:] = frames[tenth]
     return replace(recording, frames=frames)
 
 
-def slower(recording: Recording) -> Recording:
+def slower(recording):
     """All at half of the speed, at the same rate."""
     t = recording.t
     times = np.linspace(t[0], t[-1], 2 * len(t) - 1)
@@ -112,9 +97,9 @@ def slower(recording: Recording) -> Recording:
     )
 
 
-SHIFTS: Mapping[str, Shift] = {
+SHIFTS = {
     "none": lambda recording: recording,
-    "two of three frames lost": late,
+    "two of three frames lost": lambda r: part(r, slice(None, None, 3)),
     "half of the taxels dead": counts(half_dead),
     "counts doubled": counts(lambda frames: 2.0 * frames),
     "counts tenfold": counts(lambda frames: 10.0 * frames),
@@ -135,84 +120,87 @@ SHIFTS: Mapping[str, Shift] = {
 
 
 @dataclass(frozen=True)
-class Answer:
-    """An answer to a task, judged.
+class Answers:
+    """The answers to a task.
 
     Attributes:
-        right: the label is the recording's.
-        doubtful: it has a flag, or is less likely right than wrong.
-        sure: it has no flag and a high confidence.
+        right: (n,) whether the label is the recording's.
+        doubtful: (n,) whether there is a flag, or the label is less likely right than
+            wrong.
+        sure: (n,) whether there is no flag and a high confidence.
     """
 
-    right: bool
-    doubtful: bool
-    sure: bool
+    right: np.ndarray
+    doubtful: np.ndarray
+    sure: np.ndarray
+
+    @property
+    def trusted(self):
+        """The share of the answers without a doubt that are right; 0 of none."""
+        plain = self.right[~self.doubtful]
+        return plain.mean() if len(plain) else 0.0
 
 
-def answers(
-    model: Model, recordings: Sequence[Recording], shift: Shift
-) -> dict[str, list[Answer]]:
+def answers(model, recordings, shift):
     """{task: the answers to shifted touches}; a touch that is not felt has none."""
-    judged: dict[str, list[Answer]] = {task: [] for task in model.info.tasks}
+    events = {task: [] for task in model.info.tasks}
     classifier = Classifier(model)
     for recording in recordings:
         for event in classifier.classify(shift(recording)):
             if isinstance(event, Decided):
-                likely = event.confidence or 0.0
-                doubtful = bool(event.flags) or likely < UNSURE
-                judged[event.task].append(
-                    Answer(
-                        right=event.label == recording.labels[event.task],
-                        doubtful=doubtful,
-                        sure=not doubtful and likely >= SURE,
-                    )
-                )
+                right = event.label == recording.labels[event.task]
+                events[event.task].append((right, event))
+    judged = {}
+    for task, pairs in events.items():
+        likely = np.array([event.confidence or 0.0 for _, event in pairs])
+        flagged = np.array([bool(event.flags) for _, event in pairs], dtype=bool)
+        judged[task] = Answers(
+            right=np.array([right for right, _ in pairs], dtype=bool),
+            doubtful=flagged | (likely < UNSURE),
+            sure=~flagged & (likely >= SURE),
+        )
     return judged
 
 
-def share(facts: Sequence[bool]) -> float:
-    """The share that is true; 0 of none."""
-    return sum(facts) / len(facts) if facts else 0.0
-
-
-def row(
-    name: str, task: str, judged: Sequence[Answer], usual: float
-) -> dict[str, object]:
+def row(name, task, judged, usual):
     """The row of a shift and a task, beside the accuracy on usual touches."""
-    plain = [answer.right for answer in judged if not answer.doubtful]
-    doubt = share([answer.doubtful for answer in judged])
-    trusted = share(plain)
-    held = doubt >= ENOUGH or trusted >= usual - WORSE
+    count = len(judged.right)
+    right, doubt = (
+        facts.sum() / max(count, 1) for facts in (judged.right, judged.doubtful)
+    )
+    held = doubt >= ENOUGH or judged.trusted >= usual - WORSE
     return {
         "shift": name,
         "task": task,
-        "answers": len(judged),
-        "right": f"{share([answer.right for answer in judged]):.0%}",
+        "answers": count,
+        "right": f"{right:.0%}",
         "in doubt": f"{doubt:.0%}",
-        "right without doubt": f"{trusted:.0%}" if plain else "-",
-        "wrong and sure": sum(a.sure and not a.right for a in judged),
+        "right without doubt": "-"
+        if judged.doubtful.all()
+        else f"{judged.trusted:.0%}",
+        "wrong and sure": (judged.sure & ~judged.right).sum(),
         "held": "yes" if held else "no",
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def measure(model, trials):
     """Measure, and write the table."""
-    parser = argparse.ArgumentParser(prog="shifts", description=__doc__)
-    parser.add_argument("--model", type=Path, required=True, help="model.onnx")
-    parser.add_argument("--trials", type=int, default=5, help="of each object")
-    arguments = parser.parse_args(argv)
-    model = Model(arguments.model)
-    scene = scenes.load(SCENE, seed=FRESH_SEED, count=arguments.trials)
+    loaded = Model(model)
+    scene = scenes.load(SCENE, seed=FRESH_SEED, count=trials)
     fresh = [recording for _, recording in simulate(scene)]
     rows = []
-    usual: dict[str, float] = {}
+    usual = {}
     for name, shift in bar(SHIFTS.items(), desc="shifts", total=len(SHIFTS)):
-        for task, judged in answers(model, fresh, shift).items():
-            accuracy = share([a.right for a in judged if not a.doubtful])
-            rows.append(row(name, task, judged, usual.setdefault(task, accuracy)))
+        for task, judged in answers(loaded, fresh, shift).items():
+            accuracy = usual.setdefault(task, judged.trusted)
+            rows.append(row(name, task, judged, accuracy))
     tables.write("shifts", [rows], "make shifts")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--model", Path, "model.onnx"),
+        ("--trials", 5, "of each object"),
+    )

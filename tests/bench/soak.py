@@ -11,12 +11,10 @@ at 15 Hz takes about an hour.
 
 from __future__ import annotations
 
-import argparse
 import errno
 import gc
 import os
 import socket
-import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,6 +32,7 @@ from edge.skin.loop import Loop
 from edge.touch.frame import Frame
 from edge.touch.track import MAX_CONTACTS
 from tests.bench import tables
+from tests.bench.program import start
 from tests.faulty import Fault, faulty_skin
 from train.progress import bar
 from train.touch_map import TouchMap
@@ -54,7 +53,7 @@ class Soaked:
     """Contacts on the map."""
 
     @property
-    def flat(self) -> bool:
+    def flat(self):
         """Whether memory and descriptors stay, and nothing is lost."""
         early = self.rows[max(len(self.rows) // 10 - 1, 0)]
         grown_kb = max(row["kB"] for row in self.rows) - early["kB"]
@@ -64,7 +63,7 @@ class Soaked:
         return self.lost == 0 and self.placed > 0
 
 
-def soak(minutes: float, every: float, rate_hz: float) -> Soaked:
+def soak(minutes, every, rate_hz):
     """Run the loop for so many virtual minutes, with a row for each `every` of them."""
     model = Model(demo.MODEL)
     process = psutil.Process()
@@ -75,7 +74,7 @@ def soak(minutes: float, every: float, rate_hz: float) -> Soaked:
     file = skinfile.load(skinfile.shipped("cody"))
     file = replace(file, reading=replace(file.reading, rate_hz=rate_hz))
     frames_a_row = round(60.0 * rate_hz * every)
-    rows: list[dict[str, float]] = []
+    rows = []
     written = 0
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -113,20 +112,19 @@ def soak(minutes: float, every: float, rate_hz: float) -> Soaked:
     return Soaked(rows, lost, placed)
 
 
-def main() -> int:
+def measure(minutes, every, rate):
     """Run and print; 1 where something was not flat."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument(
-        "--every", type=float, default=1.0, help="minutes between two rows"
-    )
-    parser.add_argument("--rate", type=float, default=100.0, help="frames a second")
-    arguments = parser.parse_args()
-    soaked = soak(arguments.minutes, arguments.every, arguments.rate)
+    soaked = soak(minutes, every, rate)
     tables.write("soak", [soaked.rows])
     print(f"{soaked.placed} contacts on the map")
     return 0 if soaked.flat else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--minutes", 10.0, "of virtual time"),
+        ("--every", 1.0, "minutes between two rows"),
+        ("--rate", 100.0, "frames a second"),
+    )

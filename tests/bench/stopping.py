@@ -22,19 +22,12 @@ trust by answers to whole series.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Callable, Sequence
-from typing import Any
-
 import numpy as np
 from aeon.classification.early_classification import (
     TEASER,
     ProbabilityThresholdEarlyClassifier,
 )
 from aeon.classification.sklearn import SklearnClassifierWrapper
-from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.kernel_ridge import KernelRidge
@@ -43,14 +36,15 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from edge.cli import dispatch
 from edge.model.stopping import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
 from tests.bench import tables
+from tests.bench.program import start
 from train.dataset import read
 from train.evaluate import finest, stratified_folds
 from train.feature_sets import expand
-from train.rules import NEVER, THRESHOLDS, Course
+from train.report.work import Workers
+from train.rules import NEVER, THRESHOLDS
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, compare_stopping
@@ -66,58 +60,41 @@ SETS = ("paper contact", "contact joints", "contact moments joints")
 NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
 MARGINS = np.linspace(0.0, 8.0, 33)
 """Leads of the log probabilities, for the ratio test."""
-Curve = list[tuple[float, float]]
-"""(mean seconds, share wrong) at each threshold or price."""
 
 
-def decided(stops: NDArray[np.int64], right: NDArray[np.bool_]) -> tuple[float, float]:
+# A curve is [(mean seconds, share wrong)] at each threshold or price.
+
+
+def decided(stops, right):
     """(mean seconds, share wrong) of trials that are decided at the points `stops`
     (n,)."""
-    return float(SECONDS[stops].mean()), 1.0 - float(
-        right[stops, np.arange(len(stops))].mean()
-    )
+    hits = right[stops, np.arange(len(stops))]
+    return SECONDS[stops].mean(), 1.0 - hits.mean()
 
 
-def extra_trees(
-    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
-) -> tuple[Curve, Curve]:
+def once_certain(certainty, right, limits):
+    """The curve of deciding at the first point (points, n) that passes a limit, or at
+    the last point."""
+    certainty[-1] = np.inf
+    return [decided((certainty >= limit).argmax(axis=0), right) for limit in limits]
+
+
+def extra_trees(X, labels, folds):
     """Extra trees at each decision point, X (points, n, p), that decide when sure, and
-    by the ratio test."""
+    by the ratio test, which waits until the evidence for a class leads by a margin."""
     model = ExtraTreesClassifier(random_state=0)
-    split = PredefinedSplit(folds)
-    shares = np.stack(
-        [
-            cross_val_predict(model, x, labels, cv=split, method="predict_proba")
-            for x in X
-        ]
-    )
-    right = np.unique(labels)[shares.argmax(axis=2)] == labels
-    confidence = shares.max(axis=2)
-    confidence[-1] = 1.0
-    sure = [
-        decided((confidence >= limit).argmax(axis=0), right) for limit in THRESHOLDS
-    ]
-    return sure, ratio_test(shares, np.unique(labels, return_inverse=True)[1])
-
-
-def ratio_test(shares: NDArray[np.float64], truth: NDArray[np.int64]) -> Curve:
-    """Deciding once the evidence for a class leads by a margin.
-
-    Args:
-        shares: (points, n, classes) probabilities.
-        truth: (n,) classes.
-    """
+    options = {"cv": PredefinedSplit(folds), "method": "predict_proba"}
+    shares = np.stack([cross_val_predict(model, x, labels, **options) for x in X])
+    classes = np.unique(labels)
+    right = classes[shares.argmax(axis=2)] == labels
+    sure = once_certain(shares.max(axis=2), right, THRESHOLDS)
     evidence = np.log(np.maximum(shares, 1e-3)).cumsum(axis=0)
-    right = evidence.argmax(axis=2) == truth
-    ordered = np.sort(evidence, axis=2)
-    lead = ordered[..., -1] - ordered[..., -2]
-    lead[-1] = np.inf
-    return [decided((lead >= margin).argmax(axis=0), right) for margin in MARGINS]
+    right = classes[evidence.argmax(axis=2)] == labels
+    second, first = np.moveaxis(np.sort(evidence)[..., -2:], -1, 0)
+    return sure, once_certain(first - second, right, MARGINS)
 
 
-def halts(
-    known: NDArray[np.float64], new: NDArray[np.float64], waiting: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def halts(known, new, waiting):
     """(m,) the point at which CALIMERA decides: the first at which no later one is
     cheaper.
 
@@ -143,9 +120,7 @@ def halts(
     return at
 
 
-def calimera(
-    X: NDArray[np.float64], labels: NDArray[np.str_], folds: NDArray[np.int64]
-) -> Curve:
+def calimera(X, labels, folds):
     """CALIMERA at each decision point, X (points, n, p), a row for each of
     `WAITING`."""
     stops = np.empty((len(WAITING), len(labels)), dtype=np.int64)
@@ -167,9 +142,7 @@ def calimera(
     return [decided(at, right) for at in stops]
 
 
-def of_aeon(
-    make: Callable[..., Any], series: NDArray, labels: NDArray, folds: NDArray
-) -> tuple[float, float]:
+def of_aeon(make, series, labels, folds):
     """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames *
     features)."""
     trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
@@ -184,126 +157,104 @@ def of_aeon(
         stop, _, said, _ = model.get_state_info().T
         seconds[test] = looks[stop]
         right[test] = model.classes_[said] == labels[test]
-    return float(seconds.mean()), 1.0 - float(right.mean())
+    return seconds.mean(), 1.0 - right.mean()
 
 
-def peers(
-    by_set: Sequence[NDArray], series: NDArray, labels: NDArray, folds: NDArray
-) -> tuple[list[list[Curve]], dict[str, tuple[float, float]]]:
+def peers(by_set, series, labels, folds):
     """[extra trees, their ratio test, CALIMERA][set of features] curves on a task, and
     the points of aeon's rules."""
-    sure, ratios = zip(*(extra_trees(X, labels, folds) for X in by_set), strict=True)
-    ridges = [calimera(X, labels, folds) for X in by_set]
-    return [list(sure), list(ratios), ridges], {
-        name: of_aeon(make, series, labels, folds) for name, make in AEON.items()
-    }
+    curves = [
+        [*extra_trees(X, labels, folds), calimera(X, labels, folds)] for X in by_set
+    ]
+    points = {name: of_aeon(make, series, labels, folds) for name, make in AEON.items()}
+    return list(zip(*curves, strict=True)), points
 
 
-def at(rows: Curve, seconds: float) -> float:
-    """The percentage wrong at a mean time, interpolated; NaN before the soonest
-    decision."""
-    times, wrong = zip(*sorted(rows), strict=True)
-    return 100.0 * float(np.interp(seconds, times, wrong, left=np.nan))
+def at(curves, seconds):
+    """The least percentage wrong of some curves at a mean time, interpolated; NaN
+    before the soonest decision."""
+    percentages = []
+    for curve in curves:
+        times, wrong = zip(*sorted(curve), strict=True)
+        percentages.append(100.0 * np.interp(seconds, times, wrong, left=np.nan))
+    return np.fmin.reduce(percentages)
 
 
-def cell(percentage: float) -> str:
+def cell(percentage):
     """A percentage for a table; a dash where it is NaN."""
     return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
-def when_sure(course: Course) -> Curve:
-    """Stopping at each threshold."""
+def when_sure(course):
+    """The curve of our stopping, at each threshold."""
     curve = []
     for threshold in (NEVER, *THRESHOLDS.tolist()):
         stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1))
-        curve.append((float(SECONDS[stops].mean()), float(wrong.mean())))
+        curve.append((SECONDS[stops].mean(), wrong.mean()))
     return curve
 
 
-def run(arguments: argparse.Namespace) -> int:
+def measure(data, quick, jobs):
     """Measure; print and write the tables."""
-    dataset = followed(read(arguments.data), NAMES, quick=arguments.quick)
+    dataset = followed(read(data), NAMES, quick=quick)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
     by_set = []
     for sets in SETS:
         names = expand(sets.split())
-        by_set.append(
-            np.stack([dataset.features(s, SAMPLES, names) for s in DECISION_POINTS_S])
-        )
+        vectors = [dataset.features(s, SAMPLES, names) for s in DECISION_POINTS_S]
+        by_set.append(np.stack(vectors))
     frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
     paper = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES)
     n = len(folds)
     series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
-    compared = compare_stopping(
-        dataset, DECISION_POINTS_S, quick=arguments.quick, jobs=arguments.jobs
-    )
-    rivals = Parallel(n_jobs=arguments.jobs)(
-        delayed(peers)(by_set, series, y[task], folds) for task in compared
-    )
-    at_each_time = []
-    at_its_own_time = []
-    certified = []
+    compared = compare_stopping(dataset, DECISION_POINTS_S, quick=quick, jobs=jobs)
+    cases = [(by_set, series, y[task], folds) for task in compared]
+    rivals = Workers(jobs).map("peers", peers, cases)
+    rows = {"at each time": [], "at its own time": [], "certified": []}
     for (task, ours), (curves, points) in zip(compared.items(), rivals, strict=True):
-        fixed = list(zip(DECISION_POINTS_S, 1.0 - ours.right.mean(axis=1), strict=True))
+        fixed = list(zip(SECONDS, 1.0 - ours.right.mean(axis=1), strict=True))
         sure = when_sure(ours.course)
         for seconds in DECISION_POINTS_S:
             row = {"task": task, "mean time, s": f"{seconds:.1f}"}
-            at_each_time.append(row | compare(fixed, sure, curves, seconds, n))
+            row |= compare(fixed, sure, curves, seconds, n)
+            rows["at each time"].append(row)
         for name, (seconds, wrong) in points.items():
             row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
             row["wrong, %"] = cell(100 * wrong)
-            row["when sure, at that time"] = cell(at(sure, seconds))
-            at_its_own_time.append(row)
+            row["when sure, at that time"] = cell(at([sure], seconds))
+            rows["at its own time"].append(row)
         for rule in ours.certified:
             row = {"task": task, "at most wrong": f"{rule.asked:g}"}
             row["certified in folds"] = f"{rule.folds} of {FOLDS}"
             row["wrong"] = f"{rule.wrong:.1%}"
             row["unknown"] = f"{rule.unknown:.1%}"
             row["mean time, s"] = f"{rule.mean_s:.2f}"
-            certified.append(row)
-    tables.write("stopping", [at_each_time, at_its_own_time, certified])
-    return 0
+            rows["certified"].append(row)
+    tables.write("stopping", list(rows.values()))
 
 
-def least(curves: Sequence[Curve], seconds: float) -> float:
-    """The least percentage wrong at a mean time; NaN before the soonest decision."""
-    percentages = [at(curve, seconds) for curve in curves]
-    known = [percentage for percentage in percentages if not np.isnan(percentage)]
-    return min(known, default=np.nan)
-
-
-def compare(
-    fixed: Curve, sure: Curve, curves: Sequence[Sequence[Curve]], seconds: float, n: int
-) -> dict[str, str]:
+def compare(fixed, sure, curves, seconds, n):
     """Percentages wrong at a mean time: fixed window, when sure, and the peers."""
-    window = at(fixed, seconds)
-    ours = at(sure, seconds)
-    trees, ratios, ridges = (least(of_sets, seconds) for of_sets in curves)
+    window = at([fixed], seconds)
+    ours = at([sure], seconds)
     error = np.sqrt((window * (100 - window) + ours * (100 - ours)) / n)
-    return {
+    names = ("extra trees", "their SPRT", "CALIMERA")
+    cells = {
         "fixed window, % wrong": cell(window),
         "when sure": cell(ours),
         "gain": "-" if np.isnan(error) else f"{window - ours:.1f} ± {error:.1f}",
-        "extra trees": cell(trees),
-        "their SPRT": cell(ratios),
-        "CALIMERA": cell(ridges),
     }
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    top = argparse.ArgumentParser(prog="tests.bench.stopping", description=__doc__)
-    top.add_argument(
-        "--data", nargs="+", required=True, metavar="REC", help=".npz or folders"
-    )
-    top.add_argument(
-        "--quick", action="store_true", help="the settings of a quick export"
-    )
-    top.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
-    top.set_defaults(run=run)
-    return dispatch(top, argv)
+    for name, of_sets in zip(names, curves, strict=True):
+        cells[name] = cell(at(of_sets, seconds))
+    return cells
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--data", list, ".npz recordings or folders"),
+        ("--quick", False, "the settings of a quick export"),
+        ("--jobs", 2, "processes"),
+    )

@@ -8,41 +8,34 @@ compares the figures in README.md and docs/recipes.md with them.
 import csv
 import os
 import platform
+import re
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "measured"
 
-Rows = Sequence[Mapping[str, object]]
-"""The rows of a table; the keys of the first one are the columns."""
 
-
-def markdown(rows: Rows) -> str:
-    """A table as Markdown, without a line break at its end."""
+def markdown(rows):
+    """Rows as a Markdown table without a line break at its end; the keys of the first
+    one are the columns."""
     columns = list(rows[0])
-    lines = [" | ".join(columns), " | ".join("---" for _ in columns)]
-    for row in rows:
-        lines.append(" | ".join(str(row[column]) for column in columns))
-    return "\n".join(f"| {line} |" for line in lines)
+    lines = [columns, ["---"] * len(columns)]
+    lines += [[row[column] for column in columns] for row in rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
-def processor() -> str:
+def processor():
     """The name of the processor, with the number of cores that may be used."""
-    name = platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text().splitlines():
-            if line.startswith("model name"):
-                name = line.partition(":")[2].strip()
-                break
-    return f"{name}, {os.cpu_count()} cores"
+    text = cpuinfo.read_text() if cpuinfo.exists() else ""
+    name = re.search(r"(?m)^model name\s*:\s*(.*\S)", text)
+    return f"{name[1] if name else platform.machine()}, {os.cpu_count()} cores"
 
 
-def commit() -> str:
+def commit():
     """The commit that is checked out, marked where a tracked file differs from it."""
     command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
     done = subprocess.run(
@@ -51,19 +44,7 @@ def commit() -> str:
     return done.stdout.strip() or "unknown"
 
 
-def head(command: str) -> str:
-    """The line above a table."""
-    today = datetime.now(UTC).date().isoformat()
-    return f"*`{command}`, commit {commit()}, {processor()}, {today}*"
-
-
-def rows_of(path: Path) -> Rows:
-    """The rows of a CSV file that a report wrote."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def write(name: str, tables: Sequence[Rows], command: str = "") -> None:
+def write(name, tables, command=""):
     """Print the tables and write them to docs/measured/NAME.md.
 
     Args:
@@ -76,15 +57,18 @@ def write(name: str, tables: Sequence[Rows], command: str = "") -> None:
     if not command:
         module = Path(sys.argv[0]).relative_to(ROOT).with_suffix("")
         command = " ".join(["python -m", ".".join(module.parts), *sys.argv[1:]])
+    today = f"{datetime.now(UTC):%Y-%m-%d}"
+    head = f"*`{command}`, commit {commit()}, {processor()}, {today}*"
     FOLDER.mkdir(exist_ok=True)
-    path = FOLDER / f"{name}.md"
-    path.write_text(f"{head(command)}\n\n{text}\n", encoding="utf-8")
+    (FOLDER / f"{name}.md").write_text(f"{head}\n\n{text}\n", encoding="utf-8")
 
 
-def main() -> None:
+def main():
     """Write the tables of a report: `python -m tests.bench.tables NAME COMMAND CSV...`."""
     name, command, *files = sys.argv[1:]
-    write(name, [rows_of(Path(file)) for file in files], command)
+    texts = [Path(file).read_text(encoding="utf-8") for file in files]
+    tables = [list(csv.DictReader(text.splitlines())) for text in texts]
+    write(name, tables, command)
 
 
 if __name__ == "__main__":

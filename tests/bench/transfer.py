@@ -9,23 +9,17 @@ them, and nothing may be tuned to one set of them; `--seed` makes another.
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
-from edge.cli import dispatch
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
-from edge.recording import Recording
 from edge.saving import save
 from edge.tools.replay import Summary, decide
 from tests.bench import tables
@@ -37,12 +31,13 @@ from tests.bench.mujoco_touch import (
     Touch,
     simulate,
 )
+from tests.bench.program import start
 from train.progress import bar
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
 ODD = "odd things"
-HABITS: dict[str, dict[str, float]] = {
+HABITS = {
     "as in the paper": {},
     "arm speed x 0.5": {"speed": 0.5},
     "arm speed x 1.5": {"speed": 1.5},
@@ -59,17 +54,12 @@ WINDOW_S = 1.2
 the paper."""
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(rng, low, high):
     """A draw, even in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def draw_body(
-    rng: np.random.Generator,
-    kinds: str,
-    mass_kg: tuple[float, float],
-    narrowest_m: float,
-) -> Thing:
+def draw_body(rng, kinds, mass_kg, narrowest_m):
     """The properties that all things have."""
     return Thing(
         kind=str(rng.choice(kinds.split())),
@@ -81,7 +71,7 @@ def draw_body(
     )
 
 
-def draw_object(rng: np.random.Generator) -> Thing:
+def draw_object(rng):
     """One object's properties, from other ranges than those of any scene in train/."""
     body = draw_body(rng, "box drum foam cushion plant bale", (0.25, 2.2), 0.06)
     soft = {"foam": (3e3, 18e3), "cushion": (1.2e3, 5e3), "bale": (5e3, 12e3)}
@@ -95,7 +85,7 @@ def draw_object(rng: np.random.Generator) -> Thing:
     )
 
 
-def draw_odd(rng: np.random.Generator) -> Thing:
+def draw_odd(rng):
     """A door, a drawer, a thick cloth over something light, or a person's arm."""
     body = draw_body(rng, "door drawer cloth limb", (1.0, 3.0), 0.1)
     between = partial(log_uniform, rng)
@@ -105,7 +95,7 @@ def draw_odd(rng: np.random.Generator) -> Thing:
         f'{rng.choice([-1, 1]) * between(0.3, 0.7)} 0" '
         f'frictionloss="{between(0.2, 1.5)}" damping="0.5"/>'
     )
-    changes: dict[str, dict[str, Any]] = {
+    changes = {
         "door": {"joint": hinge},
         "drawer": {"joint": slide, "mass_kg": between(1.0, 6.0)},
         "cloth": {"modulus_pa": between(1.5e3, 5e3), "thick_m": between(0.03, 0.06)},
@@ -119,9 +109,7 @@ def draw_odd(rng: np.random.Generator) -> Thing:
     return replace(body, **changes[body.kind])
 
 
-def draw_touch(
-    thing: Thing, fixed: bool, rng: np.random.Generator, habit: str
-) -> Touch:
+def draw_touch(thing, fixed, rng, habit):
     """One touch: how the object stands before the arm, how the arm begins, a habit's
     factors."""
     touch = Touch(
@@ -139,7 +127,7 @@ def draw_touch(
     return replace(touch, **{name: getattr(touch, name) * by for name, by in factors})
 
 
-def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
+def touch_object(index, seed, habit):
     """A touch of an object that is fixed, and one where it is free.
 
     Both are drawn again, with another object, where the free one did not move.
@@ -159,59 +147,60 @@ def touch_object(index: int, seed: int, habit: str) -> list[Recording]:
         attempt += 1
 
 
-def run(arguments: argparse.Namespace) -> int:
+def touches(seed, trials):
+    """The habit and the recordings of each of half as many objects."""
+    habits = list(islice(cycle(HABITS), trials // 2))
+    pairs = Parallel(n_jobs=cpu_count(), return_as="generator")(
+        delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
+    )
+    shown = bar(pairs, total=len(habits), unit=" objects", desc="MuJoCo")
+    return zip(habits, shown, strict=True)
+
+
+def judged_tasks(model):
+    """{task: what a model's metadata say of it} of those that the touches have."""
+    return {name: task for name, task in model.info.tasks.items() if name in TASKS}
+
+
+def measure(model, out, trials, seed):
     """Make the trials, save them in a folder for each habit, and print how the model
     decides them.
 
     The tables have right decisions by habit and in all, contacts called unknown, and
     each task's confusion. A contact without a decision counts as wrong.
     """
-    model = Model(arguments.model)
-    seed = arguments.seed
-    tasks = {name: task for name, task in model.info.tasks.items() if name in TASKS}
+    loaded = Model(model)
+    tasks = judged_tasks(loaded)
     summaries = {habit: Summary(tasks) for habit in (*HABITS, "all")}
     unknown = 0
-    habits = list(islice(cycle(HABITS), arguments.trials // 2))
-    touches = Parallel(n_jobs=cpu_count(), return_as="generator")(
-        delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
-    )
-    shown = bar(touches, total=len(habits), unit=" objects", desc="MuJoCo")
-    for i, (habit, recordings) in enumerate(zip(habits, shown, strict=True)):
-        folder = arguments.out / f"seed{seed}" / habit.replace(" ", "-")
+    for i, (habit, recordings) in enumerate(touches(seed, trials)):
+        folder = out / f"seed{seed}" / habit.replace(" ", "-")
         folder.mkdir(parents=True, exist_ok=True)
         for recording in recordings:
             labels = recording.labels
             path = folder / f"{labels['object']}-{i:02d}-{labels['mobility']}.npz"
             save(path, recording)
-            events = decide(model, recording, str(path))
+            events = decide(loaded, recording, str(path))
             unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
             for name in (habit, "all"):
                 summaries[name].add(labels, events)
     rows = []
     for name, summary in summaries.items():
-        row: dict[str, Any] = {"trials": name, "number": summary.recordings}
+        row = {"trials": name, "number": summary.recordings}
         for task in tasks:
             row[f"{task} right"] = summary.right(task)[0]
         rows.append(row)
     tables.write("transfer", [rows])
-    print(f"unknown: {unknown} of {2 * len(habits)}\n\n{summaries['all'].text()}")
-    return 0
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    top = argparse.ArgumentParser(
-        prog="tests.bench.transfer", description=__doc__.split("\n\n")[0]
-    )
-    top.add_argument("--model", type=Path, required=True)
-    top.add_argument("--out", type=Path, default=Path("build/transfer"))
-    top.add_argument(
-        "--trials", type=int, default=96, help="two of each object (%(default)s)"
-    )
-    top.add_argument("--seed", type=int, default=1)
-    top.set_defaults(run=run)
-    return dispatch(top, argv)
+    whole = summaries["all"]
+    print(f"unknown: {unknown} of {whole.recordings}\n\n{whole.text()}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(
+        measure,
+        __doc__,
+        ("--model", Path, "model.onnx"),
+        ("--out", Path("build/transfer"), "folder"),
+        ("--trials", 96, "two of each object"),
+        ("--seed", 1, "of the test set"),
+    )

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from string import Template
@@ -22,7 +21,7 @@ class Unavailable(Exception):
 
 
 @contextmanager
-def skipping() -> Iterator[None]:
+def skipping():
     """Skip the test where something is unavailable, but not in CI."""
     try:
         yield
@@ -32,7 +31,7 @@ def skipping() -> Iterator[None]:
         pytest.skip(str(error))
 
 
-def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
+def once(target, recipe, make):
     """Make a folder, unless it was made by the same recipe before; a failed one is not
     kept."""
     stamp = target / ".made-from"
@@ -47,7 +46,7 @@ def once(target: Path, recipe: str, make: Callable[[Path], None]) -> Path:
     return target
 
 
-def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
+def unpacked(target, architecture, packages):
     """A folder with packages and their dependencies; their installation scripts do not
     run.
 
@@ -55,7 +54,7 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
         Unavailable: apt cannot fetch them.
     """
 
-    def unpack(fresh: Path) -> None:
+    def unpack(fresh):
         apt = fresh.with_suffix(".apt")
         shutil.rmtree(apt, ignore_errors=True)
         for folder in ("lists/partial", "archives/partial"):
@@ -75,7 +74,7 @@ def unpacked(target: Path, architecture: str, packages: Sequence[str]) -> Path:
     return once(target, "\n".join((architecture, *packages)), unpack)
 
 
-def program(system: Path, name: str) -> list[str]:
+def program(system, name):
     """The command of a program among unpacked packages, with their loader and
     libraries."""
     loader = next(system.glob("lib*/ld-linux*"))
@@ -88,7 +87,7 @@ def program(system: Path, name: str) -> list[str]:
     ]
 
 
-def run(command: Sequence[str], hint: str = "") -> str:
+def run(command, hint=""):
     """The text that a command prints.
 
     Raises:

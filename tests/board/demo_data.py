@@ -39,7 +39,7 @@ are multiples of 8, as of a coarser converter: their noise is most of the files.
 encoder of 16 bits a turn has about so many steps a radian."""
 
 
-def main(folder: Path) -> None:
+def main(folder):
     """Write the files."""
     demo = CHECKOUT / "edge" / "demo"
     golden_file = CHECKOUT / "tests" / "golden" / "demo.npz"

@@ -15,7 +15,6 @@ import statistics
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -36,7 +35,7 @@ architecture."""
 TABLE = AARCH64 / "instructions.csv"
 
 
-def emulated_python(wheel: Path, counts: Path) -> list[str]:
+def emulated_python(wheel, counts):
     """The command of an emulated Python that has the wheel and its dependencies.
 
     Args:
@@ -55,7 +54,7 @@ def emulated_python(wheel: Path, counts: Path) -> list[str]:
     version = executable.name.removeprefix("python")
     constraints = CHECKOUT / "constraints.txt"
 
-    def install(site: Path) -> None:
+    def install(site):
         pip = [
             sys.executable,
             "-m",
@@ -168,7 +167,7 @@ def test_the_instructions_of_each_kind_of_frame_are_counted(python, counts, tmp_
     marks = [int(line) for line in counts.read_text().split()][
         :-1
     ]  # the last marks the end
-    instructions: dict[str, list[int]] = {}
+    instructions = {}
     for kind, before, after in zip(
         printed.splitlines(), marks[::2], marks[1::2], strict=True
     ):

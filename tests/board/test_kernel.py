@@ -14,8 +14,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 
 import pytest
 
@@ -50,7 +48,7 @@ SLOWED = {
 ends with the first frame without it ends in the same frame at any rate."""
 
 
-def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
+def run_in_guest(command):
     """The exit status of a command that runs as root, and everything that the guest
     printed.
 
@@ -85,7 +83,7 @@ def run_in_guest(command: Sequence[str]) -> tuple[int, str]:
     return int(rest.split()[0]), printed
 
 
-def _initrd(system: Path, command: Sequence[str]) -> Path:
+def _initrd(system, command):
     """Make the archive that the kernel unpacks into memory and starts from."""
     root = FOLDER / "initrd.root"
     archive = FOLDER / "initrd"

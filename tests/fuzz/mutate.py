@@ -11,12 +11,9 @@ import re
 import struct
 import zipfile
 from functools import cache
-from random import Random
-from typing import Any
 
 import numpy as np
 import onnx
-from numpy.typing import NDArray
 from onnx import numpy_helper
 
 WORDS = (
@@ -112,7 +109,7 @@ TYPES = ("u1", "i2", ">u2", "f4", ">f8", "c16", "?", "U3", "S2", "M8[s]")
 FLOATS = (np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 1e18, -1.0)
 
 
-def of_bytes(data: bytes, draw: Random) -> bytes:
+def of_bytes(data, draw):
     """Spans of bytes replaced, removed, repeated, inserted or cut off."""
     out = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 4, 16))):
@@ -135,7 +132,7 @@ def of_bytes(data: bytes, draw: Random) -> bytes:
     )
 
 
-def of_text(data: bytes, draw: Random) -> bytes:
+def of_text(data, draw):
     """Words replaced by hostile ones or by others of the text, removed or repeated."""
     if draw.randrange(7) == 6:
         return of_bytes(data, draw)
@@ -153,7 +150,7 @@ def of_text(data: bytes, draw: Random) -> bytes:
     return text.encode("utf-8", draw.choice(("surrogatepass", "replace")))
 
 
-def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
+def of_array(array, draw):
     """Another type, shape or value; a text is damaged as a text."""
     if array.dtype.kind == "U" and array.size == 1 and draw.randrange(5):
         text = of_text(str(array.item()).encode(), draw)
@@ -189,7 +186,7 @@ def of_array(array: NDArray[Any], draw: Random) -> NDArray[Any]:
     return draw.choice(shapes)
 
 
-def npy(array: NDArray[Any], draw: Random) -> bytes:
+def npy(array, draw):
     """The array as an .npy file, whose header is damaged at times."""
     file = io.BytesIO()
     np.lib.format.write_array(file, np.asarray(array), allow_pickle=False)
@@ -203,14 +200,14 @@ def npy(array: NDArray[Any], draw: Random) -> bytes:
 
 
 @cache
-def bomb() -> bytes:
+def bomb():
     """64 MB of zeros as an .npy file."""
     file = io.BytesIO()
     np.save(file, np.zeros(1 << 26, np.uint8))
     return file.getvalue()
 
 
-def of_npz(data: bytes, draw: Random) -> bytes:
+def of_npz(data, draw):
     """An array of the archive changed, renamed, exchanged or left out; at times the
     bytes."""
     if draw.randrange(5) == 4:
@@ -240,7 +237,7 @@ def of_npz(data: bytes, draw: Random) -> bytes:
     return out.getvalue()
 
 
-def of_onnx(data: bytes, draw: Random) -> bytes:
+def of_onnx(data, draw):
     """Metadata, operators, attributes, edges or constants changed; at times the
     bytes."""
     if draw.randrange(3) == 2:

@@ -69,7 +69,7 @@ class Reader:
     beside: Callable[[Path], Any] = lambda path: None
 
 
-def command(main: Callable[[list[str]], int], *words: object) -> None:
+def command(main, *words):
     """Run a command line and check its exit status and its output.
 
     Raises:
@@ -89,10 +89,10 @@ def command(main: Callable[[list[str]], int], *words: object) -> None:
         raise InputError(" ".join(errors.splitlines()))
 
 
-def importing(kind: str, *more: str) -> Callable[[Path], None]:
+def importing(kind, *more):
     """`python -m train import KIND`."""
 
-    def read(path: Path) -> None:
+    def read(path):
         out = path.parent / "out"
         shutil.rmtree(out, ignore_errors=True)
         command(train_main, "import", kind, path, "--out", out, *more)
@@ -100,14 +100,14 @@ def importing(kind: str, *more: str) -> Callable[[Path], None]:
     return read
 
 
-def files(*patterns: str) -> Callable[[], list[bytes]]:
+def files(*patterns):
     """The files of the checkout that match."""
     return lambda: [
         p.read_bytes() for pattern in patterns for p in sorted(ROOT.glob(pattern))
     ]
 
 
-def recordings() -> list[bytes]:
+def recordings():
     """A few frames of two shipped recordings, the second with a mask of readable
     taxels."""
     out = []
@@ -127,7 +127,7 @@ def recordings() -> list[bytes]:
     return out
 
 
-def read_model(path: Path) -> None:
+def read_model(path):
     """Load a model and ask it once."""
     model = Model(path)
     for task, decision in model.decide(np.ones(model.info.width)).items():
@@ -137,7 +137,7 @@ def read_model(path: Path) -> None:
         Space.of(model, task)
 
 
-def skins() -> list[bytes]:
+def skins():
     """The shipped skins, and the first of them calibrated."""
     shipped = files("edge/skins/*.toml")()
     rows, noise = (
@@ -147,7 +147,7 @@ def skins() -> list[bytes]:
     return [*shipped, shipped[0] + calibration.encode()]
 
 
-def read_chain(path: Path) -> None:
+def read_chain(path):
     """Load an arm and compute a pose."""
     urdf = path.suffix == ".urdf"
     chain = Chain.from_urdf(path, "base", "lower") if urdf else Chain.from_toml(path)
@@ -169,12 +169,12 @@ TOUCH = {
 MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
 
 
-def grasps() -> list[bytes]:
+def grasps():
     """The XML of a small grasp of the SDH-2 hand."""
     return [dsa().encode()]
 
 
-def read_grasp(path: Path) -> None:
+def read_grasp(path):
     """Import the XML as the only grasp of a folder."""
     folder = path.parent / "grasps"
     (folder / "cup").mkdir(parents=True, exist_ok=True)
@@ -182,13 +182,13 @@ def read_grasp(path: Path) -> None:
     importing("sdh2")(folder)
 
 
-def made(write: Callable[[Path], Path]) -> bytes:
+def made(write):
     """The bytes of a file that a function writes."""
     with tempfile.TemporaryDirectory() as folder:
         return write(Path(folder) / "log").read_bytes()
 
 
-def logs() -> list[bytes]:
+def logs():
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
     ways: tuple[dict[str, Any], ...]
     ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
@@ -197,7 +197,7 @@ def logs() -> list[bytes]:
     ]
 
 
-def bags() -> list[bytes]:
+def bags():
     """A ROS 1 bag of arrays."""
     messages = [array(STORES[1], frame) for frame in FRAMES]
     return [
@@ -215,13 +215,13 @@ FRAME_FILES = [
 """Files of a folder of CSV recordings: the first line is the name."""
 
 
-def of_frames(data: bytes, draw: Random) -> bytes:
+def of_frames(data, draw):
     """The contents damaged, not the name."""
     name, contents = data.split(b"\n", 1)
     return name + b"\n" + mutate.of_text(contents, draw)
 
 
-def read_frames(path: Path) -> None:
+def read_frames(path):
     """Import a folder in which one file is damaged."""
     folder = path.parent / "csv"
     (folder / "one").mkdir(parents=True, exist_ok=True)

@@ -4,25 +4,23 @@ import argparse
 import sys
 import textwrap
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
 
 from tests.bench import tables
 from tests.hard_cases import margins
-from tests.hard_cases.cases import Case, Worst
 from tests.hard_cases.registry import CASES
 
 INDENT = {"initial_indent": " " * 5, "subsequent_indent": " " * 7}
 
 
-def number(value: float) -> str:
+def number(value):
     """Short, and whole where it is whole."""
     whole = value == int(value) and abs(value) < 1e6
     return str(int(value)) if whole else f"{value:.1e}"
 
 
-def place(worst: Worst) -> str:
+def place(worst):
     """The parameters of the largest error, as a person writes them."""
     if worst.error == 0.0:
         return f"none in {worst.tried} tried"
@@ -46,7 +44,7 @@ class Entry:
     judge: Mapping[str, str]
 
     @classmethod
-    def of(cls, case: Case, worst: Worst) -> Self:
+    def of(cls, case, worst):
         """The entry of a case; measures its margin, its price and the usual tools."""
         answer = {
             "hard case": case.key,
@@ -64,16 +62,16 @@ class Entry:
         return cls(_escaped(answer), _escaped(judge))
 
 
-def _escaped(row: Mapping[str, str]) -> Mapping[str, str]:
+def _escaped(row):
     return {name: text.replace("|", "\\|") for name, text in row.items()}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv=None):
     """Print the cases; 1 if one exceeds its bound. All of them renew the page's table."""
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
     parser.add_argument("--only", default="", help="cases whose name holds this text")
     arguments = parser.parse_args(argv)
-    entries: list[Entry] = []
+    entries = []
     beyond = 0
     for case in CASES:
         if arguments.only not in case.key:

@@ -48,18 +48,18 @@ class Ladder:
     recordings: str = ""
 
 
-def decades(first: float, last: float, each: int = 2) -> list[float]:
+def decades(first, last, each=2):
     """Powers of ten from one exponent to another, `each` steps a decade."""
     count = round(abs(last - first) * each) + 1
     return [10.0**e for e in np.linspace(first, last, count)]
 
 
-def powers_of_ten(low: float, high: float) -> st.SearchStrategy[float]:
+def powers_of_ten(low, high):
     """Numbers between two powers of ten, by their exponents."""
     return st.floats(low, high).map(lambda e: 10.0**e)
 
 
-def seeded(name: str, /, **more: Any) -> Callable[[float], Mapping[str, Any]]:
+def seeded(name, /, **more):
     """A function that puts a value under a name, beside fixed parameters."""
     return lambda value: {name: value, **more}
 
@@ -97,11 +97,9 @@ class Case:
     # Decompositions of this size only lose by a second thread, most of all beside
     # others.
     @threadpool_limits.wrap(limits=1)
-    def worst(self) -> Worst:
+    def worst(self):
         """The largest error at the hazard and in the search around it."""
-        seen: list[tuple[float, Mapping[str, Any]]] = [
-            (float(self.error(**at)), dict(at)) for at in self.hazard
-        ]
+        seen = [(float(self.error(**at)), dict(at)) for at in self.hazard]
         if self.around:
 
             @settings(
@@ -113,7 +111,7 @@ class Case:
                 suppress_health_check=list(HealthCheck),
             )
             @given(**self.around)
-            def search(**at: Any) -> None:
+            def search(**at):
                 error = float(self.error(**at))
                 seen.append((error, at))
                 if error < float("inf"):
@@ -124,7 +122,7 @@ class Case:
         return Worst(error, at, len(seen))
 
     @threadpool_limits.wrap(limits=1)
-    def theirs(self) -> str:
+    def theirs(self):
         """The answer of the usual tools, in words; "" without one."""
         if self.usual is None:
             return ""

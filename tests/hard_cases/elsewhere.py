@@ -7,9 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).parents[2]
 GUEST = """\
@@ -25,14 +23,12 @@ for folder in sys.argv[1:]:
 """
 
 
-def sets(golden: Path) -> list[Path]:
+def sets(golden):
     """The folders of golden files."""
     return sorted(path.parent for path in golden.glob("*/golden.npz"))
 
 
-def ask(
-    golden: Path, python: Sequence[str], path: str = ""
-) -> tuple[dict[str, Any], dict[tuple[str, str], float]]:
+def ask(golden, python, path=""):
     """Let a Python verify all golden files, away from the checkout.
 
     Args:
@@ -52,8 +48,8 @@ def ask(
     done = subprocess.run(
         command, env=environment, stdout=subprocess.PIPE, text=True, check=True
     )
-    machine: dict[str, Any] = {}
-    shares: dict[tuple[str, str], float] = {}
+    machine = {}
+    shares = {}
     name = ""
     for line in map(json.loads, done.stdout.splitlines()):
         if line["event"] == "set":
@@ -66,7 +62,7 @@ def ask(
     return machine, shares
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv=None):
     """Ask, and say which answer is farthest from its golden value; 1 beyond its
     bound."""
     parser = argparse.ArgumentParser(prog="elsewhere", description=__doc__)

@@ -1,8 +1,5 @@
 """The oracle's bits with other threads, batches, types, optimisations and engines."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import onnxruntime
 from hypothesis import strategies as st
@@ -11,22 +8,19 @@ from onnx.reference import ReferenceEvaluator
 from edge.model import onnx_file
 from edge.model.graph import Graph
 from tests.hard_cases.cases import SEEDS, Case, Ladder, seeded
-from tests.hard_cases.models import Array, converted, session, usual_pipeline
+from tests.hard_cases.models import converted, session, usual_pipeline
 from tests.hard_cases.neighbours import near_duplicates
 from tests.hard_cases.outputs import (
     KINDS,
     POINTS_S,
-    Outputs,
-    Whole,
     differing,
     whole,
 )
 
 OPTIMISED = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_ALL
-Run = Callable[[list[str], dict[str, Any]], list[Any]]
 
 
-def engine(name: str, tried: Whole) -> Run:
+def engine(name, tried):
     """What runs the graph of a model."""
     if name == "onnx.reference":
         evaluator = ReferenceEvaluator(tried.data)
@@ -35,14 +29,14 @@ def engine(name: str, tried: Whole) -> Run:
         return Graph(onnx_file.read(tried.data, "the model")).run
     level = OPTIMISED if name == "optimised" else None
     threads = 2 if name == "two threads" else 1
-    run: Run = session(tried.data, level, threads).run
+    run = session(tried.data, level, threads).run
     return run
 
 
 ENGINES = ("one by one", "two threads", "optimised", "numpy", "onnx.reference")
 
 
-def answers(name: str, tried: Whole, vectors: Array, point: int) -> Outputs:
+def answers(name, tried, vectors, point):
     """All outputs for vectors, which only the first of the engines gets one by one."""
     run = engine(name, tried)
     names = [output.name for output in session(tried.data).get_outputs()]
@@ -54,9 +48,7 @@ def answers(name: str, tried: Whole, vectors: Array, point: int) -> Outputs:
     return dict(zip(names, joined, strict=True))
 
 
-def engine_error(
-    name: str, kind: str, point: int, factor: float, seed: int, count: int = 20
-) -> float:
+def engine_error(name, kind, point, factor, seed, count=20):
     """Values of all outputs that are not the oracle's."""
     tried = whole(160, kind)
     vectors = tried.queries(seed, factor, count)
@@ -64,7 +56,7 @@ def engine_error(
     return differing(seen, tried.outputs(vectors, point))
 
 
-def single_error(kind: str, point: int, seed: int) -> float:
+def single_error(kind, point, seed):
     """Values that a vector of float32 gets, and its copy in float64 does not."""
     tried = whole(160, kind)
     vectors = tried.queries(seed, 1.0).astype(np.float32)
@@ -78,7 +70,7 @@ def single_error(kind: str, point: int, seed: int) -> float:
     return float(wrong)
 
 
-def engine_usual() -> str:
+def engine_usual():
     """Nearest of near-duplicates by skl2onnx and scikit-learn, in other
     circumstances."""
     X, queries = near_duplicates(160, 1e-7, 0, 200)

@@ -2,17 +2,15 @@
 
 import math
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from train.projection import MOST_STEPS, Projection
-
-Whole = NDArray[np.object_]
+from train.projection import MOST_STEPS
 
 
-def multiples(values: NDArray[np.float64], unit: float) -> Whole:
+def multiples(values, unit):
     """Values over a power of two, as Python integers.
 
     Raises:
@@ -26,7 +24,7 @@ def multiples(values: NDArray[np.float64], unit: float) -> Whole:
     )
 
 
-def smallest_bit(values: NDArray[np.float64]) -> float:
+def smallest_bit(values):
     """The largest power of two of which all values are multiples; 1 for zeros."""
     ratios = [Fraction(value) for value in np.ravel(values).tolist() if value]
     bits = [
@@ -44,24 +42,24 @@ class Projected(NamedTuple):
         cut: (n,) whether a step or a coordinate was cut off.
     """
 
-    units: Whole
+    units: NDArray[np.object_]
     cut: NDArray[np.bool_]
 
 
-def clipped(values: Whole, limit: int) -> Whole:
+def clipped(values, limit):
     """Whole numbers, cut off at plus and minus a limit."""
     inside = [max(-limit, min(limit, value)) for value in values.ravel().tolist()]
     return np.array(inside, dtype=object).reshape(values.shape)
 
 
-def rounded(values: Any, scale: Fraction = Fraction(1)) -> Whole:
+def rounded(values, scale=Fraction(1)):
     """Numbers times a scale, to the nearest whole number, halves to the even one."""
     array = np.asarray(values)
     wholes = [round(Fraction(value) * scale) for value in array.ravel().tolist()]
     return np.array(wholes, dtype=object).reshape(array.shape)
 
 
-def projected(vectors: NDArray[np.float64], p: Projection) -> Projected:
+def projected(vectors, p):
     """Whole coordinates of vectors by the rule of `train.projection`.
 
     The difference from the mean and its product with the gain are rounded once each, as
@@ -81,16 +79,16 @@ def projected(vectors: NDArray[np.float64], p: Projection) -> Projected:
     return Projected(units, cut)
 
 
-def coordinates(vectors: NDArray[np.float64], p: Projection, components: int) -> Whole:
+def coordinates(vectors, p, components):
     """(n, components) the first whole coordinates of vectors."""
     return projected(vectors, p).units[:, :components]
 
 
 def unrounded(
-    vectors: NDArray[np.float64],
-    mean: NDArray[np.float64],
-    weights: NDArray[np.float64],
-) -> Whole:
+    vectors,
+    mean,
+    weights,
+):
     """(n, c) whole numbers proportional to (x - mean) @ weights, without any
     rounding."""
     bit = smallest_bit(np.concatenate([vectors.ravel(), mean]))
@@ -98,7 +96,7 @@ def unrounded(
     return np.asarray(d @ multiples(weights, smallest_bit(weights)))
 
 
-def nearest(rows: Whole, query: Whole, k: int) -> tuple[list[int], list[int]]:
+def nearest(rows, query, k):
     """The k nearest rows, equal distances in the order of the rows, and the squares of
     all."""
     squares = (
@@ -107,7 +105,7 @@ def nearest(rows: Whole, query: Whole, k: int) -> tuple[list[int], list[int]]:
     return sorted(range(len(rows)), key=lambda i: (squares[i], i))[:k], squares
 
 
-def winner(labels: list[Any]) -> Any:
+def winner(labels):
     """The majority of the neighbours' labels, nearest first; ties to the nearest of the
     tied."""
     votes = {label: labels.count(label) for label in labels}
@@ -115,7 +113,7 @@ def winner(labels: list[Any]) -> Any:
     return next(label for label in labels if votes[label] == most)
 
 
-def root(square: int) -> float:
+def root(square):
     """The root of a whole number, rounded once, by whole numbers alone."""
     digits = 64
     part = math.isqrt(square << 2 * digits)
@@ -124,6 +122,6 @@ def root(square: int) -> float:
     return float(Fraction(2 * part + inexact, 2 << digits))
 
 
-def distance(square: int, unit: float) -> float:
+def distance(square, unit):
     """The root of a whole number, rounded once, in units of a power of two."""
     return root(square) * unit

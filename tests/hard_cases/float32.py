@@ -6,18 +6,14 @@ files. Whoever runs a model by another engine must be told so by `edge-classify 
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import openvino
-from numpy.typing import NDArray
 
 from edge.model import model as model_module
-from edge.model.engines import Engine, Numpy, open_engine
+from edge.model.engines import Numpy, open_engine
 from edge.model.model import Model
-from edge.model.onnx_file import Contents
 from edge.model.verify import verify
 from tests.hard_cases.elsewhere import sets
 
@@ -27,15 +23,13 @@ class OpenVino(Numpy):
 
     name = "openvino"
 
-    def __init__(self, path: str, contents: Contents) -> None:
+    def __init__(self, path, contents):
         super().__init__(contents)
         core = openvino.Core()
         core.set_property("CPU", {"INFERENCE_PRECISION_HINT": "f32"})
         self._compiled = core.compile_model(path, "CPU")
 
-    def run(
-        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
-    ) -> list[NDArray[Any]]:
+    def run(self, names, inputs):
         """The named outputs, in the types that the graph declares."""
         wanted = [port.any_name for port in self._compiled.inputs]
         seen = self._compiled({name: inputs[name] for name in wanted})
@@ -47,7 +41,7 @@ class OpenVino(Numpy):
         ]
 
 
-def engine_of(path: str, contents: Contents, engine: str | None) -> Engine:
+def engine_of(path, contents, engine):
     """OpenVINO, where no engine is asked for."""
     return (
         OpenVino(path, contents)
@@ -56,7 +50,7 @@ def engine_of(path: str, contents: Contents, engine: str | None) -> Engine:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv=None):
     """Say how many hard sets `verify` refuses; 1 if it accepts a set with wrong labels."""
     parser = argparse.ArgumentParser(prog="float32", description=__doc__)
     parser.add_argument("--golden", type=Path, default=Path("build/hard-cases/golden"))

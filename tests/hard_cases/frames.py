@@ -1,15 +1,12 @@
 """Features of hard frames and times."""
 
 import math
-from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import scipy.ndimage
 from hypothesis import strategies as st
 
-from edge.touch.contact import Contact
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -24,7 +21,7 @@ FOREARM = SkinLayout(
 )
 
 
-def region_error(density: float, peak: int, seed: int) -> float:
+def region_error(density, peak, seed):
     """1 where a random frame with dead taxels has another region, area, peak or sums;
     of density 0 frames of one taxel that differ. `tests/edge/touch/test_region.py` has
     hard shapes."""
@@ -38,7 +35,7 @@ def region_error(density: float, peak: int, seed: int) -> float:
     return float(by_us(*given) != by_scipy(*given))
 
 
-def seam_usual() -> str:
+def seam_usual():
     counts = SHAPES["seam"]
     labels, n = scipy.ndimage.label(counts > 50)
     largest = 1 + int(np.argmax([(labels == i + 1).sum() for i in range(n)]))
@@ -47,23 +44,21 @@ def seam_usual() -> str:
     return f"scipy.ndimage.label: {n} regions, column {col:.2f}; ours column {ours:.2f}"
 
 
-def contact_of(
-    frames: Iterable[Frame], layout: SkinLayout = FOREARM, **options: Any
-) -> Contact:
+def contact_of(frames, layout=FOREARM, **options):
     """The first contact of some frames."""
     tracker = ContactTracker(layout, 1, **options)
     contact, *_ = [contact for frame in frames for contact in tracker.push(frame)]
     return contact
 
 
-def taxels(*places: tuple[int, int], value: int = 100) -> np.ndarray:
+def taxels(*places, value=100):
     counts = np.zeros((16, 24), dtype=np.uint16)
     for row, col in places:
         counts[row, col % 24] = value
     return counts
 
 
-def flicker_error(seed: int) -> float:
+def flicker_error(seed):
     """Metres that the followed centroid moves though nothing does: the peaks of two
     pairs of taxels take turns at being the higher one."""
     rng = np.random.default_rng(seed)
@@ -77,7 +72,7 @@ def flicker_error(seed: int) -> float:
     return float(np.abs(contact_of(frames).series().motion).max())
 
 
-def times_error(seed: int, shortest: float) -> float:
+def times_error(seed, shortest):
     """Samples of a series with jitter, duplicates and gaps against exact interpolation,
     over the range of the counts and the resolution of the times."""
     rng = np.random.default_rng(seed)

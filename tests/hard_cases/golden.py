@@ -10,18 +10,16 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from edge.recording import Recording
 from edge.saving import save
 from export.__main__ import main as export
 from export.api import save as save_model
 from tests.conftest import FOREARM, touch
-from tests.hard_cases.models import Array, features, labels_for
+from tests.hard_cases.models import features, labels_for
 from tests.hard_cases.neighbours import (
     MANY,
     dominated,
@@ -29,23 +27,23 @@ from tests.hard_cases.neighbours import (
     near_duplicates,
     offset_data,
 )
-from train.dataset import DataSet, load_trials
+from train.dataset import load_trials
 from train.fitting import Fitted
 from train.pipeline import Choice, ContactClassifier
 
 
-def seam(recording: Recording) -> Recording:
+def seam(recording):
     """The contact turned so that it lies across the seam."""
     column = int(recording.frames[-1].sum(axis=0).argmax())
     return replace(recording, frames=np.roll(recording.frames, -column, axis=2))
 
 
-def saturated(recording: Recording) -> Recording:
+def saturated(recording):
     full = np.where(recording.frames > 0, 65535, 0).astype(np.uint16)
     return replace(recording, frames=full)
 
 
-def jittered(recording: Recording) -> Recording:
+def jittered(recording):
     """Uneven times, one instant twice, a gap."""
     rng = np.random.default_rng(1)
     t = np.cumsum(rng.uniform(0.002, 0.018, len(recording.t)))
@@ -54,21 +52,21 @@ def jittered(recording: Recording) -> Recording:
     return replace(recording, t=t)
 
 
-def split(recording: Recording) -> Recording:
+def split(recording):
     """The taxel with the most force cannot be read."""
     valid = np.ones(FOREARM.shape, dtype=bool)
     valid[np.unravel_index(recording.frames[-1].argmax(), FOREARM.shape)] = False
     return replace(recording, valid=valid)
 
 
-def wrapped(recording: Recording) -> Recording:
+def wrapped(recording):
     """The first joint's angle jumps by a turn from frame to frame."""
     joints = recording.joints.copy()
     joints[::2, 0] += 2.0 * math.pi
     return replace(recording, joints=joints)
 
 
-def short(recording: Recording) -> Recording:
+def short(recording):
     """Let go after half the window, and touched from the first frame on."""
     frames = recording.frames[20:].copy()
     frames[60:] = 0
@@ -77,7 +75,7 @@ def short(recording: Recording) -> Recording:
     )
 
 
-def hard_trials(folder: Path) -> DataSet:
+def hard_trials(folder):
     """Contacts with everything that frames and times can do to them, stored in a
     folder."""
     changes = (seam, saturated, jittered, split, wrapped, short)
@@ -93,7 +91,7 @@ MANY_LABELS = "many-labels"
 """The set whose labels need more than 64 bits, with neighbours that outvote each other."""
 
 
-def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
+def vectors(dataset):
     """Training vectors of each hard case, which are the queries too, and the model's
     settings."""
     return {
@@ -114,7 +112,7 @@ def vectors(dataset: DataSet) -> dict[str, tuple[Array, Choice]]:
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv=None):
     """Write OUT/CASE/model.onnx and golden.npz."""
     parser = argparse.ArgumentParser(prog="golden", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("build/hard-cases/golden"))

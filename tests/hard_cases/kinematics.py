@@ -13,7 +13,7 @@ from edge.touch.joint_stream import Joints
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, seeded
 
 
-def orthonormal_error(steps: int, reach: float) -> float:
+def orthonormal_error(steps, reach):
     """Largest |R R^T - 1| along a path of `steps` poses."""
     chain = Chain.cody()
     worst = 0.0
@@ -26,9 +26,7 @@ def orthonormal_error(steps: int, reach: float) -> float:
     return worst
 
 
-def exact_turn(
-    axis: tuple[float, float, float], angle: float
-) -> list[list[mpmath.mpf]]:
+def exact_turn(axis, angle):
     """Rodrigues' formula in 60 digits (400 for the reduction of large angles)."""
     with mpmath.workdps(400):
         a = mpmath.mpf(angle)
@@ -41,7 +39,7 @@ def exact_turn(
         return [[out[i, j] for j in range(3)] for i in range(3)]
 
 
-def turn_error(angle: float, seed: int) -> float:
+def turn_error(angle, seed):
     """Largest error of a rotation; off the diagonal relative to the angle where it is
     tiny."""
     x, y, z = np.random.default_rng(seed).normal(size=3).tolist()
@@ -56,10 +54,10 @@ def turn_error(angle: float, seed: int) -> float:
     return worst
 
 
-def line_error(angle: float, step: float) -> float:
+def line_error(angle, step):
     """Error of the pose midway between two lines of a sender that wraps its angles."""
 
-    def wrap(q: float) -> float:
+    def wrap(q):
         return math.remainder(q, 2.0 * math.pi)
 
     text = "".join(

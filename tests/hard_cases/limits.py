@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from edge import demo
 from edge.classifier import Classifier
 from edge.events import Decided, Onset
-from edge.recording import Recording, load
+from edge.recording import load
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
@@ -22,7 +22,7 @@ from tests.hard_cases.frames import FOREARM, contact_of
 from tests.hard_cases.models import shipped
 
 
-def skin_error(side: int, across: bool, full: bool = False) -> float:
+def skin_error(side, across, full=False):
     """Error of area, peak and centroid of a block at full scale, over a quarter of the
     columns.
 
@@ -43,7 +43,7 @@ def skin_error(side: int, across: bool, full: bool = False) -> float:
     return max(*map(abs, errors), min(gap, side - gap))
 
 
-def clock_error(start: float) -> float:
+def clock_error(start):
     """Largest error of a sample of force, area or motion, over the course's size.
 
     Steps of 2^-7 s from a whole number of seconds are exact to 2^45 s; beyond, frames
@@ -53,7 +53,7 @@ def clock_error(start: float) -> float:
     frames = [
         Frame(begin + i / 128.0, np.zeros((16, 24), np.uint16)) for i in range(200)
     ]
-    courses: list[list[Fraction]] = [[], [], []]
+    courses = [[], [], []]
     pitch = Fraction(FOREARM.pitch_m[0])
     for i in range(11, 200):
         rows = 2 + i // 50
@@ -78,12 +78,12 @@ def clock_error(start: float) -> float:
 
 
 @cache
-def touches() -> tuple[Recording, ...]:
+def touches():
     """The touches that come with the program."""
     return tuple(map(load, demo.recordings()))
 
 
-def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Recording:
+def paused(recording, pause_s, frames, unit):
     """The same with a pause so many frames after the touch, and with times in another
     unit."""
     touched = recording.frames.max(axis=(1, 2)) > recording.layout.onset
@@ -92,14 +92,14 @@ def paused(recording: Recording, pause_s: float, frames: int, unit: float) -> Re
     return replace(recording, t=unit * t)
 
 
-def decisions(recording: Recording) -> tuple[float, list[Decided]]:
+def decisions(recording):
     """When the contact began, and the decisions about it."""
     events = list(Classifier(shipped()).classify(recording))
     (onset,) = (event.onset_s for event in events if isinstance(event, Onset))
     return onset, [event for event in events if isinstance(event, Decided)]
 
 
-def gap_error(pause_s: float, frames: int, unit: float) -> float:
+def gap_error(pause_s, frames, unit):
     """Decisions whose flag `gap` is wrong.
 
     One step covers more than a twelfth of the window, more than 0.1 s and more than two
@@ -123,7 +123,7 @@ def gap_error(pause_s: float, frames: int, unit: float) -> float:
     return float(wrong)
 
 
-def gap_usual() -> str:
+def gap_usual():
     """The labels that interpolation across the pause alone gives the touches."""
     changed = []
     sure = []
@@ -143,7 +143,7 @@ COURSES = ("log_max_force", "sqrt_max_force", "log_right_force", "sqrt_right_for
 floor."""
 
 
-def transform_error(counts: int, scale: float) -> float:
+def transform_error(counts, scale):
     """Largest error of a logarithm or root of a constant force, over the larger of it
     and 1."""
     layout = replace(FOREARM, counts_per_newton=scale)

@@ -1,7 +1,6 @@
 """The margin of each case, found by search, beside where recordings lie; and the
 guards' prices."""
 
-from collections.abc import Mapping
 from functools import cache
 from timeit import repeat
 
@@ -12,7 +11,6 @@ from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from tests.hard_cases.cases import Case, Ladder
 from tests.hard_cases.frames import contact_of
 from tests.hard_cases.models import (
     Ours,
@@ -29,7 +27,7 @@ SEEDS = range(5)
 """A case that draws by a seed must hold with each of these."""
 
 
-def failure(case: Case, ladder: Ladder, value: float) -> str:
+def failure(case, ladder, value):
     """How a case fails at a value; "" if it holds."""
     at = ladder.at(value)
     for seed in SEEDS if "seed" in at else SEEDS[:1]:
@@ -44,7 +42,7 @@ def failure(case: Case, ladder: Ladder, value: float) -> str:
     return ""
 
 
-def margin(case: Case) -> str:
+def margin(case):
     """The last value at which a case holds, the first at which it does not, and the
     recordings."""
     ladder = case.ladder
@@ -66,7 +64,7 @@ def margin(case: Case) -> str:
 
 
 @cache
-def prices() -> Mapping[str, str]:
+def prices():
     """The cost of the guards of each group of cases."""
     X = features(160)
     x = features(1, 1)
@@ -110,6 +108,6 @@ def prices() -> Mapping[str, str]:
     }
 
 
-def price(case: Case) -> str:
+def price(case):
     """The cost of a case's guard."""
     return prices()[case.guard or case.key.split(":")[0]]

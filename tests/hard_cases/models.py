@@ -1,32 +1,28 @@
 """Models of the project and of the usual stack on the same training vectors."""
 
 import tempfile
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnxruntime
-from numpy.typing import NDArray
 from skl2onnx import to_onnx as convert
 from sklearn.decomposition import PCA
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
 from edge import demo
-from edge.model.info import ModelInfo, Task
+from edge.model.info import Task
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
 from train.pipeline import Choice, ContactClassifier
 
-Array = NDArray[np.float64]
 USUAL = Choice("none", 6, 5)
 
 
-def features(n: int, seed: int = 0) -> Array:
+def features(n, seed=0):
     """(n, 120) vectors with the scales of force, area and motion."""
     rng = np.random.default_rng(seed)
     X = rng.gamma(2.0, size=(n, 120))
@@ -36,12 +32,12 @@ def features(n: int, seed: int = 0) -> Array:
 
 
 @cache
-def shipped() -> Model:
+def shipped():
     """The model that comes with the program."""
     return Model(demo.MODEL)
 
 
-def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
+def describe(fitted, samples=40):
     """The shipped model's metadata, with the tasks of a model that was fitted on
     vectors alone."""
     tasks = {
@@ -67,7 +63,7 @@ def describe(fitted: ContactClassifier, samples: int = 40) -> ModelInfo:
     )
 
 
-def labels_for(X: Array, classes: int = 5, seed: int = 0) -> NDArray[np.str_]:
+def labels_for(X, classes=5, seed=0):
     """Labels that have nothing to do with the vectors: classes overlap, votes tie."""
     rng = np.random.default_rng([seed, 77])
     return np.array([f"c{i:04d}" for i in rng.integers(0, classes, len(X))])
@@ -77,9 +73,7 @@ class Ours:
     """A fitted classifier of one task, its exported graph, and the oracle of the
     two."""
 
-    def __init__(
-        self, X: Array, y: NDArray[np.str_] | None = None, choice: Choice = USUAL
-    ) -> None:
+    def __init__(self, X, y=None, choice=USUAL):
         y = labels_for(X) if y is None else y
         self.fitted = ContactClassifier({"t": choice}).fit(X, {"t": y})
         with tempfile.TemporaryDirectory() as folder:
@@ -91,11 +85,11 @@ class Ours:
         self.projection = next(iter(self.fitted.projections_.values()))
         self.rows = self.whole(X)
 
-    def whole(self, vectors: Array) -> exact.Whole:
+    def whole(self, vectors):
         """The exact coordinates of vectors."""
         return exact.coordinates(vectors, self.projection, self.fitted.components_["t"])
 
-    def alone(self, queries: Array) -> Mapping[str, NDArray[Any]]:
+    def alone(self, queries):
         """The graph's answers to queries one by one, as the board asks."""
         answers = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
         return {
@@ -105,7 +99,7 @@ class Ours:
             for name in answers[0]
         }
 
-    def wrong(self, queries: Array) -> int:
+    def wrong(self, queries):
         """Queries whose neighbours, order, label or a bit of a distance is not the
         oracle's."""
         seen = self.alone(queries)
@@ -123,7 +117,7 @@ class Ours:
         return wrong
 
 
-def usual_pipeline(X: Array, components: int, k: int, y: Any) -> Any:
+def usual_pipeline(X, components, k, y):
     """PCA and k-NN as scikit-learn fits them by default, brute force."""
     c = min(components, *X.shape)
     return make_pipeline(
@@ -131,7 +125,7 @@ def usual_pipeline(X: Array, components: int, k: int, y: Any) -> Any:
     ).fit(X, y)
 
 
-def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
+def session(data, level=None, threads=1):
     """A session of ONNX Runtime."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
@@ -143,7 +137,7 @@ def session(data: bytes, level: Any = None, threads: int = 1) -> Any:
     )
 
 
-def converted(pipe: Any, X: Array) -> Callable[[Array], NDArray[Any]]:
+def converted(pipe, X):
     """The answers of the default skl2onnx conversion: float32 in, its own k-NN."""
     proto = convert(pipe, X[:1].astype(np.float32), options={"zipmap": False})
     theirs = session(proto.SerializeToString())
@@ -152,7 +146,7 @@ def converted(pipe: Any, X: Array) -> Callable[[Array], NDArray[Any]]:
     )
 
 
-def answers_of_usual(pipe: Any, X: Array, queries: Array) -> dict[str, NDArray[Any]]:
+def answers_of_usual(pipe, X, queries):
     """The answers of scikit-learn and of its conversion."""
     return {
         "scikit-learn": pipe.predict(queries),
@@ -160,7 +154,7 @@ def answers_of_usual(pipe: Any, X: Array, queries: Array) -> dict[str, NDArray[A
     }
 
 
-def usual_neighbours(X: Array, queries: Array, components: int = 6) -> str:
+def usual_neighbours(X, queries, components=6):
     """Shares of nearest rows that are not those of exact arithmetic without any
     rounding."""
     numbers = np.arange(len(X))

@@ -1,8 +1,5 @@
 """Neighbours: which rows are nearest, in order, by whole numbers that never round."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
-
 import numpy as np
 from hypothesis import strategies as st
 from sklearn.neighbors import KNeighborsClassifier
@@ -11,7 +8,6 @@ from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
 from tests.hard_cases.models import (
     USUAL,
-    Array,
     Ours,
     answers_of_usual,
     features,
@@ -28,14 +24,12 @@ WHOLE = "Python's whole numbers"
 LISTS = "queries with another neighbour, order, label or distance"
 
 
-def near_duplicates(
-    n: int, spread: float, seed: int, count: int = 24
-) -> tuple[Array, Array]:
+def near_duplicates(n, spread, seed, count=24):
     """Clusters whose rows differ by `spread` of their norm, and queries like them."""
     rng = np.random.default_rng(seed)
     base = features(8, seed)
 
-    def jittered(rows: Array) -> Array:
+    def jittered(rows):
         return rows * (1.0 + spread * rng.normal(size=rows.shape))
 
     return jittered(np.repeat(base, n // 8, axis=0)), jittered(
@@ -43,9 +37,7 @@ def near_duplicates(
     )
 
 
-def offset_data(
-    offset: float, sd: float, seed: int, n: int = 160
-) -> tuple[Array, Array]:
+def offset_data(offset, sd, seed, n=160):
     """Vectors far from zero."""
     rng = np.random.default_rng(seed)
     return offset + sd * rng.normal(size=(n, 120)), offset + sd * rng.normal(
@@ -53,17 +45,17 @@ def offset_data(
     )
 
 
-def scaled_data(scale: float, seed: int, n: int = 160) -> tuple[Array, Array]:
+def scaled_data(scale, seed, n=160):
     """Vectors of another size."""
     return features(n, seed) * scale, features(24, seed + 1) * scale
 
 
-def far_data(factor: float, seed: int, n: int = 160) -> tuple[Array, Array]:
+def far_data(factor, seed, n=160):
     """Queries outside the training set."""
     return features(n), features(8, seed) * factor
 
 
-def lattice(seed: int, n: int = 160) -> tuple[Array, Array]:
+def lattice(seed, n=160):
     """Whole numbers in three columns, and queries midway between rows: pairs lie
     equally far."""
     rng = np.random.default_rng(seed)
@@ -75,14 +67,14 @@ def lattice(seed: int, n: int = 160) -> tuple[Array, Array]:
     return X, queries
 
 
-def duplicates(n: int, seed: int) -> tuple[Array, Array]:
+def duplicates(n, seed):
     """Rows that stand four times in the set, and the first of them as queries."""
     order = np.random.default_rng(seed).permutation(n)
     X = np.repeat(features(n // 4, seed), 4, axis=0)[order]
     return X, X[:40]
 
 
-def dominated(power: float, seed: int) -> tuple[Array, Array]:
+def dominated(power, seed):
     """One feature is 10^power times as large as the others, which alone separate the
     rows."""
     rng = np.random.default_rng(seed)
@@ -93,7 +85,7 @@ def dominated(power: float, seed: int) -> tuple[Array, Array]:
     return X, queries
 
 
-def denormals(times: int, seed: int) -> tuple[Array, Array]:
+def denormals(times, seed):
     """One feature has a few of the smallest numbers of float64; the others are
     ordinary."""
     X = features(160, seed)
@@ -106,25 +98,23 @@ def denormals(times: int, seed: int) -> tuple[Array, Array]:
     return X, queries
 
 
-def wrong(
-    data: Callable[..., tuple[Array, Array]], choice: Choice
-) -> Callable[..., float]:
+def wrong(data, choice):
     """The error of a case: wrong answers to the queries of `data`."""
 
-    def error(**at: float) -> float:
+    def error(**at):
         X, queries = data(**at)
         return Ours(X, choice=choice).wrong(queries)
 
     return error
 
 
-def ties_error(k: int, seed: int) -> float:
+def ties_error(k, seed):
     X = features(160, seed)
     ours = Ours(X, labels_for(X, 12, seed), Choice("none", 6, k))
     return ours.wrong(features(40, seed + 1))
 
 
-def discriminants_error(shrinkage: float, seed: int) -> float:
+def discriminants_error(shrinkage, seed):
     """Wrong answers of a projection fitted to the labels, with ties of equal rows."""
     X = features(60, seed)
     X[30:40] = X[:10]
@@ -132,7 +122,7 @@ def discriminants_error(shrinkage: float, seed: int) -> float:
     return Ours(X, labels_for(X, 5, seed), choice).wrong(X[::3])
 
 
-def far_error(factor: float, seed: int, n: int = 160) -> float:
+def far_error(factor, seed, n=160):
     """Wrong answers, and queries that were cut off without a word or flagged without
     need."""
     X, queries = far_data(factor, seed, n)
@@ -159,7 +149,7 @@ class Outlier:
         changed: share of queries whose nearest row is not that of unrounded numbers.
     """
 
-    def __init__(self, factor: float, seed: int) -> None:
+    def __init__(self, factor, seed):
         X = features(160, seed)
         X[80] += (factor - 1.0) * (X[80] - X.mean(axis=0))
         queries = features(200, seed + 1)
@@ -174,13 +164,13 @@ class Outlier:
         self.changed = float(np.mean(seen != truth))
 
 
-def outlier_error(factor: float, seed: int) -> float:
+def outlier_error(factor, seed):
     """Share of other nearest rows; 0 where export names the row that is to blame."""
     outlier = Outlier(factor, seed)
     return 0.0 if outlier.named else outlier.changed
 
 
-def outlier_price() -> str:
+def outlier_price():
     """The share of other nearest rows for rows farther and farther out."""
     shares = []
     for power in (2, 3, 4, 5, 6):
@@ -190,7 +180,7 @@ def outlier_price() -> str:
     return f"no warning; our other nearest rows, at a factor of {'; '.join(shares)}"
 
 
-def grid_error(spread: float, seed: int) -> float:
+def grid_error(spread, seed):
     """Largest error of a distance, over the longest training row, against unrounded
     numbers."""
     X, queries = near_duplicates(80, spread, seed, 8)
@@ -211,7 +201,7 @@ def grid_error(spread: float, seed: int) -> float:
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
 
-def ties_usual() -> str:
+def ties_usual():
     """The last of 12 overlapping classes is hardly ever said where the lowest number
     wins."""
     X = features(160)
@@ -230,7 +220,7 @@ def ties_usual() -> str:
     return f"{tied:.0%} of votes tie; {shares} ({true})"
 
 
-def equal_usual() -> str:
+def equal_usual():
     """Equal distances are to be answered with the lower row, which the order of sums
     decides."""
     X, queries = lattice(0)
@@ -244,27 +234,27 @@ def equal_usual() -> str:
     return "not the lower row: " + ", ".join(shares)
 
 
-def few_error(n: int, classes: int, same: bool) -> float:
+def few_error(n, classes, same):
     X = np.repeat(features(1), n, axis=0) if same else features(n)
     ours = Ours(X, labels_for(X, classes), Choice("none", 6, n))
     return ours.wrong(np.concatenate([X[:5], features(3, 1)]))
 
 
 def answers(
-    name: str,
-    error: Callable[..., float],
-    hazard: Sequence[Mapping[str, Any]],
-    around: Mapping[str, Any],
-    ladder: Ladder | None = None,
-    usual: Callable[[], str] | None = None,
-) -> Case:
+    name,
+    error,
+    hazard,
+    around,
+    ladder=None,
+    usual=None,
+):
     """A row whose answers whole numbers judge."""
     around = around | {"seed": SEEDS} if "seed" in hazard[0] else around
     key = f"neighbours: {name}"
     return Case(key, WHOLE, LISTS, error, hazard, around, ladder, usual, examples=4)
 
 
-BY_ROWS: dict[str, Any] = {
+BY_ROWS = {
     "hazard": [{"n": 160, "seed": 0}, {"n": MANY, "seed": 0}],
     "around": {"n": st.just(160)},
     "ladder": Ladder("training rows", [160, 1400], seeded("n", seed=0), "856 and 140"),

@@ -6,28 +6,25 @@ whole numbers and fractions, and rounds where IEEE 754 says that an operation ro
 """
 
 import tempfile
-from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from edge.model.info import Task
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
-from tests.hard_cases.models import Array, features, shipped
+from tests.hard_cases.models import features, shipped
 from tests.hard_cases.neighbours import near_duplicates, offset_data
 from train.evaluate import stratified_folds
 from train.novelty import CLIP, FARTHEST, STEP_BITS
-from train.pipeline import Choice, ContactClassifier
+from train.pipeline import Choice
 from train.stopping import SequentialClassifier
 
 POINTS_S = (0.4, 0.8, 1.2)
@@ -42,10 +39,9 @@ CHOICES = {
 """Of every number of neighbours that the graph treats in its own way: one, two, more."""
 KINDS = ("contacts", "near-duplicates", "duplicates", "offset", "tiny")
 TASK_OUTPUTS = ("label", "scores", "distances", "neighbours", "label_distances")
-Outputs = Mapping[str, NDArray[Any]]
 
 
-def labels_of(n: int) -> dict[str, NDArray[np.str_]]:
+def labels_of(n):
     """A product and its factors, objects, and surfaces that every third trial lacks."""
     rng = np.random.default_rng(2012)
     objects = rng.permutation(np.arange(n) % 12)
@@ -62,7 +58,7 @@ def labels_of(n: int) -> dict[str, NDArray[np.str_]]:
     }
 
 
-def trials(n: int, kind: str) -> Array:
+def trials(n, kind):
     """(n, 120) training vectors of a kind."""
     if kind == "near-duplicates":
         return near_duplicates(n, 1e-6, 0)[0]
@@ -81,7 +77,7 @@ class Whole:
         kind: one of `KINDS`.
     """
 
-    def __init__(self, n: int, kind: str) -> None:
+    def __init__(self, n, kind):
         X = trials(n, kind)
         self.y = labels_of(n)
         # Early windows: of the same trials, with less of what tells them apart.
@@ -95,7 +91,7 @@ class Whole:
             path.write_bytes(self.data)
             self.model = Model(path)
 
-    def _info(self, n: int) -> Any:
+    def _info(self, n):
         tasks = {
             task: Task(
                 tuple(sorted({*self.y[task]} - {""})),
@@ -117,7 +113,7 @@ class Whole:
             novelty=self.fitted.novelty_,
         )
 
-    def queries(self, seed: int, factor: float, count: int = 10) -> Array:
+    def queries(self, seed, factor, count=10):
         """Vectors between training rows, on them, and `factor` times as far away."""
         rng = np.random.default_rng(seed)
         X = self.X[-1]
@@ -126,7 +122,7 @@ class Whole:
         mixed = middle + factor * (0.5 * (first + second) - middle)
         return np.concatenate([first[:2], mixed])
 
-    def outputs(self, vectors: Array, point: int) -> dict[str, NDArray[Any]]:
+    def outputs(self, vectors, point):
         """What the graph is to answer to vectors (n, 120) at a decision point."""
         fitted = self.fitted.decision_points_[point]
         spaces = {
@@ -134,7 +130,7 @@ class Whole:
             for space, projection in fitted.projections_.items()
         }
         cut = np.any([projected.cut for projected in spaces.values()], axis=0)
-        expected: dict[str, NDArray[Any]] = {
+        expected = {
             "out_of_range": cut.astype(np.float64),
             "novelty": self._novelty(vectors, point),
         }
@@ -143,9 +139,7 @@ class Whole:
             expected |= self._task(task, fitted, points, point)
         return expected
 
-    def _task(
-        self, task: str, fitted: ContactClassifier, points: exact.Whole, point: int
-    ) -> dict[str, NDArray[Any]]:
+    def _task(self, task, fitted, points, point):
         space = fitted.spaces_[task]
         members = np.flatnonzero(self.y[task] != "")
         labels = self.y[task][members].tolist()
@@ -156,7 +150,7 @@ class Whole:
         kept = fitted.components_[task]
         unit = fitted.projections_[space].grid_.unit
         scale = Fraction(unit) * Fraction(fitted.slopes_[task])
-        answers: list[tuple[Any, ...]] = []
+        answers = []
         for query in points:
             k = CHOICES[task].k
             near, squares = exact.nearest(rows[:, :kept], query[:kept], k)
@@ -174,7 +168,7 @@ class Whole:
         named = zip(TASK_OUTPUTS, columns_of, strict=True)
         return {f"{task}_{end}": np.array(column) for end, column in named}
 
-    def _novelty(self, vectors: Array, point: int) -> Array:
+    def _novelty(self, vectors, point):
         space = self.fitted.space_
         at = space.points[point]
         steps = exact.rounded((vectors - at.mean) * at.gain)
@@ -195,7 +189,7 @@ class Whole:
         return np.array(scores)
 
 
-def _far(label: str, labels: list[str], squares: list[int], scale: Fraction) -> float:
+def _far(label, labels, squares, scale):
     """The mean distance of a label's nearest twentieth, at least three, in log odds."""
     distances = sorted(
         s for s, other in zip(squares, labels, strict=True) if other == label
@@ -207,11 +201,11 @@ def _far(label: str, labels: list[str], squares: list[int], scale: Fraction) -> 
 
 
 @cache
-def whole(n: int, kind: str) -> Whole:
+def whole(n, kind):
     return Whole(n, kind)
 
 
-def differing(seen: Outputs, expected: Outputs) -> float:
+def differing(seen, expected):
     """Values of the expected outputs that have another bit."""
     assert seen.keys() == expected.keys()
     return float(
@@ -224,7 +218,7 @@ def differing(seen: Outputs, expected: Outputs) -> float:
     )
 
 
-def outputs_error(kind: str, point: int, factor: float, seed: int) -> float:
+def outputs_error(kind, point, factor, seed):
     """Values of all outputs that are not the oracle's."""
     tried = whole(160, kind)
     vectors = tried.queries(seed, factor)
@@ -233,7 +227,7 @@ def outputs_error(kind: str, point: int, factor: float, seed: int) -> float:
     return differing(seen, tried.outputs(vectors, point))
 
 
-def agreed(task: str, factors: Mapping[str, Any], distances: Outputs) -> dict[str, Any]:
+def agreed(task, factors, distances):
     """{task: label and distance of each label} of a product and its factors, for a
     vector.
 
@@ -254,7 +248,7 @@ def agreed(task: str, factors: Mapping[str, Any], distances: Outputs) -> dict[st
     return answers
 
 
-def agreement_error(kind: str, point: int, factor: float, seed: int) -> float:
+def agreement_error(kind, point, factor, seed):
     """Decisions whose label, distances or tie is not the oracle's."""
     tried = whole(160, kind)
     vectors = tried.queries(seed, factor)
@@ -279,7 +273,7 @@ def agreement_error(kind: str, point: int, factor: float, seed: int) -> float:
     return float(wrong)
 
 
-def contradictions() -> str:
+def contradictions():
     """How often tasks that are decided one by one contradict each other."""
     tried = whole(160, "contacts")
     vectors = np.concatenate([tried.queries(seed, 1.0) for seed in range(20)])
@@ -292,7 +286,7 @@ def contradictions() -> str:
     return f"decided one by one, category contradicts its factors in {share:.0%} of answers"
 
 
-def confidence_error(kind: str, point: int, factor: float, seed: int) -> float:
+def confidence_error(kind, point, factor, seed):
     """Largest error of a confidence, over what its log odds resolve."""
     tried = whole(160, kind)
     info = tried.model.info

@@ -2,7 +2,6 @@
 
 import json
 import tempfile
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from edge.touch.track import ContactTracker
 from tests.hard_cases.cases import Case
 from tests.hard_cases.frames import FOREARM, taxels
 from tests.hard_cases.models import (
-    Array,
     Ours,
     converted,
     features,
@@ -34,7 +32,7 @@ from train.projection import Projection
 BAD = (float("nan"), float("inf"), float("-inf"))
 
 
-def recording(bad: float, key: str) -> None:
+def recording(bad, key):
     t = np.arange(3.0)
     joints = np.zeros((3, 5))
     {"t": t, "joints": joints.reshape(-1)}[key][2] = bad
@@ -43,7 +41,7 @@ def recording(bad: float, key: str) -> None:
         save(Path(folder) / "x.npz", trial)
 
 
-def frame(bad: float, key: str) -> None:
+def frame(bad, key):
     times = np.full((16, 24), bad if key == "times" else 0.0)
     joints = np.full(5, bad if key == "joints" else 0.0)
     tracker = ContactTracker(FOREARM, chain=Chain.cody())
@@ -51,7 +49,7 @@ def frame(bad: float, key: str) -> None:
     tracker.push(Frame(t, taxels((3, 3)), times=times, joints=joints))
 
 
-def line(bad: float) -> None:
+def line(bad):
     lines = iter([json.dumps({"t": 1.0, "q": [bad]}).encode() + b"\n", None])
     joints = Joints(lambda: next(lines), dof=1, now=lambda: 1.0)
     if joints.at(1.0) is None and joints.malformed == 1:
@@ -59,11 +57,11 @@ def line(bad: float) -> None:
 
 
 @cache
-def small_model() -> Ours:
+def small_model():
     return Ours(features(30), choice=Choice("none", 5, 3))
 
 
-def graph(bad: float) -> None:
+def graph(bad):
     """Every position in one batch; the graph itself answers -1 and votes for
     nothing."""
     queries = np.repeat(features(1, 1), 121, axis=0)
@@ -76,14 +74,14 @@ def graph(bad: float) -> None:
         raise InputError("label -1")
 
 
-def spoiled(bad: float, count: int = 12) -> Array:
+def spoiled(bad, count=12):
     """Vectors of which one has a bad value."""
     X = features(count)
     X[0, 43] = bad
     return X
 
 
-def csv_frames(bad: float) -> None:
+def csv_frames(bad):
     """A folder of frames whose times are bad in their names."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial"
@@ -95,7 +93,7 @@ def csv_frames(bad: float) -> None:
         list(options.importer.trials(Path(folder), None, options))
 
 
-ENTRIES: dict[str, Callable[[float], object]] = {
+ENTRIES = {
     "a recording's times, written": lambda bad: recording(bad, "t"),
     "a recording's joint angles, written": lambda bad: recording(bad, "joints"),
     "a frame's time": lambda bad: frame(bad, "t"),
@@ -120,7 +118,7 @@ ENTRIES: dict[str, Callable[[float], object]] = {
 }
 
 
-SIZES: dict[str, Callable[[float], object]] = {
+SIZES = {
     "a vector, infinite once scaled": lambda size: small_model().model.decide(
         np.full(120, size)
     ),
@@ -134,7 +132,7 @@ BEYOND += [
 ]
 
 
-def let_in(entry: str, bad: float) -> float:
+def let_in(entry, bad):
     """1 where an entry takes a value that is not finite, or that float64 cannot hold
     scaled."""
     try:
@@ -144,7 +142,7 @@ def let_in(entry: str, bad: float) -> float:
     return 1.0
 
 
-def usual() -> str:
+def usual():
     X = features(30)
     pipe = usual_pipeline(X, 5, 1, np.arange(30))
     queries = np.repeat(features(1, 1), 3, axis=0)

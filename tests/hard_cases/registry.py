@@ -2,12 +2,10 @@
 
 from importlib import import_module
 
-from tests.hard_cases.cases import Case
-
 GROUPS = (
     "neighbours outputs scaling frames kinematics limits refusals everywhere simulator"
 )
-CASES: list[Case] = [
+CASES = [
     case
     for name in GROUPS.split()
     for case in import_module(f"tests.hard_cases.{name}").CASES

@@ -5,14 +5,14 @@ from hypothesis import strategies as st
 from scipy.linalg import hadamard
 
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
-from tests.hard_cases.models import Array, features
+from tests.hard_cases.models import features
 from train.projection import CLOSE_EIGENVALUES, Projection, principal_axes
 from train.scaling import SCALINGS
 
 METHODS = st.sampled_from(SCALINGS)
 
 
-def constant_error(scaling: str, value: float, seed: int) -> float:
+def constant_error(scaling, value, seed):
     """The larger of two constant columns' weight and of a projection's shift when they
     move."""
     X = features(60, seed)
@@ -24,7 +24,7 @@ def constant_error(scaling: str, value: float, seed: int) -> float:
     return max(float(np.abs(p.weights_[[7, 95]]).max()), float(shift))
 
 
-def hadamard_data(values: Array, seed: int = 0) -> Array:
+def hadamard_data(values, seed=0):
     """(512, 32) data whose singular values are exactly these times 128: Hadamard rows
     and columns are orthogonal and their sums are exact."""
     h, g = (hadamard(n).astype(np.float64) for n in (512, 32))
@@ -32,7 +32,7 @@ def hadamard_data(values: Array, seed: int = 0) -> Array:
     return (h[:, columns] * values) @ g[1 : len(values) + 1]
 
 
-def cut_error(gap: float, seed: int) -> float:
+def cut_error(gap, seed):
     """How far the reported gap at the cut is from the one that the data was made with;
     wrong where it is not under the warning's limit although the true one is."""
     values = np.array([4.0, 2.0, 2.0 * np.sqrt(1.0 - gap), 1.0])
@@ -42,12 +42,12 @@ def cut_error(gap: float, seed: int) -> float:
     return abs(p.gap_ - true) if warned else 1.0
 
 
-def orders(top: int, count: int) -> Array:
+def orders(top, count):
     """`count` powers of two over `top` binary orders."""
     return 2.0 ** -np.round(np.linspace(0, top, count))
 
 
-def decades_error(top: int, count: int, seed: int) -> float:
+def decades_error(top, count, seed):
     """Largest error of a singular value over the largest one; a rank that is off counts
     1."""
     X = hadamard_data(orders(top, count), seed)

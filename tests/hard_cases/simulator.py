@@ -8,7 +8,7 @@ from tests.train.simulate.scenes import Trace, slider
 from tests.train.simulate.test_simulate_stability import SPEED, judge
 
 
-def push_error(h: float, mu: float, steps: int = 120) -> float:
+def push_error(h, mu, steps=120):
     """Pushes that a judge complains about, of every stiffness and mass."""
     grid = np.meshgrid(10.0 ** np.arange(-3, 16, 2), 10.0 ** np.arange(-9, 10, 1.8))
     stiffness, mass = (values.ravel() for values in grid)
@@ -21,7 +21,7 @@ def push_error(h: float, mu: float, steps: int = 120) -> float:
     return float(sum(bool(judge(push, k, m, mu, 0.8 * mu)) for push, k, m in judged))
 
 
-def lugre(h: float, v: float = 0.2, sigma: float = 1e5, hold: float = 1.0) -> float:
+def lugre(h, v=0.2, sigma=1e5, hold=1.0):
     """Largest bristle force over a slide by explicit steps, over its limit."""
     z = worst = 0.0
     g = hold / sigma

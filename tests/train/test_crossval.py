@@ -110,7 +110,7 @@ def test_features_that_spread_beyond_any_distance_are_refused():
         neighbours(overlapping()[0] * 1e200)
 
 
-def subspace_gap(ours: np.ndarray, exact: np.ndarray) -> float:
+def subspace_gap(ours, exact):
     """Largest sine between the spans of the first 1, 2, ... axes."""
     worst = 0.0
     for c in range(1, len(ours) + 1):

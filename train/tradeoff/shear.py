@@ -37,6 +37,22 @@ class Answers:
     points: Points
     early: Mapping[str, StoppingComparison]
 
+    @property
+    def tasks(self) -> list[str]:
+        """The tasks."""
+        return list(self.early)
+
+    def shares(self, task: str, kind: str) -> dict[float, float | None]:
+        """{window: accuracy}; None if no group was left out."""
+        hits = {w: right(tasks[task], kind) for w, tasks in self.points.items()}
+        return {w: None if h is None else float(h.mean()) for w, h in hits.items()}
+
+    def early_s(self, task: str, level: float) -> float | None:
+        """The shortest mean time of early decisions of an accuracy."""
+        rules = self.early[task].certified
+        times = [rule.mean_s for rule in rules if 1.0 - rule.wrong >= level]
+        return min(times, default=None)
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -48,11 +64,6 @@ class Compared:
 
     sheared: Answers
     plain: Answers
-
-    @property
-    def tasks(self) -> list[str]:
-        """The tasks, in the order of the answers."""
-        return list(self.sheared.early)
 
 
 def without(dataset: DataSet) -> DataSet:
@@ -89,17 +100,10 @@ def right(choice: Chosen, kind: str) -> NDArray[np.bool_] | None:
     return None if result is None else np.asarray(result.hits)
 
 
-def share(choice: Chosen, kind: str) -> float | None:
-    """The accuracy, likewise."""
-    hits = right(choice, kind)
-    return None if hits is None else float(hits.mean())
-
-
-def reached_s(answers: Answers, task: str, kind: str, level: float) -> float | None:
+def reached_s(shares: Mapping[float, float | None], level: float) -> float | None:
     """The first window from which on an accuracy is kept; None if there is none."""
     first = None
-    for window, tasks in answers.points.items():
-        accuracy = share(tasks[task], kind)
+    for window, accuracy in shares.items():
         if accuracy is None or accuracy < level:
             first = None
         elif first is None:
@@ -107,39 +111,31 @@ def reached_s(answers: Answers, task: str, kind: str, level: float) -> float | N
     return first
 
 
-def early_s(answers: Answers, task: str, level: float) -> float | None:
-    """The shortest mean time of early decisions of an accuracy."""
-    times = [
-        rule.mean_s
-        for rule in answers.early[task].certified
-        if 1.0 - rule.wrong >= level
-    ]
-    return min(times, default=None)
-
-
-def seconds(value: float | None) -> str:
-    """A time as text; a dash where it is never reached."""
-    return "-" if value is None else f"{value:.2f}"
-
-
 def times(compared: Compared) -> list[Row]:
-    """The time at which each task reaches each level, with shear and without."""
-    both = {"without s": compared.plain, "with s": compared.sheared}
+    """The time at which each task reaches each level, with shear and without; a dash
+    where it never does."""
+    sides = {"without s": compared.plain, "with s": compared.sheared}
     rows: list[Row] = []
-    for task in compared.tasks:
+    for task in compared.sheared.tasks:
+        shares = {
+            kind: {name: side.shares(task, kind) for name, side in sides.items()}
+            for kind in (KNOWN, UNMET)
+        }
         for level in LEVELS:
-            start = {"task": task, "right": f"{level:.0%}"}
-            for kind in (KNOWN, UNMET):
-                cells = {
-                    name: seconds(reached_s(answers, task, kind, level))
-                    for name, answers in both.items()
+            reached = {
+                f"fixed, {kind}": {
+                    name: reached_s(of_side, level) for name, of_side in of_kind.items()
                 }
-                rows.append({**start, "decision": f"fixed, {kind}", **cells})
-            cells = {
-                name: seconds(early_s(answers, task, level))
-                for name, answers in both.items()
+                for kind, of_kind in shares.items()
             }
-            rows.append({**start, "decision": f"early, {KNOWN}", **cells})
+            reached[f"early, {KNOWN}"] = {
+                name: side.early_s(task, level) for name, side in sides.items()
+            }
+            for decision, seconds in reached.items():
+                row: Row = {"task": task, "right": f"{level:.0%}", "decision": decision}
+                for name, value in seconds.items():
+                    row[name] = "-" if value is None else f"{value:.2f}"
+                rows.append(row)
     return rows
 
 
@@ -147,7 +143,7 @@ def gains(compared: Compared) -> list[Row]:
     """The accuracy at each window, with shear and without, and the paired
     difference."""
     rows: list[Row] = []
-    for task in compared.tasks:
+    for task in compared.sheared.tasks:
         for window, tasks in compared.sheared.points.items():
             row: Row = {"task": task, "window s": window}
             for kind in (KNOWN, UNMET):
@@ -194,7 +190,7 @@ def section(compared: Compared) -> Section:
 
 def drawn(compared: Compared) -> Figure:
     """The picture: accuracy against time, with shear and without."""
-    tasks = compared.tasks
+    tasks = compared.sheared.tasks
     heights = 2.9, 2.4 * len(tasks) + 0.8
 
     def draw(canvas: Any, phone: bool) -> None:
@@ -209,20 +205,20 @@ def drawn(compared: Compared) -> Figure:
     return picture("shear", title, draw, heights, max(PHONE * len(tasks), PHONE))
 
 
-def draw_task(axes: Any, compared: Compared, task: str) -> None:
-    """Draw the accuracy of one task."""
+def draw_task(axes: Any, compared: Compared, task: str, size: float = 3.0) -> None:
+    """Draw the accuracy of one task, with markers of a size."""
     series = {"with shear": compared.sheared, "without": compared.plain}
     for number, (name, answers) in enumerate(series.items()):
         colour, marker, _ = STROKES[number]
         for kind, dashes in ((KNOWN, "-"), (UNMET, ":")):
-            shares = {w: share(made[task], kind) for w, made in answers.points.items()}
+            shares = answers.shares(task, kind)
             percentages = {w: 100.0 * s for w, s in shares.items() if s is not None}
             axes.plot(
                 list(percentages),
                 list(percentages.values()),
                 color=colour,
                 marker=marker,
-                ms=3,
+                ms=size,
                 ls=dashes,
                 label=f"{name}, {kind}",
             )

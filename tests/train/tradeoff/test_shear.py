@@ -14,10 +14,10 @@ from train.tradeoff.shear import KNOWN, UNMET, Answers, Compared
 from train.tradeoff.wires import microcontroller, waited_s
 
 
-def chosen(right: int, unmet: int | None = None) -> Chosen:
+def chosen(right, unmet=None):
     """A choice that answers so many of 10 trials rightly."""
 
-    def result(count: int) -> Promise:
+    def result(count):
         return Promise(count, 10, hits=np.arange(10) < count)
 
     left_out = "trial" if unmet is None else "object"
@@ -25,7 +25,7 @@ def chosen(right: int, unmet: int | None = None) -> Chosen:
     return Chosen(Choice("IV", 1, 1), other, result(right), left_out)
 
 
-def answers(shares, unmet=None, early=()) -> Answers:
+def answers(shares, unmet=None, early=()):
     """Answers about mobility at windows of 0.2, 0.4, ... s."""
     unmet = unmet or [None] * len(shares)
     points = {}
@@ -37,22 +37,22 @@ def answers(shares, unmet=None, early=()) -> Answers:
 
 def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
     made = answers([9, 7, 9, 8])
-    assert shear.reached_s(made, "mobility", KNOWN, 0.9) is None
-    assert shear.reached_s(made, "mobility", KNOWN, 0.8) == 0.6
-    assert shear.reached_s(made, "mobility", KNOWN, 0.7) == 0.2
+    assert shear.reached_s(made.shares("mobility", KNOWN), 0.9) is None
+    assert shear.reached_s(made.shares("mobility", KNOWN), 0.8) == 0.6
+    assert shear.reached_s(made.shares("mobility", KNOWN), 0.7) == 0.2
 
 
 def test_objects_never_met_have_times_of_their_own():
     made = answers([9, 9], unmet=[5, 8])
-    assert shear.reached_s(made, "mobility", UNMET, 0.8) == 0.4
-    assert shear.reached_s(answers([9, 9]), "mobility", UNMET, 0.1) is None
+    assert shear.reached_s(made.shares("mobility", UNMET), 0.8) == 0.4
+    assert shear.reached_s(answers([9, 9]).shares("mobility", UNMET), 0.1) is None
 
 
 def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
     made = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
-    assert shear.early_s(made, "mobility", 0.9) == 0.5
-    assert shear.early_s(made, "mobility", 0.95) == 0.8
-    assert shear.early_s(made, "mobility", 0.99) is None
+    assert made.early_s("mobility", 0.9) == 0.5
+    assert made.early_s("mobility", 0.95) == 0.8
+    assert made.early_s("mobility", 0.99) is None
 
 
 def test_gains_are_paired_differences():

@@ -52,7 +52,7 @@ def measured(**changes):
     return Measured(**{**facts, "breakaways": {}, **changes})
 
 
-def shown() -> str:
+def shown():
     return slider(measured())
 
 
