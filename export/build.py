@@ -1,6 +1,9 @@
 """Nodes and constants of an ONNX graph, and the projection of `train.projection` as its
 nodes."""
 
+from __future__ import annotations
+
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,6 +30,18 @@ class Builder:
         self.decision_point = decision_point
         self._constants: dict[tuple[Any, ...], str] = {}
         self._made: dict[tuple[Any, ...], str] = {}
+
+    def among(self, decision_points: Sequence[int], count: int) -> Builder:
+        """A builder of the same graph, whose constants stand for some of `count`
+        decision points, which are successive.
+
+        At the others it takes the constants of the nearest of these.
+        """
+        first = decision_points[0]
+        places = np.clip(np.arange(count), first, decision_points[-1]) - first
+        part = copy.copy(self)
+        part.decision_point = self.node("Gather", places, self.decision_point, axis=0)
+        return part
 
     def constant(self, value: Any, name: str = "") -> str:
         """Name of a constant of the value's type; equal ones are stored once, but for
@@ -149,7 +164,10 @@ class Builder:
 
 
 def project(
-    build: Builder, x: str, decision_points: Sequence[Projection]
+    build: Builder,
+    x: str,
+    decision_points: Sequence[Projection],
+    components: int | None = None,
 ) -> tuple[str, str]:
     """Nodes that take features (n, p) to whole coordinates; see
     `train.projection.Projection`.
@@ -158,6 +176,7 @@ def project(
         build: takes the nodes.
         x: name of the features.
         decision_points: a projection for each.
+        components: number of coordinates; the most that one of these has where None.
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
@@ -172,16 +191,18 @@ def project(
     steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS] * len(grids))
     # A step over a unit is a power of two, so that the products' sums are still exact.
     weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
-    columns = build.by_decision_point_small(widened(weights))
+    columns = build.by_decision_point_small(widened(weights, components))
     rounded = build.node("Round", build.node("MatMul", steps, columns))
     z, farther = build.clipped(rounded, [grid.limit for grid in grids])
     return z, build.node("Add", far, farther)
 
 
-def widened(arrays: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Arrays with columns of zeros added up to the widest, for coordinates that are
-    always 0."""
-    widest = max(array.shape[-1] for array in arrays)
+def widened(
+    arrays: Sequence[NDArray[np.float64]], width: int | None = None
+) -> list[NDArray[np.float64]]:
+    """Arrays with columns of zeros added up to a width, or to the widest, for
+    coordinates that are always 0."""
+    widest = width or max(array.shape[-1] for array in arrays)
     return [
         np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, widest - array.shape[-1])])
         for array in arrays

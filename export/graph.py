@@ -24,7 +24,7 @@ from edge.model.info import METADATA_KEY, ModelInfo
 from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
 from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
-from train.pipeline import ContactClassifier
+from train.pipeline import ContactClassifier, Space
 from train.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -37,7 +37,7 @@ def _squares(
     task: str,
     z: str,
     rows: Sequence[NDArray[np.float64]],
-    components: int,
+    components: Sequence[int],
     absent: NDArray[np.bool_],
 ) -> tuple[str, str]:
     """Squared distances (n, rows) of points z (n, c) to rows (rows, c), less |z|^2, and
@@ -46,21 +46,23 @@ def _squares(
     Those to `absent` trials (rows,), which have no label for the task, are infinite.
 
     All are whole numbers below 2^53 (`train.projection.coordinate_bits`), so that |b|^2
-    - 2 b.z cancels nothing. Of more coordinates than `components` the others count as
-    0: the tasks of a space share its rows.
+    - 2 b.z cancels nothing. Of more coordinates than the `components` of a decision
+    point the others count as 0: the tasks of a space share its rows.
     """
     width = rows[0].shape[1]
-    if components < width:
-        z = build.node("Mul", z, (np.arange(width) < components).astype(np.float64))
+    if min(components) < width:
+        masks = [(np.arange(width) < c).astype(np.float64) for c in components]
+        z = build.node("Mul", z, build.by_decision_point(masks))
     columns = build.by_decision_point_small(
         [-2.0 * r.T for r in rows], f"columns of {task}"
     )
-    lengths = build.by_decision_point(
-        [np.where(absent, np.inf, (r[:, :components] ** 2).sum(axis=1)) for r in rows],
-        f"lengths of {task}",
-    )
+    lengths = []
+    for r, c in zip(rows, components, strict=True):
+        squares = (r[:, :c] ** 2).sum(axis=1)
+        lengths.append(np.where(absent, np.inf, squares))
+    subtrahend = build.by_decision_point(lengths, f"lengths of {task}")
     length = build.squared_length(z)
-    return build.node("Gemm", z, columns, lengths), length
+    return build.node("Gemm", z, columns, subtrahend), length
 
 
 def _vote(
@@ -112,25 +114,61 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
     points = (
         model.decision_points_ if isinstance(model, SequentialClassifier) else [model]
     )
-    last = points[-1]
     build = Builder(scope, container)
     names = {output.raw_name: output.full_name for output in operator.outputs}
     x = operator.inputs[0].full_name
     if isinstance(model, SequentialClassifier):
         build.decision_point = build.node("Squeeze", operator.inputs[1].full_name)
-    projected = {
-        space: project(
-            build,
-            build.taken(x, last.columns_[space], last.n_features_in_),
-            [point.projections_[space] for point in points],
-        )
-        for space in last.projections_
-    }
+    projected: dict[Spaces, tuple[str, str]] = {}
+    for task in model.choices:
+        spaces = _spaces(points, task)
+        if spaces not in projected:
+            projected[spaces] = _projected(build, x, points, spaces)
     _out_of_range(build, [off for _, off in projected.values()], names["out_of_range"])
     if isinstance(model, SequentialClassifier):
         _novelty(build, x, model.space_, names["novelty"])
     for task in model.choices:
-        _task(build, points, task, projected[last.spaces_[task]], names)
+        _task(build, points, task, projected[_spaces(points, task)], names)
+
+
+Spaces = tuple[Space, ...]
+"""The space of a task at each decision point. Tasks whose spaces are equal at every one
+share the nodes of a projection."""
+
+
+def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
+    return tuple(point.spaces_[task] for point in points)
+
+
+def _projected(
+    build: Builder, x: str, points: Sequence[ContactClassifier], spaces: Spaces
+) -> tuple[str, str]:
+    """Nodes that project features x to a task's spaces; see `project`.
+
+    Decision points whose spaces take the same columns share nodes. Of several such
+    nodes, those of the decision point asked for are taken.
+    """
+    columns = [p.columns_[space] for p, space in zip(points, spaces, strict=True)]
+    projections = [
+        p.projections_[space] for p, space in zip(points, spaces, strict=True)
+    ]
+    components = max(projection.weights_.shape[1] for projection in projections)
+    count = len(points)
+    starts = [0]
+    for point in range(1, count):
+        if not np.array_equal(columns[point], columns[point - 1]):
+            starts.append(point)
+    parts = []
+    for start, end in zip(starts, [*starts[1:], count], strict=True):
+        part = build if len(starts) == 1 else build.among(range(start, end), count)
+        taken = build.taken(x, columns[start], points[-1].n_features_in_)
+        parts.append(project(part, taken, projections[start:end], components))
+    z, off = parts[0]
+    for start, (later_z, later_off) in zip(starts[1:], parts[1:], strict=True):
+        is_later = build.by_decision_point([point >= start for point in range(count)])
+        z = build.node("Where", is_later, later_z, z)
+        off = build.node("Where", is_later, later_off, off)
+    return z, off
 
 
 def _task(
@@ -150,11 +188,11 @@ def _task(
         names: {output: its name in the graph}.
     """
     last = points[-1]
-    space = last.spaces_[task]
-    members = last.members_[space]
-    units = [point.projections_[space].grid_.unit for point in points]
+    members = last.members_[last.spaces_[task]]
+    units = [point.unit(task) for point in points]
     rows = []
     for point, unit in zip(points, units, strict=True):
+        space = point.spaces_[task]
         of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
         of_all[members] = point.rows_[space] / unit
         rows.append(of_all)
@@ -163,9 +201,7 @@ def _task(
     classes = len(last.classes_[task])
     k = last.choices[task].k
     output = names[f"{task}_label"].removesuffix("_label")
-    # Trials span fewer components at some decision points: there, the rest are always
-    # 0.
-    components = max(point.components_[task] for point in points)
+    components = [point.choices[task].components for point in points]
     z, off = projected
     squares, length = _squares(build, output, z, widened(rows), components, labels < 0)
     voters = build.constant([k], f"k of {output}")

@@ -32,6 +32,7 @@ WITH_JOINTS = (
     ("contact", "joints"),
     ("moments", "joints"),
     ("contact", "moments", "joints"),
+    ("contact", "sqrt_joints"),
     ("taxels",),
     ("sqrt_taxels",),
     ("contact", "joints", "posture"),
@@ -47,6 +48,10 @@ WITH_SHEAR = (
 )
 """Those that recordings of a skin of three axes have besides, with or without joint
 angles."""
+EARLY_WITH_JOINTS = (("sqrt_joints",),)
+"""Those tried besides at early decision points of recordings with joint angles. The arm
+tells that a thing has begun to move before the skin does; roots let a small motion
+count."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
@@ -75,11 +80,13 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.projection.KINDS`.
         grids: the settings tried with them.
+        early: whether it is tried at early decision points alone.
     """
 
     sets: tuple[str, ...]
     projection: str
     grids: tuple[SearchGrid, ...]
+    early: bool = False
 
     @property
     def name(self) -> str:
@@ -121,13 +128,16 @@ def candidates(  # noqa: PLR0913 - each option of `export` that fixes a choice
     """
     fixed = Fixed(features, projection, scaling, components, k)
     mode = Mode.of(drawn=drawn, quick=quick)
+    sets_at_the_end = _combinations(fixed, mode, joints=joints, shear=shear)
+    early = mode.early if joints and features is None else ()
     combinations = []
-    for sets in _combinations(fixed, mode, joints=joints, shear=shear):
+    for sets in (*sets_at_the_end, *early):
         for kind in KINDS if projection is None else (projection,):
             if fixed.asks or mode.tries(kind, sets):
                 grid = _grid(sets, kind, fixed, mode)
                 grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-                combinations.append(Candidate(tuple(sets), kind, grids))
+                is_early = sets not in sets_at_the_end
+                combinations.append(Candidate(tuple(sets), kind, grids, is_early))
     return combinations
 
 
@@ -158,6 +168,7 @@ class Mode:
     Attributes:
         combinations, with_joints: feature sets without and with joint angles.
         with_shear: further ones of a skin of three axes.
+        early: further ones of early decision points, with joint angles.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -168,6 +179,7 @@ class Mode:
     combinations: Sequence[tuple[str, ...]]
     with_joints: Sequence[tuple[str, ...]]
     with_shear: Sequence[tuple[str, ...]]
+    early: Sequence[tuple[str, ...]]
     shrinkages: Sequence[float]
     components: Sequence[int]
     most_directions: int | None
@@ -182,6 +194,7 @@ class Mode:
                 combinations=(DRAWN,),
                 with_joints=(DRAWN_WITH_JOINTS,),
                 with_shear=(),
+                early=(),
                 shrinkages=DRAWN_SHRINKAGES,
                 components=DRAWN_COMPONENTS,
                 most_directions=DRAWN_COMPONENTS[-1],
@@ -193,6 +206,7 @@ class Mode:
             combinations=PLAIN[:number],
             with_joints=WITH_JOINTS[:number],
             with_shear=WITH_SHEAR,
+            early=() if quick else EARLY_WITH_JOINTS,
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
             most_directions=None,

@@ -16,6 +16,7 @@ from train.candidates import Candidate, costs, places_of
 from train.dataset import DataSet
 from train.evaluate import (
     FOLDS,
+    SEED,
     VARIANCE,
     AnswerTable,
     Promise,
@@ -31,7 +32,7 @@ from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
 from train.search import SearchGrid
-from train.stopping import held_out
+from train.stopping import Early, held_out
 from train.vectors import Labels, Vectors
 
 FEWEST_GROUPS = 3
@@ -47,10 +48,18 @@ MANY = 2000
 """Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
 and five with more than `MANY`: four fifths of so many trials teach nearly as much as
 all."""
+REPEATS = 3
+FEW_TO_REPEAT = 200
+"""How often the trials are divided into folds where there are fewer than
+`FEW_TO_REPEAT`. The fits of more trials take longer, and their choice depends less on
+the division."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
 objects."""
+EARLY_SHARE = 0.5
+"""Part of the full window at which the settings of the earlier decision points are
+chosen."""
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 WINDOW_MARGIN = 0.02
@@ -86,6 +95,27 @@ def fold_count(trials: int, quick: bool = False) -> int:
 
 Plan = tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
+
+
+@dataclass(frozen=True)
+class Nested:
+    """Which answers are nested: those to left-out trials, and to left-out groups."""
+
+    trials: bool
+    groups: bool
+
+
+@dataclass(frozen=True)
+class EarlySettings:
+    """The settings of the decision points before the full window.
+
+    Attributes:
+        settings: chosen as those of the full window are.
+        known: chosen for objects that were recorded.
+    """
+
+    settings: Early
+    known: Early
 
 
 @dataclass(frozen=True)
@@ -131,7 +161,7 @@ class Choosing:
     Args:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
-        tried: the candidates.
+        tried: the candidates, those of early decision points among them.
         samples: values of a feature.
         leave_out: label whose groups are left out for a task, where each of its classes
             has several of them; `TRIAL` for none. In place of an object its entire kind
@@ -155,14 +185,21 @@ class Choosing:
     ) -> None:
         self._dataset = dataset
         self._y = y
-        self.tried = tried
+        self.tried = [candidate for candidate in tried if not candidate.early]
+        self._tried_early = tried
         self._samples = samples
         self._jobs = jobs
         self._progress = progress
         self._leave_out = leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
         labels = y[finest(y)]
-        self._folds = stratified_folds(labels, fold_count(len(labels), quick))
+        count = fold_count(len(labels), quick)
+        self._folds = stratified_folds(labels, count)
+        repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
+        self._other_folds = [
+            stratified_folds(labels, count, SEED + repeat)
+            for repeat in range(1, repeats)
+        ]
         kinds = (
             kinds_of([t.recording for t in dataset.trials])
             if leave_out == LEAVE_OUT
@@ -189,31 +226,40 @@ class Choosing:
         return Vectors(X, self._y, self._dataset.names, widths)
 
     def _tables(
-        self, X: NDArray[np.float64], nested: bool, what: str
+        self,
+        X: NDArray[np.float64],
+        tried: Sequence[Candidate],
+        nested: Nested,
+        what: str,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any.
 
         Without groups, both are the answers to left-out trials.
         """
-        grids = [grid for candidate in self.tried for grid in candidate.grids]
-        answers = partial(evaluate, jobs=self._jobs, nested=nested)
+        grids = [grid for candidate in tried for grid in candidate.grids]
+        answers = partial(evaluate, jobs=self._jobs)
         vectors = self._vectors(X)
-        total = fits(self._folds, nested)
+        total = fits(self._folds, nested.trials)
+        total += sum(fits(folds, False) for folds in self._other_folds)
         if self._grouped:
-            total += fits(self._group_folds, nested)
+            total += fits(self._group_folds, nested.groups)
         # One bar for both tables, so that the time left is that of the whole choice.
         with bar(
             total=total, desc=what, unit=" fits", disable=not self._progress
         ) as progress:
-            trials = answers(vectors, self._folds, grids, progress=progress.update)
+            answers = partial(answers, progress=progress.update)
+            trials = answers(vectors, self._folds, grids, nested=nested.trials)
+            repeated = [
+                answers(vectors, folds, grids, nested=False)
+                for folds in self._other_folds
+            ]
+            trials = replace(trials, repeated=tuple(repeated))
             if not self._grouped:
                 return trials, trials
             vectors = replace(vectors, y=self._of_groups(grids))
             unseen = self._unseen(grids)
-            groups = answers(
-                vectors, self._group_folds, unseen, progress=progress.update
-            )
+            groups = answers(vectors, self._group_folds, unseen, nested=nested.groups)
         return trials, groups
 
     def _unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
@@ -235,12 +281,13 @@ class Choosing:
         tasks = self._grouped.union(*together)
         return {task: self._y[task] for task in self._y if task in tasks}
 
-    def _right(self, window_s: float) -> dict[str, NDArray[np.bool_]]:
-        """{task: answers of the candidate that is best in plain cross-validation}."""
-        trials, groups = self._tables(
-            self._features(window_s), False, f"{window_s:g} s"
-        )
-        right: dict[str, NDArray[np.bool_]] = {}
+    def _right(self, window_s: float) -> dict[str, NDArray[np.float64]]:
+        """{task: the shares of right answers to each trial, of the candidate that is
+        best in plain cross-validation}."""
+        X = self._features(window_s)
+        plain = Nested(trials=False, groups=False)
+        trials, groups = self._tables(X, self.tried, plain, f"{window_s:g} s")
+        right: dict[str, NDArray[np.float64]] = {}
         for task in self._y:
             table = groups if task in self._grouped else trials
             answers = table.held_out(task)[:, table.tested[task]]
@@ -252,7 +299,7 @@ class Choosing:
         wrong."""
         results = [
             promised(
-                Result(int(right.sum()), len(right)),
+                Result(round(right.sum()), len(right)),
                 self._dataset.untouched_labels(task),
             )
             for task, right in self._right(window_s).items()
@@ -301,7 +348,8 @@ class Choosing:
             [fold]{task: the choice made without the fold's trials}.
         """
         X = self._features(window_s)
-        trials, groups = self._tables(X, True, "choosing")
+        nested = Nested(trials=True, groups=True)
+        trials, groups = self._tables(X, self.tried, nested, "choosing")
         settled = {task: self._settle(task, trials, groups) for task in self._y}
         chosen = {task: settings.chosen for task, settings in settled.items()}
         without = _by_fold(
@@ -321,6 +369,33 @@ class Choosing:
         }
         together = decided_together(chosen, self._vectors(X), plans, self._jobs)
         return together, trials.folds, without
+
+    def early(self, window_s: float, chosen: Mapping[str, Chosen]) -> EarlySettings:
+        """The settings of the decision points before the full window: by the same rule,
+        at `EARLY_SHARE` of it."""
+        X = self._features(EARLY_SHARE * window_s)
+        nested = Nested(trials=True, groups=False)
+        trials, groups = self._tables(X, self._tried_early, nested, "choosing early")
+        folds = range(int(trials.folds.max()) + 1)
+
+        def settings(tables: Mapping[str, AnswerTable]) -> Early:
+            choices = {}
+            by_fold: list[dict[str, Choice]] = [{} for _ in folds]
+            for task, table in tables.items():
+                # The graph has one number of neighbours for all decision points.
+                k = chosen[task].choice.k
+                prices = costs(table.choices[task], self._widths)
+                margin = 0.0 if table is trials else UNSEEN_MARGIN
+                place = table.chosen(task, prices, margin=margin)
+                choices[task] = replace(table.choices[task][place], k=k)
+                without = without_folds(task, trials, table, prices, margin)
+                for of_fold, choice in zip(by_fold, without, strict=True):
+                    of_fold[task] = replace(choice, k=k)
+            return Early(window_s, choices, by_fold)
+
+        by_trial = dict.fromkeys(self._y, trials)
+        by_group = dict.fromkeys(self._grouped, groups)
+        return EarlySettings(settings(by_trial | by_group), settings(by_trial))
 
     def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
         """A task's settings, by the answers to left-out trials and to left-out
@@ -456,7 +531,7 @@ def _right_together(
     that are decided together."""
     folds, choices = plan
     at_end = replace(vectors, X=vectors.X[None])
-    of_family = [_of_tasks(by_task, family) for by_task in choices]
+    of_family = [[_of_tasks(by_task, family)] for by_task in choices]
     right = {task: np.zeros(len(folds), dtype=bool) for task in family}
     for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
         in_fold = folds == fold

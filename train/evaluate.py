@@ -9,7 +9,13 @@ a fit's own trials. So no trial takes part in the fit that answers it, nor in th
 of features, projection, shrinkage, components and k: the share of right answers is the
 nested accuracy. A fit without folds i and j serves both i and j, so ten folds take 55
 fits, not 110.
+
+With few trials the best candidate depends on how they are divided. So the choice by all
+trials averages the answers of several divisions (`AnswerTable.repeated`). The choices
+that the nested accuracy counts come from one division, which makes them no better.
 """
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -96,9 +102,11 @@ def finest(y: Labels) -> str:
     return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
 
 
-def stratified_folds(y: NDArray[np.str_], count: int = FOLDS) -> NDArray[np.int64]:
+def stratified_folds(
+    y: NDArray[np.str_], count: int = FOLDS, seed: int = SEED
+) -> NDArray[np.int64]:
     """(n,) folds in which each class is spread evenly; the same for the same labels."""
-    order = np.random.default_rng(SEED).permutation(len(y))
+    order = np.random.default_rng(seed).permutation(len(y))
     order = order[np.argsort(y[order], kind="stable")]
     folds = np.empty(len(y), dtype=np.int64)
     folds[order] = np.arange(len(y)) % min(count, len(y))
@@ -215,17 +223,24 @@ class AnswerTable:
             that are not tested.
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
+        repeated: tables of the same candidates by other folds, whose answers to
+            left-out trials count in the choice by all trials.
     """
 
     folds: NDArray[np.int64]
     choices: dict[str, list[Choice]]
     right: dict[str, NDArray[np.bool_]] = field(repr=False)
     tested: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+    repeated: tuple[AnswerTable, ...] = ()
 
-    def held_out(self, task: str) -> NDArray[np.bool_]:
-        """(candidates, n) answers to each trial by the fit without its fold."""
-        right = self.right[task]
-        return np.asarray(right[self.folds, :, np.arange(len(self.folds))].T)
+    def held_out(self, task: str) -> NDArray[np.float64]:
+        """(candidates, n) share of right answers to each trial, by the fits without its
+        fold in this table and in the `repeated` ones."""
+        right = self.right[task][self.folds, :, np.arange(len(self.folds))].T
+        shares = right.astype(np.float64)
+        for table in self.repeated:
+            shares += table.held_out(task)
+        return shares / (1 + len(self.repeated))
 
     def chosen(self, task: str, *rule: Any, **more: Any) -> int:
         """The candidate chosen by all trials."""
@@ -256,7 +271,7 @@ class AnswerTable:
 
 
 def choose(
-    right: NDArray[np.bool_],
+    right: NDArray[np.bool_] | NDArray[np.float64],
     cost: NDArray[np.int64] | None = None,
     allowed: NDArray[np.int64] | None = None,
     margin: float = 0.0,
@@ -268,7 +283,7 @@ def choose(
     trials.
 
     Args:
-        right: (candidates, n) answers of each.
+        right: (candidates, n) whether the answers of each are right, or what share.
         cost: (candidates,) of each. At equal cost the most accurate counts, then the
             first. Without costs the most accurate of all is taken.
         allowed: the candidates to choose from; all where None.
@@ -283,7 +298,7 @@ def choose(
     best = np.array(
         [np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)]
     )
-    answers = right[candidates[best]].astype(np.int64)
+    answers = right[candidates[best]].astype(np.float64)
     worse = answers[means[best].argmax()] - answers
     error = worse.std(axis=1) / np.sqrt(right.shape[1])
     within = worse.mean(axis=1) <= np.maximum(error, margin)

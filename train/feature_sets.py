@@ -54,8 +54,9 @@ the skin's cells, lie above values that training gave (`edge.touch.kernels`).
 | `taxel_kernels`, 1,008 of them | 1 | the sums of counts of at most 32 cells |
 | `zone_kernels`, 504 of them | 1 | the sums of `contact`, `skin`, `left` and `right` |
 
-`joints`: how far each joint yields, which depends on the object touched. `posture`: the
-angles themselves. They give a gripper the object's size, and an arm its place. Where
+`joints`: how far each joint yields, which depends on the object touched. `sqrt_joints`:
+the same of its square root, in which small motions count. `posture`: the angles
+themselves. They give a gripper the object's size, and an arm its place. Where
 each object stood in its own place, posture recognises it for a reason that holds in
 that room only.
 
@@ -113,6 +114,7 @@ SETS: dict[str, tuple[str, ...]] = {
     "kernels": ("taxel_kernels",),
     "zone_kernels": ("zone_kernels",),
     "joints": ("joint_change@10", "joint_change_rate@10"),
+    "sqrt_joints": ("sqrt_joint_change@10", "sqrt_joint_change_rate@10"),
     "posture": ("joint_angle@10",),
     "shear": (
         "log_contact_shear_size@5",

@@ -1,6 +1,8 @@
 """Recordings to a fitted model: settings are chosen, and their accuracy measured."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, candidates
-from train.choose import LEAVE_OUT, Choosing, Chosen, kinds_of
+from train.choose import LEAVE_OUT, Choosing, Chosen, EarlySettings, kinds_of
 from train.dataset import DataSet, Recordings, Untouched, load_trials, read
 from train.feature_sets import expand
 from train.mix import mix
@@ -174,6 +176,8 @@ class Settings:
         tried: the candidates that they were chosen among.
         window_s: of the full decision.
         notes: sentences that a user should read.
+        early: settings of earlier decision points; None where those of the full window
+            serve for all.
     """
 
     chosen: dict[str, Chosen]
@@ -182,11 +186,36 @@ class Settings:
     tried: Sequence[Candidate]
     window_s: float
     notes: list[str]
+    early: EarlySettings | None = None
 
     @property
     def choices(self) -> dict[str, Choice]:
         """{task: its choice}."""
         return {task: settled.choice for task, settled in self.chosen.items()}
+
+    @property
+    def tested(self) -> int:
+        """Number of trials that calibrate."""
+        return int((self.folds >= 0).sum())
+
+    def taken(self, *, folds: bool = False) -> set[str]:
+        """The names of the features that the settings take.
+
+        Args:
+            folds: count those chosen without each fold too.
+        """
+        settings: list[Mapping[str, Choice]] = [self.choices]
+        settings += self.without if folds else []
+        if self.early is not None:
+            early = self.early.settings
+            settings.append(early.choices)
+            settings += early.by_fold if folds else []
+        return {
+            name
+            for choices in settings
+            for choice in choices.values()
+            for name in choice.features
+        }
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
@@ -245,8 +274,10 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
     notes += [*settings.notes, *_leaks_of(measured, y)]
-    dataset = measured.of(_features(settings.choices.values()))
-    points = _decision_points(dataset, settings, fixed, notes)
+    points = _decision_points(measured, settings, fixed, notes)
+    if len(points) < 2:
+        settings = replace(settings, early=None)
+    dataset = measured.of(sorted(settings.taken()))
     X = dataset.features(settings.window_s, fixed.samples)
     sequential = None
     if points:
@@ -391,7 +422,10 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
         )
     window_s, notes = choosing.window(windows)
     chosen, folds, without = choosing.choose(window_s)
-    return Settings(chosen, folds, without, choosing.tried, window_s, notes)
+    settings = Settings(chosen, folds, without, choosing.tried, window_s, notes)
+    if options.quick or not _has_early_points(settings, options):
+        return settings
+    return replace(settings, early=choosing.early(window_s, chosen))
 
 
 def _choose_mixed(
@@ -424,11 +458,6 @@ def _choose_mixed(
     )
 
 
-def _features(choices: Iterable[Choice]) -> list[str]:
-    """The names of the features that some choices take."""
-    return [name for choice in choices for name in choice.features]
-
-
 def calibrate(
     measured: DataSet,
     y: Labels,
@@ -437,10 +466,7 @@ def calibrate(
     options: FitOptions,
 ) -> SequentialClassifier:
     """A classifier for all decision points, with its stopping rules."""
-    choices = list(settings.choices.values())
-    for by_task in settings.without:
-        choices += by_task.values()
-    dataset = measured.of(_features(choices))
+    dataset = measured.of(sorted(settings.taken(folds=True)))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
         settings.choices,
@@ -448,6 +474,7 @@ def calibrate(
         dataset.names,
         jobs=options.processes,
         widths=dataset.widths(options.samples),
+        early=None if settings.early is None else settings.early.settings,
     )
     return classifier.fit(
         at_points, y, settings.folds, settings.without, measured.is_own
@@ -478,7 +505,10 @@ def _early_of_known(
         by_task | {task: c.known_by_fold[fold] for task, c in known.items()}
         for fold, by_task in enumerate(settings.without)
     ]
-    for_known = replace(settings, chosen=chosen, without=without)
+    early = settings.early
+    if early is not None:
+        early = replace(early, settings=early.known)
+    for_known = replace(settings, chosen=chosen, without=without, early=early)
     other = calibrate(measured, y, points, for_known, options)
     errors = []
     for task in known:
@@ -601,7 +631,7 @@ def _decision_points(
                 "decisions carry no confidence, as the model has no decision points"
             )
         return tuple(options.decision_points_s)
-    tested = int((settings.folds >= 0).sum())
+    tested = settings.tested
     if tested < FEWEST:
         notes.append(
             "decisions carry no confidence and none is early: calibration needs at "
@@ -615,21 +645,21 @@ def _decision_points(
             "asks for them"
         )
         return (settings.window_s,)
-    bytes_a_point = _bytes_a_point(dataset, settings.choices, options.samples)
-    most_bytes = LARGEST_BYTES - _bytes_of_novelty(dataset, options.samples)
+    dataset = dataset.of(sorted(settings.taken()))
+    sizes = _Sizes.of(dataset, settings, options.samples)
     points: list[float] = []
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
         step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
         points = _rising(step_s, settings.window_s)
-        if len(points) * bytes_a_point <= most_bytes:
+        if sizes.total(len(points)) <= LARGEST_BYTES:
             if every_s > STEPS_S[0]:
                 notes.append(
                     f"{len(points)} decision points, one every {step_s:g} s, so that "
                     "the model stays below 1.2 MB; --decision-points asks for more"
                 )
             return tuple(points)
-    megabytes = len(points) * bytes_a_point / 1e6
+    megabytes = sizes.total(len(points)) / 1e6
     notes.append(
         "no decision points before the full window: they would make the model about "
         f"{megabytes:.1f} MB; --decision-points asks for them"
@@ -637,10 +667,54 @@ def _decision_points(
     return (settings.window_s,)
 
 
-def _bytes_a_point(
-    dataset: DataSet, choices: Mapping[str, Choice], samples: int
-) -> int:
-    """Bytes of weights of a decision point."""
+def _has_early_points(settings: Settings, options: FitOptions) -> bool:
+    """Whether decision points before the full window are asked for, or usual."""
+    if options.decision_points_s is not None:
+        return len(options.decision_points_s) > 1
+    return FEWEST <= settings.tested <= MOST_TRIALS
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """Bytes of a model's constants.
+
+    Attributes:
+        once: of those that all decision points share.
+        early: of each decision point before the full window.
+        full: of the full window.
+    """
+
+    once: int
+    early: int
+    full: int
+
+    @classmethod
+    def of(cls, dataset: DataSet, settings: Settings, samples: int) -> _Sizes:
+        """The sizes of the model that some settings give."""
+        columns = sum(dataset.widths(samples))
+        trials = len(dataset.trials)
+        novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
+        novelty += 8 * columns + 8 * trials
+        early = settings.choices
+        if settings.early is not None:
+            early = {**early, **settings.early.settings.choices}
+        return cls(
+            once=2 * MOST_COMPONENTS * columns,
+            early=novelty + _bytes_of(early, dataset, samples),
+            full=novelty + _bytes_of(settings.choices, dataset, samples),
+        )
+
+    def total(self, points: int) -> int:
+        """Bytes of a model with so many decision points."""
+        return self.once + (points - 1) * self.early + self.full
+
+
+def _bytes_of(choices: Mapping[str, Choice], dataset: DataSet, samples: int) -> int:
+    """Bytes of the constants that project and compare at a decision point.
+
+    A column has a mean, a gain, and a weight for each coordinate; a trial its
+    coordinates and their length.
+    """
     widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
     trials = len(dataset.trials)
     size = 0
@@ -648,14 +722,8 @@ def _bytes_a_point(
         columns = sum(widths[name] for name in choice.features)
         classes = len(set(dataset.labels(task).tolist()))
         components = min(choice.components, 2 * classes, trials)
-        size += components * (4 * columns + 8 * trials)
-    every_column = sum(widths.values())
-    return size + 8 * every_column + 2 * MOST_COMPONENTS * trials
-
-
-def _bytes_of_novelty(dataset: DataSet, samples: int) -> int:
-    """Bytes of the weights that score novelty at all decision points."""
-    return 2 * MOST_COMPONENTS * sum(dataset.widths(samples))
+        size += columns * (16 + 4 * components) + trials * (8 + 4 * components)
+    return size
 
 
 def _rising(step_s: float, window_s: float) -> list[float]:

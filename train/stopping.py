@@ -1,9 +1,11 @@
 """Deciding as soon as it is sure: a calibrated confidence at each decision point.
 
 A model decides at several decision points, each with a window, a projection and
-training rows of its own. Confidence, rules and novelty limits are made from trials that
-the deciding model did not see: the trials are divided into folds, and each fold is
-decided by a model that was fitted, and whose settings were chosen, without it.
+training rows of its own. Those before some time may have settings of their own too
+(`Early`): early the arm tells what the skin tells later. Confidence, rules and novelty
+limits are made from trials that the deciding model did not see: the trials are divided
+into folds, and each fold is decided by a model that was fitted, and whose settings were
+chosen, without it.
 
 **Confidence.** The margin says how much nearer the training trials of the named label
 lie than those of any other (`edge.model.stopping.margin`). Logistic regression at each
@@ -64,6 +66,25 @@ LEAST_SLOPE = 1e-3
 likely."""
 
 
+AtPoints = Sequence[Mapping[str, Choice]]
+"""[decision point]{task: Choice}."""
+
+
+@dataclass(frozen=True)
+class Early:
+    """Settings of the decision points before some time.
+
+    Attributes:
+        until_s: the time.
+        choices: {task: Choice}; a task without one has the settings of the full window.
+        by_fold: [fold]{task: the choice made without the fold's trials}.
+    """
+
+    until_s: float
+    choices: Mapping[str, Choice]
+    by_fold: Sequence[Mapping[str, Choice]]
+
+
 Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64]]]
 """{task: labels and margins, (decision points, m) each}."""
 
@@ -94,7 +115,7 @@ def _answers(
 def held_out(
     vectors: Vectors,
     folds: NDArray[np.int64],
-    fold_choices: Sequence[Mapping[str, Choice]],
+    fold_choices: Sequence[AtPoints],
     jobs: int = 1,
 ) -> list[Answers]:
     """[fold] decisions of models without the fold's trials on these, in their order.
@@ -102,7 +123,7 @@ def held_out(
     Args:
         vectors: (decision points, n, p).
         folds: (n,) from 0, or -1 for trials that are never left out.
-        fold_choices: [fold]{task: Choice}.
+        fold_choices: [fold][decision point]{task: Choice}.
         jobs: processes.
     """
     work = (
@@ -112,15 +133,13 @@ def held_out(
     return list(Parallel(n_jobs=jobs)(work))
 
 
-def _fold(
-    vectors: Vectors, left_out: NDArray[np.bool_], choices: Mapping[str, Choice]
-) -> Answers:
+def _fold(vectors: Vectors, left_out: NDArray[np.bool_], choices: AtPoints) -> Answers:
     training = vectors.part(~left_out)
     form = training.features, training.widths
     with single_thread():
         models = [
-            ContactClassifier(choices, *form).fit(x, training.y, training.is_own)
-            for x in training.X
+            ContactClassifier(at_point, *form).fit(x, training.y, training.is_own)
+            for at_point, x in zip(choices, training.X, strict=True)
         ]
         return answers(models, vectors.X[:, left_out])
 
@@ -245,12 +264,13 @@ class SequentialClassifier:
     waiting.
 
     Args:
-        choices: {task: Choice}, the same at every decision point.
+        choices: {task: Choice} of the full window.
         decision_points_s: windows in seconds, increasing; the last is the full window.
         features: names of the feature types, in the order of the vectors; features that
             `choices` do not take are there for the choices of the folds.
         jobs: processes.
         widths: columns of each feature type; equal where None.
+        early: settings of early decision points; those of the full window where None.
 
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
@@ -271,8 +291,10 @@ class SequentialClassifier:
         features: Sequence[str] = FEATURES,
         jobs: int = 1,
         widths: Sequence[int] | None = None,
+        early: Early | None = None,
     ) -> None:
         self.choices = choices
+        self.early = early
         self.decision_points_s = tuple(decision_points_s)
         self.features = features
         self.jobs = jobs
@@ -307,27 +329,52 @@ class SequentialClassifier:
         self._fit_points(X, y, is_own)
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(X, y, folds)
-        chosen_without = self._held_out(X, y, folds, fold_choices, is_own)
+        without = self._without(fold_choices)
+        chosen_without = self._held_out(X, y, folds, without, is_own)
         self.right_ = chosen_without.right
         rules = self._certify(chosen_without, folds, tested)
         # Margins are on the scale of the settings. Curves that the exported model uses
         # come from margins by its own settings, in fits without the trials; as the
         # trials had a part in the choice of these, the curves' means come from choices
         # without them.
-        if all(choices == self.choices for choices in fold_choices):
+        same = [self.choices_at] * len(fold_choices)
+        if without == same:
             curves = chosen_without
         else:
-            same = [self.choices] * len(fold_choices)
             curves = self._held_out(X, y, folds, same, is_own)
         self._calibrate(curves, tested, rules)
         return self
+
+    @property
+    def choices_at(self) -> AtPoints:
+        """[decision point]{task: Choice}."""
+        early = {} if self.early is None else self.early.choices
+        return self._at_points(self.choices, early)
+
+    def _without(self, fold_choices: Sequence[Mapping[str, Choice]]) -> list[AtPoints]:
+        """[fold][decision point]{task: the choice made without the fold's trials}."""
+        if self.early is None:
+            return [self._at_points(choices, {}) for choices in fold_choices]
+        pairs = zip(fold_choices, self.early.by_fold, strict=True)
+        return [self._at_points(full, early) for full, early in pairs]
+
+    def _at_points(
+        self, full: Mapping[str, Choice], early: Mapping[str, Choice]
+    ) -> AtPoints:
+        """[decision point]{task: Choice} of choices for the full window and for early
+        points."""
+        until_s = 0.0 if self.early is None else self.early.until_s
+        return [
+            {**full, **early} if seconds < until_s else full
+            for seconds in self.decision_points_s
+        ]
 
     def _held_out(
         self,
         X: NDArray[np.float64],
         y: Mapping[str, NDArray[np.str_]],
         folds: NDArray[np.int64],
-        fold_choices: Sequence[Mapping[str, Choice]],
+        fold_choices: Sequence[AtPoints],
         is_own: NDArray[np.bool_] | None,
     ) -> HeldOut:
         """Answers to each trial by models with some settings, without its fold."""
@@ -351,15 +398,16 @@ class SequentialClassifier:
         is_own: NDArray[np.bool_] | None,
     ) -> None:
         """Fit the classifier of each decision point."""
-        features = _taken(self.choices.values(), self.features)
+        choices = [choice for at in self.choices_at for choice in at.values()]
+        features = _taken(choices, self.features)
         widths = widths_of(X.shape[2], self.features, self.widths)
         self.columns_ = columns_of(features, self.features, widths)
         self.types_ = types_of(features, self.features, widths)
         self.n_features_in_ = len(self.columns_)
         self.decision_points_ = []
         with single_thread():
-            for x in X[..., self.columns_]:
-                classifier = ContactClassifier(self.choices, *self.types_)
+            for at_point, x in zip(self.choices_at, X[..., self.columns_], strict=True):
+                classifier = ContactClassifier(at_point, *self.types_)
                 self.decision_points_.append(classifier.fit(x, y, is_own))
 
     def _fit_novelty(

@@ -3,7 +3,14 @@
 import numpy as np
 
 from tests.train.test_agreement import TASKS
-from train.candidates import PLAIN, WITH_JOINTS, WITH_SHEAR, candidates, costs
+from train.candidates import (
+    EARLY_WITH_JOINTS,
+    PLAIN,
+    WITH_JOINTS,
+    WITH_SHEAR,
+    candidates,
+    costs,
+)
 from train.feature_sets import expand
 from train.pipeline import Choice
 
@@ -40,9 +47,9 @@ def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
 
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
-    assert {candidate.sets for candidate in candidates(TASKS, joints=True)} == set(
-        WITH_JOINTS
-    )
+    with_joints = candidates(TASKS, joints=True)
+    assert {c.sets for c in with_joints if not c.early} == set(WITH_JOINTS)
+    assert {c.sets for c in with_joints if c.early} == set(EARLY_WITH_JOINTS)
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
 

@@ -10,7 +10,13 @@ from edge.recording import Recording
 from edge.saving import save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
-from train.fitting import FitOptions, _decision_points, _leaks, windows_of
+from train.fitting import (
+    FitOptions,
+    Settings,
+    _decision_points,
+    _leaks,
+    windows_of,
+)
 from train.pipeline import Choice
 
 
@@ -135,9 +141,10 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
     ("trials", "objects", "components", "points"),
     [
         (140, 18, 99, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
-        (1400, 18, 17, (0.4, 0.8, 1.2)),
-        (600, 68, 67, (0.6, 1.2)),
-        (120, 100, 999, (0.3, 0.6, 0.9, 1.2)),  # no more coordinates than trials
+        (1400, 18, 17, (0.3, 0.6, 0.9, 1.2)),
+        (600, 68, 67, (0.3, 0.6, 0.9, 1.2)),
+        # no more coordinates than trials
+        (120, 100, 999, (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)),
         (2000, 90, 89, (1.2,)),
     ],
 )
@@ -151,10 +158,15 @@ def test_a_model_has_the_decision_points_that_keep_it_small(
         widths=lambda samples: (150,),
         labels=lambda task: labels,
     )
-    settings = SimpleNamespace(
-        choices={"object": Choice("IV", components, 3, features=("max_force",))},
+    data.of = lambda names: data
+    choice = Choice("IV", components, 3, features=("max_force",))
+    settings = Settings(
+        chosen={"object": SimpleNamespace(choice=choice)},
         folds=np.zeros(trials),
+        without=[],
+        tried=(),
         window_s=1.2,
+        notes=[],
     )
     notes: list[str] = []
     found = _decision_points(data, settings, FitOptions(), notes)
