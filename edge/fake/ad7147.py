@@ -43,10 +43,9 @@ class FakeAD7147(FakeChip):
                 last one; 0 for results that are always fresh.
             power_up: draws the stage registers, which power-up leaves undefined.
         """
-        self._sense = sense
         self._refresh = refresh_s
         self._power_up = power_up or random.Random("power-up")
-        self.reset()
+        super().__init__(sense)
 
     @classmethod
     def of(

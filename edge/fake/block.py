@@ -30,11 +30,10 @@ class FakeBlock(FakeChip):
             bits: of one value.
             axes: values of a taxel; those of three axes go out as signed numbers.
         """
-        self._sense = sense
+        super().__init__(sense)
         self._taxels = taxels
         self._bits = bits
         self._axes = axes
-        self._pointer = 0
 
     @classmethod
     def of(

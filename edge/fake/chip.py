@@ -17,6 +17,16 @@ Sense = Callable[[float], NDArray[np.uint16]]
 class FakeChip(ABC):
     """A model of a chip on a fake bus."""
 
+    def __init__(self, sense: Sense) -> None:
+        """Model a chip that has just been powered on.
+
+        Args:
+            sense: raw values of its taxels at a time.
+        """
+        self._sense = sense
+        self._pointer = 0
+        self.reset()
+
     @classmethod
     def of(
         cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
@@ -29,7 +39,7 @@ class FakeChip(ABC):
             timed: whether conversions take their real time.
             power_up: draws the registers that power-up leaves undefined.
         """
-        return cls(sense)  # type: ignore[call-arg] # most models take nothing else
+        return cls(sense)
 
     @abstractmethod
     def write(self, data: bytes, t: float) -> None:

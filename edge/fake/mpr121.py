@@ -14,7 +14,7 @@ from edge.chips.mpr121 import (
     SATURATED,
     TOUCH_HIGH,
 )
-from edge.fake.chip import FakeChip, Sense
+from edge.fake.chip import FakeChip
 
 
 class FakeMPR121(FakeChip):
@@ -23,11 +23,8 @@ class FakeMPR121(FakeChip):
     While it runs, a write to most registers is lost.
     """
 
-    def __init__(self, sense: Sense) -> None:
-        self._sense = sense
-        self.over_current = False
-        """The resistor at REXT is too small."""
-        self.reset()
+    over_current = False
+    """The resistor at REXT is too small."""
 
     def reset(self) -> None:
         """Registers as after power-on or soft reset."""

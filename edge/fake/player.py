@@ -54,7 +54,8 @@ class Playback:
             loop: start again after its end, and after a pause without a touch that
                 ends every contact.
         """
-        self.recording, self._frames = recording, list(recording)
+        self.recording = recording
+        self._frames = list(recording)
         self._t = recording.t - recording.t[0]
         steps = np.diff(self._t)
         last = float(np.median(steps)) if steps.size else 0.01
@@ -72,9 +73,8 @@ class Playback:
         t -= self.start
         if self.ends == math.inf:
             t %= self._length
-        return max(
-            0, int(np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")) - 1
-        )
+        after = np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")
+        return max(0, int(after) - 1)
 
     def __call__(self, t: float) -> NDArray[np.uint16]:
         """Counts above baseline (rows, cols) at `t`."""
@@ -97,20 +97,20 @@ def _untouched(frame: Frame) -> Frame:
 
 def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     """The file with its calibration, or with that of fake chips with this noise."""
-    if file.calibration is not None:
-        return file
-    baseline = np.zeros(file.layout.shape, dtype=np.uint16)
-    for chip in file.chips:
-        baseline.flat[chip.served] = chip.traits.rest
-    noise = np.full(baseline.shape, noise_counts)
-    calibration = TaxelCalibration(baseline, noise)
-    if file.layout.axes:
+    calibration = file.calibration
+    if calibration is None:
+        baseline = np.zeros(file.layout.shape, dtype=np.uint16)
+        for chip in file.chips:
+            baseline.flat[chip.served] = chip.traits.rest
+        calibration = TaxelCalibration(baseline, np.full(baseline.shape, noise_counts))
+    if file.layout.axes and calibration.shear_baseline is None:
         from edge.chips.three_axes import ZERO  # few skins have three axes
 
+        shape = *file.layout.shape, 2
         calibration = replace(
             calibration,
-            shear_baseline=np.full((*baseline.shape, 2), ZERO, dtype=np.uint16),
-            shear_noise=np.full((*baseline.shape, 2), noise_counts),
+            shear_baseline=np.full(shape, ZERO, dtype=np.uint16),
+            shear_noise=np.full(shape, noise_counts),
         )
     return replace(file, calibration=calibration)
 
@@ -158,17 +158,15 @@ def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
         noise = np.rint(noise_counts * normal).astype(np.int64)
         for c, chip in enumerate(spec.chips):
             power_up = random.Random(f"power-up/{seed}/{b}/{c}")
-            sense = _sense(chip, scene, calibration.baseline.ravel(), noise)
-            if file.layout.axes:
-                sense = _three_axes(sense, chip, scene, calibration, noise)
+            sense = _sense(chip, scene, calibration, noise)
             fake: type[FakeChip] = kinds.load(kinds.KINDS[chip.kind.name].model)
             model = fake.of(chip, sense, timed=timed, power_up=power_up)
-            if chip.mux is None or chip.channel is None:
-                bus.chips[chip.address] = model
-                continue
-            mux = bus.chips.setdefault(chip.mux, FakeTCA9548A())
-            assert isinstance(mux, FakeTCA9548A)
-            mux.channels[chip.channel][chip.address] = model
+            chips = bus.chips
+            if chip.mux is not None and chip.channel is not None:
+                mux = chips.setdefault(chip.mux, FakeTCA9548A())
+                assert isinstance(mux, FakeTCA9548A)
+                chips = mux.channels[chip.channel]
+            chips[chip.address] = model
         buses.append(bus)
     return buses
 
@@ -183,51 +181,42 @@ def _bits_counter(spec: BusSpec) -> Callable[[Sequence[Message]], int]:
 
 
 def _sense(
-    chip: ChipSpec, scene: Scene, rest: NDArray[np.uint16], noise: NDArray[np.int64]
-) -> Sense:
-    """The function that gives a chip its raw values: rest values, and the scene with
-    its sign and noise. A stage without a taxel rests."""
-    taxels = np.array(chip.taxels)
-    wired = taxels != UNUSED
-    at_rest = np.where(wired, rest[taxels], chip.traits.rest).astype(np.int64)
-
-    def sense(t: float) -> NDArray[np.uint16]:
-        counts = scene(t).reshape(-1)[taxels].astype(np.int64)
-        noisy = noise[int((t + TIME_ROUNDING_S) / NOISE_STEP_S) % len(noise)]
-        raw = at_rest + wired * (chip.sign * counts + noisy[taxels])
-        return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
-
-    return sense
-
-
-def _three_axes(
-    normal: Sense,
     chip: ChipSpec,
     scene: Scene,
     calibration: TaxelCalibration,
     noise: NDArray[np.int64],
 ) -> Sense:
-    """The function that gives a chip of three axes its raw values, taxel by taxel."""
-    from edge.chips.three_axes import ZERO  # few skins have three axes
-
+    """The function that gives a chip its raw values: rest values, and the scene with
+    its sign and noise. A stage without a taxel rests."""
     taxels = np.array(chip.taxels)
-    rest = np.full((len(taxels), 2), ZERO, dtype=np.int64)
-    if calibration.shear_baseline is not None:
-        rest = calibration.shear_baseline.reshape(-1, 2)[taxels].astype(np.int64)
+    wired = taxels != UNUSED
+    rest = calibration.baseline.ravel()[taxels]
+    at_rest = np.where(wired, rest, chip.traits.rest).astype(np.int64)
+
+    def noise_at(t: float, shift: int = 0) -> NDArray[np.int64]:
+        step = int((t + TIME_ROUNDING_S) / NOISE_STEP_S)
+        return np.asarray(noise[(step + shift) % len(noise)][taxels])
+
+    def normal(t: float) -> NDArray[np.uint16]:
+        counts = scene(t).reshape(-1)[taxels].astype(np.int64)
+        raw = at_rest + wired * (chip.sign * counts + noise_at(t))
+        return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
+
+    if calibration.shear_baseline is None:
+        return normal
+    shear_rest = calibration.shear_baseline.reshape(-1, 2)[taxels].astype(np.int64)
     shear_of = getattr(scene, "shear", lambda t: None)
 
-    def sense(t: float) -> NDArray[np.uint16]:
-        shear = shear_of(t)
+    def three_axes(t: float) -> NDArray[np.uint16]:
         # Other rows of the noise than the normal axis has.
-        step = int((t + TIME_ROUNDING_S) / NOISE_STEP_S)
-        rows = [noise[(step + shift) % len(noise)][taxels] for shift in (31, 62)]
-        raw = rest + np.stack(rows, axis=1)
+        raw = shear_rest + np.column_stack([noise_at(t, 31), noise_at(t, 62)])
+        shear = shear_of(t)
         if shear is not None:
             raw += shear.reshape(-1, 2)[taxels]
         three = np.column_stack([normal(t), np.clip(raw, 0, chip.traits.highest)])
         return three.reshape(-1).astype(np.uint16)
 
-    return sense
+    return three_axes
 
 
 def fake_skin(
