@@ -79,7 +79,7 @@ FRAME = [
 ]
 """The way of one frame through `edge/`."""
 TOUCH = [
-    f"edge.touch.{s}" for s in "frame layout region measures track features".split()
+    f"edge.touch.{s}" for s in "frame layout active measures track features".split()
 ]
 """The way of a touch: a frame becomes a region, a contact, a vector."""
 OF_A_FRAME = {"edge.touch.frame", "edge.touch.layout"}

@@ -26,7 +26,7 @@ def test_a_frame_passes_the_rooms_in_one_direction(ways):
         "edge/chips/ad7147.py:AD7147.read",
         "edge/skin/decoder.py:Decoder.decode",
         "edge/classifier.py:Classifier.push",
-        "edge/touch/region.py:ActiveTaxels.largest",
+        "edge/touch/active.py:ActiveTaxels.largest",
         "edge/touch/contact.py:Contact.add",
         "edge/touch/features.py:feature_vector",
         "edge/model/engines.py:OnnxRuntime.run",

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.touch.active import Region
 from edge.touch.frame import Frame
-from edge.touch.region import Region
 
 WAYS = "→↘↓↙←↖↑↗"
 """Eighths of a turn from the columns' direction towards that of the rows, which run

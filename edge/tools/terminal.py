@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from edge.commands.output import counted
 from edge.skin.loop import Stop
+from edge.touch.active import Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import Region, find_regions
+from edge.touch.region import find_regions
 
 CLEAR = "\x1b[2J"
 HOME = "\x1b[H"

@@ -1,4 +1,5 @@
-"""Connected components of many taxels, labelled by their runs.
+"""All regions of a frame, where one flood does not tell its largest: components of
+taxels, labelled by their runs.
 
 A run is a stretch of active taxels in a row. Runs that overlap in neighbouring rows are
 joined, all at once: every component takes the lowest number among those that it is next
@@ -8,6 +9,7 @@ connectivity algorithm, 1982). The rounds are few, and each is linear in the run
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +50,8 @@ def components_of(active: NDArray[np.bool_], wraps: bool) -> Components:
         wraps: the first column touches the last but one.
     """
     stride = active.shape[1]
-    flat = active.reshape(-1)
-    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    if flat[0]:
-        changes = np.concatenate([[0], changes])
+    flat = np.concatenate([[False], active.reshape(-1)])
+    changes = np.flatnonzero(flat[1:] != flat[:-1])
     starts = changes[::2]
     ends = changes[1::2]
     # Runs of the row above that overlap a run lie between these two places.
@@ -62,14 +62,11 @@ def components_of(active: NDArray[np.bool_], wraps: bool) -> Components:
     before = overlaps.cumsum() - overlaps
     upper = np.arange(len(lower)) + (first - before).repeat(overlaps)
     if wraps:
-        left = np.flatnonzero(starts % stride == 0)
-        right = np.flatnonzero(ends % stride == stride - 1)
-        rows = starts[left] // stride
-        _, at_left, at_right = np.intersect1d(
-            rows, starts[right] // stride, assume_unique=True, return_indices=True
-        )
-        lower = np.concatenate([lower, right[at_right]])
-        upper = np.concatenate([upper, left[at_left]])
+        closed = np.flatnonzero(active[:, 0] & active[:, -2]) * stride
+        at_left = starts.searchsorted(closed, side="right") - 1
+        at_right = starts.searchsorted(closed + stride - 2, side="right") - 1
+        lower = np.concatenate([lower, at_right])
+        upper = np.concatenate([upper, at_left])
     roots = _roots(len(starts), lower, upper)
     is_root = roots == np.arange(len(roots))
     labels = (is_root.cumsum() - 1)[roots]
@@ -99,3 +96,59 @@ def _roots(count: int, first: Integers, second: Integers) -> Integers:
         first = first[apart]
         second = second[apart]
     return parents
+
+
+def _peaks(
+    components: Components, active: NDArray[np.bool_], counts: NDArray[Any]
+) -> NDArray[np.int64]:
+    """(components,) the largest count of each."""
+    peaks = np.full(len(components.areas), counts.min(), dtype=np.int64)
+    np.maximum.at(peaks, components.of_taxel, counts[active[:, :-1]])
+    return peaks
+
+
+def all_of(
+    active: NDArray[np.bool_], counts: NDArray[Any], wraps: bool
+) -> list[tuple[int, int]]:
+    """Taxels, as the bits of `edge.touch.active.Grid`, and peak of each component.
+
+    The arguments are those of `largest_of`.
+    """
+    components = components_of(active, wraps)
+    bits = [0] * len(components.areas)
+    runs = zip(
+        components.labels.tolist(),
+        components.starts.tolist(),
+        components.lengths.tolist(),
+        strict=True,
+    )
+    for label, start, length in runs:
+        bits[label] |= ((1 << length) - 1) << start
+    return list(zip(bits, _peaks(components, active, counts).tolist(), strict=True))
+
+
+def largest_of(
+    active: NDArray[np.bool_],
+    counts: NDArray[Any],
+    wraps: bool,
+    previous: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """The taxels of the component that `edge.touch.region.largest_region` returns.
+
+    Args:
+        active: as for `components_of`.
+        counts: (rows, cols) of the frame.
+        wraps: as for `components_of`.
+        previous: (rows, cols) the region followed so far.
+    """
+    components = components_of(active, wraps)
+    areas = components.areas
+    largest = np.flatnonzero(areas == areas.max())
+    if len(largest) > 1:
+        overlaps = np.bincount(components.of_taxel, previous[active[:, :-1]])
+        peaks = _peaks(components, active, counts)
+        # The last key counts most; of equal components the first is taken.
+        largest = largest[np.lexsort((-peaks[largest], -overlaps[largest]))]
+    taxels = np.zeros_like(active)
+    taxels[active] = components.of_taxel == largest[0]
+    return taxels

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+from edge.touch.active import ActiveTaxels, Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import Measurer
-from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector

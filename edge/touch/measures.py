@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+from edge.touch.active import ActiveTaxels, Region, best_cut
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import ActiveTaxels, Region, best_cut
 
 PAPER = ("max_force", "contact_area", "contact_motion")
 """The three features of the paper's section III-B, in its order."""

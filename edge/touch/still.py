@@ -12,9 +12,9 @@ from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
+    from edge.touch.active import ActiveTaxels
     from edge.touch.frame import Frame
     from edge.touch.layout import SkinLayout
-    from edge.touch.region import ActiveTaxels
 
 STILL_S = 2.0
 """A taxel whose count stays the same for so long is not touched. It takes a second more

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
+from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
@@ -20,7 +21,6 @@ from edge.touch.contact import (
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import PAPER, Measurer
-from edge.touch.region import ActiveTaxels, Region
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain

@@ -10,11 +10,12 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.tools.arrows import region_shear
+from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.region import Region, largest_region
+from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker, first_contact
 from edge.writing import write_whole
 from train.arms import arm_of

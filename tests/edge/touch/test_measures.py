@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.touch.active import ActiveTaxels
 from edge.touch.features import FEATURES, feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -24,7 +25,7 @@ from edge.touch.measures import (
     features,
     names,
 )
-from edge.touch.region import ActiveTaxels, largest_region
+from edge.touch.region import largest_region
 from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch import shear
+from edge.touch.active import ActiveTaxels, best_cut
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import SHEAR, ZONE_WIDTH, ZONES, Measurer, feature
-from edge.touch.region import ActiveTaxels, best_cut
 from tests.edge.touch.pressed import followed
 
 THRESHOLD = 10

@@ -1,0 +1,234 @@
+"""The active taxels of a frame, those above the threshold, and the largest region of
+them.
+
+The taxels are the bits of one Python integer, so neighbours are shifts, sets are ands
+and ors, and areas are population counts. A row takes cols + 1 bits: its last bit is
+always clear and keeps a shift from running into the next row. Every result is an
+integer and the same on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_STEPS = 32
+"""Steps of one taxel that a flood takes; more would cost as much as labelling all."""
+
+
+class Grid:
+    """Sets of taxels of a rows x cols grid; `wraps` joins its last column to its first.
+
+    Taxels that share an edge are neighbours.
+    """
+
+    def __init__(self, rows: int, cols: int, wraps: bool) -> None:
+        self.rows = rows
+        self.cols = cols
+        self.wraps = wraps
+        self.stride = cols + 1
+        row = (1 << cols) - 1
+        column = sum(1 << (i * self.stride) for i in range(rows))
+        self._rows = [row << (i * self.stride) for i in range(rows)]
+        self._columns = [column << i for i in range(cols)]
+
+    def pack(self, active: NDArray[np.bool_]) -> int:
+        """The set of a bool array (rows, stride) whose last column is False."""
+        return int.from_bytes(np.packbits(active, None, "little").tobytes(), "little")
+
+    def unpack(self, bits: int) -> NDArray[np.bool_]:
+        """The set as a bool array (rows, cols)."""
+        size = self.rows * self.stride
+        packed = np.frombuffer(bits.to_bytes((size + 7) // 8, "little"), dtype=np.uint8)
+        flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
+        return flat.reshape(self.rows, self.stride)[:, : self.cols]
+
+    def bit(self, index: int) -> int:
+        """The taxel of a flat index (row * cols + col)."""
+        row, col = divmod(index, self.cols)
+        return 1 << (row * self.stride + col)
+
+    def neighbours(self, bits: int) -> int:
+        """The taxels next to one of `bits`; bits outside the grid may be set too."""
+        beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
+        if self.wraps:
+            beside |= (bits & self._columns[0]) << self.cols - 1
+            beside |= (bits & self._columns[-1]) >> self.cols - 1
+        return beside
+
+    def flood(self, seed: int, within: int) -> int:
+        """All taxels of `within` that are connected to `seed`; 0 where that takes more
+        than `MOST_STEPS`."""
+        region = seed
+        for _ in range(MOST_STEPS):
+            grown = (region | self.neighbours(region)) & within
+            if grown == region:
+                return region
+            region = grown
+        return 0
+
+    def row_sum(self, bits: int) -> int:
+        """Sum of the rows of all taxels of `bits`."""
+        return sum(i * (bits & row).bit_count() for i, row in enumerate(self._rows))
+
+    def col_sum(self, bits: int) -> int:
+        """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
+
+        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set
+        that spans less than half a turn has the mean of its unrolled columns, wherever
+        the seam lies.
+        """
+        areas = [(bits & column).bit_count() for column in self._columns]
+        cut = best_cut(areas) if self.wraps else 0
+        total = sum(col * area for col, area in enumerate(areas))
+        total += self.cols * sum(areas[:cut])
+        return total % (self.cols * sum(areas))
+
+
+def best_cut(weights: Sequence[int]) -> int:
+    """The column at which to cut a circle so that the weights' variance is least.
+
+    Columns below the cut count as one turn higher. The mean of the columns so counted
+    is the intrinsic mean of the circle. Of equally good cuts the lowest is taken.
+
+    Args:
+        weights: of each column, whole numbers.
+    """
+    turn = len(weights)
+    weighted = [(col, weight) for col, weight in enumerate(weights) if weight]
+    if not weighted or 2 * (weighted[-1][0] - weighted[0][0]) <= turn:
+        return 0  # no two columns are nearer to each other across the seam
+    total = sum(weights)
+    first = sum(col * weight for col, weight in weighted)
+    second = sum(col * col * weight for col, weight in weighted)
+    best = 0
+    lowest = total * second - first * first
+    for col, weight in weighted:
+        first += turn * weight
+        second += turn * (turn + 2 * col) * weight
+        variance = total * second - first * first
+        if variance < lowest:
+            best = col + 1
+            lowest = variance
+    return best
+
+
+grid = lru_cache(maxsize=16)(Grid)
+"""The grid of a shape; its masks are constants, so each is made once."""
+
+
+class Region:
+    """Connected active taxels.
+
+    Attributes:
+        area: number of taxels.
+        peak: largest count.
+        bits: the taxels as the bits of an integer (see `Grid`).
+    """
+
+    def __init__(self, on: Grid, bits: int, peak: int) -> None:
+        self._grid = on
+        self.bits = bits
+        self.area = bits.bit_count()
+        self.peak = peak
+
+    @cached_property
+    def sums(self) -> tuple[int, int]:
+        """(sum of rows, sum of columns) over the taxels: `area` times the centroid."""
+        return self._grid.row_sum(self.bits), self._grid.col_sum(self.bits)
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """(row, col) of the mean of the taxels, on the circle where the skin wraps."""
+        rows, cols = self.sums
+        return rows / self.area, cols / self.area
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """(rows, cols), True on the region's taxels."""
+        return self._grid.unpack(self.bits)
+
+    def touches(self, other: Self) -> bool:
+        """Whether a taxel of this region is next to, or the same as, one of the
+        other's."""
+        return bool((self.bits | self._grid.neighbours(self.bits)) & other.bits)
+
+    def __repr__(self) -> str:
+        row, col = self.centroid
+        return f"Region(area={self.area}, peak={self.peak}, centroid=({row:.2f}, {col:.2f}))"
+
+
+class ActiveTaxels:
+    """The taxels of one frame above the threshold, and the regions that they form.
+
+    Attributes:
+        counts: (rows, cols) of the frame.
+        mask: (rows, cols), True on the active taxels.
+        bits: the active taxels as the bits of an integer (see `Grid`).
+    """
+
+    def __init__(
+        self,
+        counts: NDArray[Any],
+        threshold: int | NDArray[Any],
+        *,
+        valid: NDArray[np.bool_] | None = None,
+        wraps: bool = True,
+    ) -> None:
+        """Take the arguments of `edge.touch.region.find_regions`."""
+        rows, cols = counts.shape
+        self.counts = counts
+        self._grid = grid(rows, cols, wraps)
+        self._padded = np.zeros((rows, cols + 1), dtype=np.bool_)
+        self.mask = self._padded[:, :cols]
+        np.greater(counts, threshold, out=self.mask)
+        if valid is not None:
+            self.mask &= valid
+        self.bits = self._grid.pack(self._padded)
+
+    @cached_property
+    def regions(self) -> list[Region]:
+        """All regions, as `edge.touch.region.find_regions` returns them."""
+        from edge.touch.components import all_of
+
+        components = all_of(self._padded, self.counts, self._grid.wraps)
+        regions = [Region(self._grid, bits, peak) for bits, peak in components]
+        # Of regions alike in both, the order stays that of their first taxels.
+        return sorted(regions, key=lambda region: (-region.area, -region.peak))
+
+    def largest(self, previous: Region | None = None) -> Region | None:
+        """The largest region, as `edge.touch.region.largest_region` returns it."""
+        if not self.bits:
+            return None
+        # The region with the frame's peak is nearly always larger than all others
+        # together.
+        index = int(self.counts.argmax())
+        bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
+        if 2 * bits.bit_count() > self.bits.bit_count():
+            return Region(self._grid, bits, self.counts.item(index))
+        return self._largest_of_many(0 if previous is None else previous.bits)
+
+    def _largest_of_many(self, previous: int) -> Region:
+        if not self.bits & self._grid.neighbours(self.bits):
+            # A flickering skin may have nothing but lone taxels, a hundred and more.
+            among = self.bits & previous or self.bits
+            lone = np.flatnonzero(self._grid.unpack(among))
+            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
+            return Region(self._grid, self._grid.bit(index), self.counts.item(index))
+        from edge.touch.components import largest_of  # one flood does for a touch
+
+        before = self._grid.unpack(previous)
+        taxels = largest_of(self._padded, self.counts, self._grid.wraps, before)
+        peak = int(self.counts[taxels[:, :-1]].max())
+        return Region(self._grid, self._grid.pack(taxels), peak)
+
+    def has_other(self, region: Region, onset: int) -> bool:
+        """Whether a taxel beside a region is above the onset."""
+        others = self.bits & ~region.bits
+        if not others:
+            return False
+        return int(self.counts[self._grid.unpack(others)].max()) > onset
