@@ -163,47 +163,80 @@ class Builder:
         return inside, self.node("ReduceL1", excess, [1], keepdims=1)
 
 
+def product(
+    build: Builder, x: str, decision_points: Sequence[Projection], components: int
+) -> tuple[str, str]:
+    """Nodes that multiply features (n, p) by the weights of a projection for each
+    decision point.
+
+    Returns:
+        Names of the whole products (n, components) in the grid's units, and of how much
+        was cut off from features to get them, as in `project`.
+    """
+    means = build.by_decision_point([p.mean_ for p in decision_points])
+    centred = build.node("Sub", x, means)
+    gains = [p.gain_ / p.grid_.step for p in decision_points]
+    scaled = build.node("Mul", centred, build.by_decision_point(gains))
+    limits = [MOST_STEPS] * len(decision_points)
+    steps, far = build.clipped(build.node("Round", scaled), limits)
+    # A step over a unit is a power of two, so that the products' sums are still exact.
+    weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
+    columns = build.by_decision_point_small(widened(weights, components))
+    return build.node("Round", build.node("MatMul", steps, columns)), far
+
+
 def project(
     build: Builder,
     x: str,
+    width: int,
     decision_points: Sequence[Projection],
-    components: int | None = None,
+    columns: Sequence[NDArray[np.int64]],
 ) -> tuple[str, str]:
     """Nodes that take features (n, p) to whole coordinates; see
     `train.projection.Projection`.
 
+    Decision points that take the same columns share nodes. Of several such nodes, those
+    of the decision point asked for count.
+
     Args:
         build: takes the nodes.
         x: name of the features.
+        width: their number, p.
         decision_points: a projection for each.
-        components: number of coordinates; the most that one of these has where None.
+        columns: of the features, that each takes.
 
     Returns:
         Names of the coordinates (n, c) in the grid's units, and of how much was cut off
         to get them (n, 1): 0 within the training set's reach, not finite where a
         feature is not.
     """
-    grids = [p.grid_ for p in decision_points]
-    means = build.by_decision_point([p.mean_ for p in decision_points])
-    centred = build.node("Sub", x, means)
-    gains = [p.gain_ / p.grid_.step for p in decision_points]
-    scaled = build.node("Mul", centred, build.by_decision_point(gains))
-    steps, far = build.clipped(build.node("Round", scaled), [MOST_STEPS] * len(grids))
-    # A step over a unit is a power of two, so that the products' sums are still exact.
-    weights = [p.weights_ * (p.grid_.step / p.grid_.unit) for p in decision_points]
-    columns = build.by_decision_point_small(widened(weights, components))
-    rounded = build.node("Round", build.node("MatMul", steps, columns))
-    z, farther = build.clipped(rounded, [grid.limit for grid in grids])
+    count = len(decision_points)
+    components = max(p.weights_.shape[1] for p in decision_points)
+    starts = [0]
+    for point in range(1, count):
+        if not np.array_equal(columns[point], columns[point - 1]):
+            starts.append(point)
+    parts = []
+    for start, end in zip(starts, [*starts[1:], count], strict=True):
+        part = build if len(starts) == 1 else build.among(range(start, end), count)
+        taken = build.taken(x, columns[start], width)
+        parts.append(product(part, taken, decision_points[start:end], components))
+    rounded, far = parts[0]
+    for start, (later, later_far) in zip(starts[1:], parts[1:], strict=True):
+        is_earlier = build.by_decision_point([point < start for point in range(count)])
+        rounded = build.node("Where", is_earlier, rounded, later)
+        far = build.node("Where", is_earlier, far, later_far)
+    limits = [p.grid_.limit for p in decision_points]
+    z, farther = build.clipped(rounded, limits)
     return z, build.node("Add", far, farther)
 
 
 def widened(
-    arrays: Sequence[NDArray[np.float64]], width: int | None = None
+    arrays: Sequence[NDArray[np.float64]], width: int
 ) -> list[NDArray[np.float64]]:
-    """Arrays with columns of zeros added up to a width, or to the widest, for
-    coordinates that are always 0."""
-    widest = width or max(array.shape[-1] for array in arrays)
+    """Arrays with columns of zeros added up to a width, for coordinates that are always
+    0."""
     return [
-        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, widest - array.shape[-1])])
+        np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, width - array.shape[-1])])
         for array in arrays
     ]

@@ -143,32 +143,13 @@ def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
 def _projected(
     build: Builder, x: str, points: Sequence[ContactClassifier], spaces: Spaces
 ) -> tuple[str, str]:
-    """Nodes that project features x to a task's spaces; see `project`.
-
-    Decision points whose spaces take the same columns share nodes. Of several such
-    nodes, those of the decision point asked for are taken.
-    """
-    columns = [p.columns_[space] for p, space in zip(points, spaces, strict=True)]
-    projections = [
-        p.projections_[space] for p, space in zip(points, spaces, strict=True)
-    ]
-    components = max(projection.weights_.shape[1] for projection in projections)
-    count = len(points)
-    starts = [0]
-    for point in range(1, count):
-        if not np.array_equal(columns[point], columns[point - 1]):
-            starts.append(point)
-    parts = []
-    for start, end in zip(starts, [*starts[1:], count], strict=True):
-        part = build if len(starts) == 1 else build.among(range(start, end), count)
-        taken = build.taken(x, columns[start], points[-1].n_features_in_)
-        parts.append(project(part, taken, projections[start:end], components))
-    z, off = parts[0]
-    for start, (later_z, later_off) in zip(starts[1:], parts[1:], strict=True):
-        is_later = build.by_decision_point([point >= start for point in range(count)])
-        z = build.node("Where", is_later, later_z, z)
-        off = build.node("Where", is_later, later_off, off)
-    return z, off
+    """Nodes that project features x to a task's spaces; see `project`."""
+    projections = []
+    columns = []
+    for point, space in zip(points, spaces, strict=True):
+        projections.append(point.projections_[space])
+        columns.append(point.columns_[space])
+    return project(build, x, points[-1].n_features_in_, projections, columns)
 
 
 def _task(
@@ -203,7 +184,8 @@ def _task(
     output = names[f"{task}_label"].removesuffix("_label")
     components = [point.choices[task].components for point in points]
     z, off = projected
-    squares, length = _squares(build, output, z, widened(rows), components, labels < 0)
+    rows = widened(rows, max(row.shape[1] for row in rows))
+    squares, length = _squares(build, output, z, rows, components, labels < 0)
     voters = build.constant([k], f"k of {output}")
     outputs = ["", names[f"{task}_neighbours"]]
     nearest, neighbours = build.nodes(

@@ -9,13 +9,15 @@ from train.evaluate import stratified_folds
 from train.stopping import SequentialClassifier
 
 
-def fitted_model(path, info, choices, X, y):
+def fitted_model(path, info, choices, X, y, early=None):
     """The estimator, and its model, which is written to a path.
 
     `info` is the metadata of a model of the same features; X has a set of vectors for
     each of its decision points, and the first task of y gives the folds.
     """
-    estimator = SequentialClassifier(choices, info.decision_points_s, info.features)
+    estimator = SequentialClassifier(
+        choices, info.decision_points_s, info.features, early=early
+    )
     estimator.fit(X, y, stratified_folds(next(iter(y.values()))), [choices] * 10)
     tasks = {
         task: Task(

@@ -48,10 +48,15 @@ WITH_SHEAR = (
 )
 """Those that recordings of a skin of three axes have besides, with or without joint
 angles."""
-EARLY_WITH_JOINTS = (("sqrt_joints",),)
-"""Those tried besides at early decision points of recordings with joint angles. The arm
-tells that a thing has begun to move before the skin does; roots let a small motion
-count."""
+EARLY_WITH_JOINTS = (
+    ("contact", "joints"),
+    ("moments", "joints"),
+    ("contact", "moments", "joints"),
+    ("contact", "sqrt_joints"),
+    ("sqrt_joints",),
+)
+"""Those tried at early decision points of recordings with joint angles. The arm tells
+that a thing has begun to move before the skin does. Roots let a small motion count."""
 DRAWN = ("contact",)
 DRAWN_WITH_JOINTS = ("contact", "joints")
 """The combination tried for touches of simulated things that are drawn from kinds
@@ -80,12 +85,14 @@ class Candidate:
         sets: names of feature sets and of single features.
         projection: one of `train.projection.KINDS`.
         grids: the settings tried with them.
-        early: whether it is tried at early decision points alone.
+        full: whether it is tried at the full window.
+        early: whether it is tried at early decision points.
     """
 
     sets: tuple[str, ...]
     projection: str
     grids: tuple[SearchGrid, ...]
+    full: bool = True
     early: bool = False
 
     @property
@@ -128,16 +135,16 @@ def candidates(  # noqa: PLR0913 - each option of `export` that fixes a choice
     """
     fixed = Fixed(features, projection, scaling, components, k)
     mode = Mode.of(drawn=drawn, quick=quick)
-    sets_at_the_end = _combinations(fixed, mode, joints=joints, shear=shear)
-    early = mode.early if joints and features is None else ()
+    full = _combinations(fixed, mode, joints=joints, shear=shear)
+    early = _early_combinations(fixed, mode, joints=joints, shear=shear)
     combinations = []
-    for sets in (*sets_at_the_end, *early):
+    for sets in dict.fromkeys((*full, *early)):
         for kind in KINDS if projection is None else (projection,):
             if fixed.asks or mode.tries(kind, sets):
                 grid = _grid(sets, kind, fixed, mode)
                 grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-                is_early = sets not in sets_at_the_end
-                combinations.append(Candidate(tuple(sets), kind, grids, is_early))
+                candidate = Candidate(sets, kind, grids, sets in full, sets in early)
+                combinations.append(candidate)
     return combinations
 
 
@@ -168,7 +175,7 @@ class Mode:
     Attributes:
         combinations, with_joints: feature sets without and with joint angles.
         with_shear: further ones of a skin of three axes.
-        early: further ones of early decision points, with joint angles.
+        early: those of early decision points, with joint angles.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -233,11 +240,24 @@ def _combinations(
     """The feature sets that are tried together."""
     if fixed.features is not None:
         return [tuple(fixed.features)]
-    if not shear:
-        return mode.with_joints if joints else mode.combinations
+    usual = mode.with_joints if joints else mode.combinations
+    return [*usual, *_sheared(mode, joints=joints, shear=shear)]
+
+
+def _early_combinations(
+    fixed: Fixed, mode: Mode, *, joints: bool, shear: bool
+) -> Sequence[tuple[str, ...]]:
+    """The feature sets that are tried together at early decision points; none where
+    they have the settings of the full window."""
+    if fixed.asks or not joints or not mode.early:
+        return []
+    return [*mode.early, *_sheared(mode, joints=joints, shear=shear)]
+
+
+def _sheared(mode: Mode, *, joints: bool, shear: bool) -> Sequence[tuple[str, ...]]:
+    """The feature sets of a skin of three axes."""
     angles = ("joints",) if joints else ()
-    sheared = [(*sets, *angles) for sets in mode.with_shear]
-    return [*_combinations(fixed, mode, joints=joints, shear=False), *sheared]
+    return [(*sets, *angles) for sets in mode.with_shear] if shear else []
 
 
 def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:

@@ -21,6 +21,7 @@ from train.evaluate import (
     AnswerTable,
     Promise,
     Result,
+    averaged,
     choose,
     evaluate,
     finest,
@@ -28,6 +29,7 @@ from train.evaluate import (
     group_folds,
     stratified_folds,
 )
+from train.feature_sets import expand
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
@@ -57,9 +59,9 @@ UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
 objects."""
-EARLY_SHARE = 0.5
-"""Part of the full window at which the settings of the earlier decision points are
-chosen."""
+EARLY_SHARES = (0.25, 0.5, 0.75)
+"""Parts of the full window at which the settings of the earlier decision points are
+chosen, by the mean of their accuracies."""
 UNSEEN_MARGIN = 0.01
 """Accuracy on left-out groups within which the cheaper candidate is taken."""
 WINDOW_MARGIN = 0.02
@@ -185,8 +187,8 @@ class Choosing:
     ) -> None:
         self._dataset = dataset
         self._y = y
-        self.tried = [candidate for candidate in tried if not candidate.early]
-        self._tried_early = tried
+        self.tried = [candidate for candidate in tried if candidate.full]
+        self._tried_early = [candidate for candidate in tried if candidate.early]
         self._samples = samples
         self._jobs = jobs
         self._progress = progress
@@ -227,7 +229,7 @@ class Choosing:
 
     def _tables(
         self,
-        X: NDArray[np.float64],
+        vectors: Vectors,
         tried: Sequence[Candidate],
         nested: Nested,
         what: str,
@@ -239,7 +241,6 @@ class Choosing:
         """
         grids = [grid for candidate in tried for grid in candidate.grids]
         answers = partial(evaluate, jobs=self._jobs)
-        vectors = self._vectors(X)
         total = fits(self._folds, nested.trials)
         total += sum(fits(folds, False) for folds in self._other_folds)
         if self._grouped:
@@ -284,9 +285,9 @@ class Choosing:
     def _right(self, window_s: float) -> dict[str, NDArray[np.float64]]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
-        X = self._features(window_s)
+        vectors = self._vectors(self._features(window_s))
         plain = Nested(trials=False, groups=False)
-        trials, groups = self._tables(X, self.tried, plain, f"{window_s:g} s")
+        trials, groups = self._tables(vectors, self.tried, plain, f"{window_s:g} s")
         right: dict[str, NDArray[np.float64]] = {}
         for task in self._y:
             table = groups if task in self._grouped else trials
@@ -347,9 +348,9 @@ class Choosing:
             {task: its settings}, the fold of each trial, and
             [fold]{task: the choice made without the fold's trials}.
         """
-        X = self._features(window_s)
+        vectors = self._vectors(self._features(window_s))
         nested = Nested(trials=True, groups=True)
-        trials, groups = self._tables(X, self.tried, nested, "choosing")
+        trials, groups = self._tables(vectors, self.tried, nested, "choosing")
         settled = {task: self._settle(task, trials, groups) for task in self._y}
         chosen = {task: settings.chosen for task, settings in settled.items()}
         without = _by_fold(
@@ -367,35 +368,55 @@ class Choosing:
             self._leave_out: (groups.folds, without_groups),
             TRIAL: (trials.folds, without),
         }
-        together = decided_together(chosen, self._vectors(X), plans, self._jobs)
+        together = decided_together(chosen, vectors, plans, self._jobs)
         return together, trials.folds, without
 
-    def early(self, window_s: float, chosen: Mapping[str, Chosen]) -> EarlySettings:
-        """The settings of the decision points before the full window: by the same rule,
-        at `EARLY_SHARE` of it."""
-        X = self._features(EARLY_SHARE * window_s)
+    def early(
+        self, window_s: float, chosen: Mapping[str, Chosen]
+    ) -> EarlySettings | None:
+        """The settings of the decision points before the full window, by the same rule
+        as those of the full window; None without candidates for them."""
+        if not self._tried_early:
+            return None
+        sets = [name for candidate in self._tried_early for name in candidate.sets]
+        dataset = self._dataset.of(expand(sets))
+        widths = dataset.widths(self._samples)
         nested = Nested(trials=True, groups=False)
-        trials, groups = self._tables(X, self._tried_early, nested, "choosing early")
-        folds = range(int(trials.folds.max()) + 1)
+        by_trial = []
+        by_group = []
+        for share in EARLY_SHARES:
+            X = dataset.features(share * window_s, self._samples)
+            vectors = Vectors(X, self._y, dataset.names, tuple(widths))
+            what = f"{share * window_s:g} s"
+            trials, groups = self._tables(vectors, self._tried_early, nested, what)
+            by_trial.append(trials)
+            by_group.append(groups)
+        trials = averaged(by_trial)
+        groups = averaged(by_group)
+        known = {}
+        usual = {}
+        for task in self._y:
+            k = chosen[task].choice.k
+            known[task] = self._settle_early(task, trials, trials, k)
+            usual[task] = known[task]
+            if task in self._grouped:
+                usual[task] = self._settle_early(task, trials, groups, k)
+        return EarlySettings(_early(window_s, usual), _early(window_s, known))
 
-        def settings(tables: Mapping[str, AnswerTable]) -> Early:
-            choices = {}
-            by_fold: list[dict[str, Choice]] = [{} for _ in folds]
-            for task, table in tables.items():
-                # The graph has one number of neighbours for all decision points.
-                k = chosen[task].choice.k
-                prices = costs(table.choices[task], self._widths)
-                margin = 0.0 if table is trials else UNSEEN_MARGIN
-                place = table.chosen(task, prices, margin=margin)
-                choices[task] = replace(table.choices[task][place], k=k)
-                without = without_folds(task, trials, table, prices, margin)
-                for of_fold, choice in zip(by_fold, without, strict=True):
-                    of_fold[task] = replace(choice, k=k)
-            return Early(window_s, choices, by_fold)
+    def _settle_early(
+        self, task: str, trials: AnswerTable, table: AnswerTable, k: int
+    ) -> list[Choice]:
+        """A task's settings by a table, and those chosen without each fold of the
+        trials.
 
-        by_trial = dict.fromkeys(self._y, trials)
-        by_group = dict.fromkeys(self._grouped, groups)
-        return EarlySettings(settings(by_trial | by_group), settings(by_trial))
+        The graph has one number of neighbours, `k`, for all decision points.
+        """
+        choices = table.choices[task]
+        prices = costs(choices, self._widths)
+        margin = 0.0 if table is trials else UNSEEN_MARGIN
+        rule = Rule(prices, margin, np.flatnonzero([c.k == k for c in choices]))
+        best = choices[table.chosen(task, prices, rule.allowed, margin)]
+        return [best, *without_folds(task, trials, table, rule)]
 
     def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
         """A task's settings, by the answers to left-out trials and to left-out
@@ -406,7 +427,7 @@ class Choosing:
         choices = table.choices[task]
         prices = costs(choices, self._widths)
         places = [places_of(candidate, choices) for candidate in self.tried]
-        without = without_folds(task, trials, table, prices, margin)
+        without = without_folds(task, trials, table, Rule(prices, margin))
         without_groups = []
         if task in groups.right:
             unseen = groups.choices[task]
@@ -460,6 +481,14 @@ class _Settled:
     chosen: Chosen
     without: list[Choice]
     without_groups: list[Choice]
+
+
+def _early(window_s: float, settled: Mapping[str, Sequence[Choice]]) -> Early:
+    """Early settings from {task: its choice, and the choice made without each fold}."""
+    choices = {task: all_choices[0] for task, all_choices in settled.items()}
+    folds = zip(*(all_choices[1:] for all_choices in settled.values()), strict=True)
+    by_fold = [dict(zip(settled, of_fold, strict=True)) for of_fold in folds]
+    return Early(window_s, choices, by_fold)
 
 
 def _by_fold(
@@ -540,12 +569,21 @@ def _right_together(
     return right
 
 
+@dataclass(frozen=True)
+class Rule:
+    """How one of some candidates is chosen; see `train.evaluate.choose`."""
+
+    prices: NDArray[np.int64]
+    margin: float
+    allowed: NDArray[np.int64] | None = None
+
+    def __call__(self, right: NDArray[np.float64]) -> int:
+        """The candidate chosen by answers (candidates, n)."""
+        return choose(right, self.prices, self.allowed, self.margin)
+
+
 def without_folds(
-    task: str,
-    trials: AnswerTable,
-    table: AnswerTable,
-    prices: NDArray[np.int64],
-    margin: float,
+    task: str, trials: AnswerTable, table: AnswerTable, rule: Rule
 ) -> list[Choice]:
     """[fold] the settings chosen without a fold's trials, by the rule that chooses them
     with all.
@@ -557,18 +595,14 @@ def without_folds(
         task: the task.
         trials: the candidates' answers to left-out trials.
         table: the answers that choose; `trials`, or those to left-out groups.
-        prices, margin: of `choose`.
+        rule: that chooses.
     """
     if table is trials:
-        places = trials.by_fold(task, prices, margin=margin)
+        places = trials.by_fold(task, rule.prices, rule.allowed, rule.margin)
     else:
         answers = table.held_out(task)
         folds = range(int(trials.folds.max()) + 1)
-        others = (answers[:, trials.folds != fold] for fold in folds)
-        places = [
-            choose(answers_of_others, prices, margin=margin)
-            for answers_of_others in others
-        ]
+        places = [rule(answers[:, trials.folds != fold]) for fold in folds]
     return [table.choices[task][place] for place in places]
 
 

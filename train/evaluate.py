@@ -220,7 +220,7 @@ class AnswerTable:
         choices: {task: the candidates}.
         right: {task: (folds, candidates, n)} whether the fit without a fold, and
             without the trial's own fold, answers the trial rightly; True for trials
-            that are not tested.
+            that are not tested. In an `averaged` table, the share of right answers.
         tested: {task: (n,) whether a trial has a label and a fold}; all where a task
             has no entry.
         repeated: tables of the same candidates by other folds, whose answers to
@@ -229,7 +229,7 @@ class AnswerTable:
 
     folds: NDArray[np.int64]
     choices: dict[str, list[Choice]]
-    right: dict[str, NDArray[np.bool_]] = field(repr=False)
+    right: dict[str, NDArray[Any]] = field(repr=False)
     tested: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
     repeated: tuple[AnswerTable, ...] = ()
 
@@ -268,6 +268,19 @@ class AnswerTable:
         hits = hits[self.tested.get(task, self.folds >= 0)]
         usual = self.choices[task][int(np.bincount(picked).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
+
+
+def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
+    """A table with the mean share of right answers of several, of the same candidates
+    and folds."""
+    first = tables[0]
+    right = {
+        task: np.mean([table.right[task] for table in tables], axis=0)
+        for task in first.right
+    }
+    repeats = zip(*(table.repeated for table in tables), strict=True)
+    repeated = [averaged(same) for same in repeats]
+    return replace(first, right=right, repeated=tuple(repeated))
 
 
 def choose(

@@ -206,12 +206,16 @@ class Graph:
         return self._plans[names]
 
     def path(self, output: str) -> list[Node]:
-        """The nodes from the features to a value, through the first input of each."""
+        """The nodes from the features to a value at the full window.
+
+        They lead through the first input of each, and through the last of a `Where`,
+        which chooses between the values of earlier decision points and this one.
+        """
         nodes = []
         while output in self.makers:
             node = self.makers[output]
             nodes.append(node)
-            output = node.inputs[0]
+            output = node.inputs[-1 if node.operator == "Where" else 0]
         return nodes[::-1]
 
 

@@ -225,8 +225,9 @@ def within_reach(graph: Graph, task: str, z: NDArray[np.float64]) -> NDArray[np.
     of training may be: half of what the coordinates of a query are clipped at, see
     `train.projection.coordinate_bits`.
     """
-    clipped_at = graph.makers[coordinates_of(graph, task)].inputs[2]
-    limits = [_value(graph, clipped_at, point) for point in range(len(z))]
+    nodes = graph.path(coordinates_of(graph, task))
+    *_, clip = (node for node in nodes if node.operator == "Clip")
+    limits = [_value(graph, clip.inputs[2], point) for point in range(len(z))]
     longest = 0.5 * np.reshape(limits, (len(z), 1))
     lengths = (z**2).sum(axis=2)
     return np.asarray((lengths <= longest**2).all(axis=0))

@@ -69,7 +69,7 @@ def test_the_graph_projects_to_the_whole_numbers_of_the_estimator(graph, scaling
         -3, 3
     ).repeat(20)
     p = Projection(scaling, 7).fit(X)
-    z = run(project(build, "x", [p])[0], X)
+    z = run(project(build, "x", 120, [p], [np.arange(120)])[0], X)
     assert (z == np.rint(z)).all()
     assert (z * p.grid_.unit == p.transform(X)).all()
 
@@ -106,6 +106,6 @@ def test_constants_of_several_decision_points_are_stored_in_float32_where_it_hol
 
 
 def test_widened_columns_are_zero():
-    narrow, wide = widened([np.ones((2, 1)), np.ones((2, 3))])
+    narrow, wide = widened([np.ones((2, 1)), np.ones((2, 3))], 3)
     assert narrow.tolist() == [[1.0, 0.0, 0.0]] * 2
     assert wide.tolist() == [[1.0, 1.0, 1.0]] * 2

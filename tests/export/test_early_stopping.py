@@ -28,6 +28,7 @@ from tests.hard_cases.models import session
 from tests.sequential import fitted_model
 from train.dataset import load_trials
 from train.pipeline import Choice
+from train.stopping import Early
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +93,74 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
             given = model.run(queries, point)["t_label_distances"][:, label]
             expected = [mean_of_roots(row, fitted.unit("t")) for row in nearest]
             assert given.tolist() == [fitted.slopes_["t"] * mean for mean in expected]
+
+
+@pytest.fixture(scope="module")
+def with_early_settings(early, tmp_path_factory):
+    """Vectors, and an estimator and a model whose tasks take other features and other
+    directions before 1.2 s; one of them shares a space with another there alone."""
+    rng = np.random.default_rng(3)
+    y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
+    X = rng.normal(size=(3, 45, early.info.width))
+    choices = {
+        "t": Choice("none", 4, 3, features=FEATURES[:2]),
+        "u": Choice("none", 3, 3, "lda", features=FEATURES),
+    }
+    area = FEATURES[1:2]
+    at_first = {
+        "t": Choice("IV", 6, 3, features=area),
+        "u": Choice("IV", 2, 3, features=area),
+    }
+    settings = Early(1.2, at_first, [at_first] * 10)
+    path = tmp_path_factory.mktemp("early") / "model.onnx"
+    return X, *fitted_model(path, early.info, choices, X, y, settings)
+
+
+def test_decision_points_may_have_features_and_directions_of_their_own(
+    with_early_settings,
+):
+    X, sequential, model = with_early_settings
+    queries = np.random.default_rng(4).normal(size=(9, X.shape[2]))
+    for point, fitted in enumerate(sequential.decision_points_):
+        answers = model.run(queries, point)
+        for task in sequential.choices:
+            distances, rows = fitted.neighbours(task, queries)
+            assert (answers[f"{task}_neighbours"] == rows).all()
+            assert (answers[f"{task}_distances"] == distances).all()
+    assert [len(c) for c in sequential.decision_points_[0].columns_.values()] == [
+        len(queries[0]) // len(FEATURES)
+    ]
+
+
+def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
+    with_early_settings,
+):
+    X, _, model = with_early_settings
+    far = X[0, :1].copy()
+    far[0, 0] = 1e6
+    outside = [model.run(far, point)["out_of_range"].tolist() for point in range(3)]
+    assert outside == [[0.0], [0.0], [1.0]]
+
+
+def test_early_settings_are_the_same_bits_in_numpy(with_early_settings):
+    _, _, model = with_early_settings
+    rng = np.random.default_rng(2)
+    assert_same_bits(model.path, hostile(model.info.width, rng))
+
+
+def test_a_taught_trial_is_nearest_to_itself_at_every_decision_point(
+    with_early_settings, tmp_path
+):
+    X, _, model = with_early_settings
+    more = np.random.default_rng(5).normal(scale=0.5, size=(3, 1, X.shape[2]))
+    path = tmp_path / "taught.onnx"
+    path.write_bytes(taught(model, ["new"], more, [{"t": "a", "u": "y"}]))
+    after = Model(path)
+    for point, vectors in enumerate(more):
+        answers = after.run(vectors, point)
+        for task in ("t", "u"):
+            assert answers[f"{task}_neighbours"][0, 0] == 45
+            assert answers[f"{task}_distances"][0, 0] == 0.0
 
 
 def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
