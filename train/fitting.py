@@ -24,7 +24,7 @@ from train.feature_sets import expand
 from train.mix import mix
 from train.novelty import MOST_COMPONENTS
 from train.pipeline import Choice, ContactClassifier
-from train.stopping import FEWEST, SequentialClassifier
+from train.stopping import FEWEST, Early, SequentialClassifier
 from train.vectors import Labels
 
 STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
@@ -78,6 +78,12 @@ class Fitted:
     classifier: ContactClassifier
     sequential: SequentialClassifier | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def early(self) -> Early | None:
+        """Settings of the decision points before the full window, where these have
+        their own."""
+        return None if self.sequential is None else self.sequential.early
 
 
 @dataclass(frozen=True, kw_only=True)

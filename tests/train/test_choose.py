@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,18 +10,24 @@ import pytest
 import train
 from edge.saving import save
 from edge.statistics import wilson
+from train.candidates import candidates
 from train.choose import (
+    Choosing,
     Chosen,
+    Rule,
     decided_together,
     fold_count,
     groupable,
     kinds_of,
     without_folds,
 )
+from train.dataset import load_trials
 from train.evaluate import AnswerTable, Promise
+from train.feature_sets import expand
 from train.pipeline import Choice, ContactClassifier, vote
 from train.vectors import Vectors
 
+EARLY = ("contact", "contact joints", "sqrt_joints")
 TWO = ("max_force", "contact_area")
 
 
@@ -80,20 +87,48 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
     assert fitted.chosen["object"].left_out == "trial"
 
 
+@pytest.mark.parametrize("arm", [True, False])
+def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
+    arm, make_touch, tmp_path
+):
+    """The number of neighbours is that of the full window, as the graph has one."""
+    for kind in ("hard", "soft"):
+        for seed in range(6):
+            touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
+            save(tmp_path / f"{kind}-{seed}.npz", touch)
+    tried = [c for c in candidates({}, joints=arm) if c.name in EARLY]
+    names = [name for candidate in tried for name in candidate.sets]
+    dataset = load_trials([tmp_path], features=expand(names))
+    y = {"softness": dataset.labels("softness")}
+    choosing = Choosing(dataset, y, tried, samples=40)
+    k = 3
+    chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
+    settings = choosing.early(1.2, chosen)
+    if not arm:
+        assert settings is None
+        return
+    early = settings.settings
+    assert early.until_s == 1.2
+    assert early.choices["softness"].features == expand(["contact", "joints"])
+    assert len(early.by_fold) == 10
+    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {k}
+    assert settings.known == early
+
+
 def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():
     """One candidate is right on other trials of known objects, the other on new
     objects."""
     near = Choice("IV", 1, 1, "lda")
     far = Choice("IV", 1, 3, "lda")
     folds = np.arange(12) % 3
-    prices = np.zeros(2, dtype=np.int64)
+    rule = Rule(np.zeros(2, dtype=np.int64), margin=0.0)
     right = np.repeat([[True], [False]], 12, axis=1)
     by_trial = AnswerTable(folds, {"t": [near, far]}, {"t": np.stack([right] * 3)})
     by_group = AnswerTable(
         folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)}
     )
-    assert without_folds("t", by_trial, by_trial, prices, 0.0) == [near] * 3
-    assert without_folds("t", by_trial, by_group, prices, 0.0) == [far] * 3
+    assert without_folds("t", by_trial, by_trial, rule) == [near] * 3
+    assert without_folds("t", by_trial, by_group, rule) == [far] * 3
 
 
 def test_tasks_that_agree_are_scored_as_they_are_decided_together():

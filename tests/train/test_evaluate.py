@@ -8,15 +8,17 @@ import pytest
 from edge.errors import InputError
 from edge.statistics import wilson
 from train.evaluate import (
+    AnswerTable,
     Promise,
     Result,
+    averaged,
     choose,
     evaluate,
     fits,
     group_folds,
     stratified_folds,
 )
-from train.pipeline import ContactClassifier
+from train.pipeline import Choice, ContactClassifier
 from train.search import SearchGrid
 from train.vectors import Vectors
 
@@ -193,6 +195,38 @@ def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
     assert choose(right, np.array([0, 2, 1])) == 2
     assert choose(right, np.array([0, 1, 2]), margin=0.2) == 0
     assert choose(right, np.array([0, 1, 2]), np.array([0, 2])) == 2
+
+
+def test_further_divisions_count_in_the_choice_by_all_trials_alone():
+    """By the first division the first candidate is better, by both the second."""
+    first = np.array([[True, True, True, False], [True, True, False, False]])
+    second = np.array([[False, False, False, False], [True, True, True, True]])
+    folds = np.arange(4) % 2
+    settings = [Choice("IV", 1, 1), Choice("IV", 1, 3)]
+
+    def table(right, **repeated):
+        return AnswerTable(
+            folds, {"t": settings}, {"t": np.stack([right] * 2)}, **repeated
+        )
+
+    both = table(first, repeated=(table(second),))
+    assert both.held_out("t").tolist() == [[0.5, 0.5, 0.5, 0.0], [1.0, 1.0, 0.5, 0.5]]
+    assert both.chosen("t") == 1
+    assert both.by_fold("t") == table(first).by_fold("t") == [0, 0]
+
+
+def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
+    right = np.array([[True, True, True, False], [True, True, False, False]])
+    folds = np.arange(4) % 2
+    settings = {"t": [Choice("IV", 1, 1), Choice("IV", 1, 3)]}
+    tables = [
+        AnswerTable(folds, settings, {"t": np.stack([window] * 2)})
+        for window in (right, ~right)
+    ]
+    mean = averaged([tables[0], tables[0], tables[1]])
+    assert mean.held_out("t") == pytest.approx(
+        np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3
+    )
 
 
 def test_of_candidates_that_cost_the_same_the_best_is_chosen():

@@ -54,6 +54,9 @@ def summary(fitted: Fitted, prices: Prices) -> str:
             f"{task}: {accuracy(chosen)}",
             f"  {_described(chosen.choice, fitted)}",
         ]
+        if fitted.early is not None:
+            early = _described(fitted.early.choices[task], fitted)
+            lines.append(f"  before {fitted.early.until_s:g} s: {early}")
     lines += ["", *_by_unit(fitted.dataset.units)]
     if any(moves(measures.feature(name)) for name in fitted.dataset.names):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
