@@ -1,10 +1,8 @@
 """A model that decides at several points of time, fitted on vectors of a test."""
 
-from dataclasses import replace
-
-from edge.model.info import Task
 from edge.model.model import Model
 from export.graph import to_onnx
+from tests.hard_cases.models import describe
 from train.evaluate import stratified_folds
 from train.stopping import SequentialClassifier
 
@@ -19,18 +17,5 @@ def fitted_model(path, info, choices, X, y, early=None):
         choices, info.decision_points_s, info.features, early=early
     )
     estimator.fit(X, y, stratified_folds(next(iter(y.values()))), [choices] * 10)
-    tasks = {
-        task: Task(
-            labels_of(y[task]), c.k, c.components, c.scaling, 0.5, features=c.features
-        )
-        for task, c in choices.items()
-    }
-    calibration = {"stopping": estimator.stopping_, "novelty": estimator.novelty_}
-    info = replace(info, tasks=tasks, rows=X.shape[1], trials=(), **calibration)
-    path.write_bytes(to_onnx(estimator, info))
+    path.write_bytes(to_onnx(estimator, describe(estimator, info, info.samples)))
     return estimator, Model(path)
-
-
-def labels_of(y):
-    """The labels of a task, without that of trials that have none."""
-    return tuple(sorted({*y} - {""}))

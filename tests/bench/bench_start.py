@@ -58,8 +58,7 @@ def bench_cold_start(against, tmp_path):
     replay = ["-m", "edge", "replay", "--model", MODEL, FOLDER / "pillow-movable.npz"]
     against(
         start(b'"decision"', *replay),
-        {"scikit-learn's pipeline": start(b"[", "-c", USUAL, arrays)},
-        most={"scikit-learn's pipeline": 1 / 6},
+        {"scikit-learn's pipeline": (start(b"[", "-c", USUAL, arrays), 1 / 6)},
         calls=1,
         rounds=7,
         timer=time.perf_counter,

@@ -7,10 +7,11 @@ programs share; the ratio is the median over the rounds, printed beside its targ
 
 from __future__ import annotations
 
-import statistics
 import time
 import timeit
+from itertools import zip_longest
 
+import numpy as np
 import pytest
 
 from tests.bench import tables
@@ -33,16 +34,16 @@ def note(request, capsys):
     name = request.node.name.removeprefix("bench_")
 
     def add(rival, ratio, bound, *seconds):
+        times = [f"{duration * 1e6:.1f} us" for duration in seconds]
         row = {"benchmark": name, "beside": rival, "ratio": f"{ratio:.3g}"}
         row["bound"] = bound
-        row["ours"] = ""
-        row["theirs"] = ""
-        for column, duration in zip(("ours", "theirs"), seconds, strict=False):
-            row[column] = f"{duration * 1e6:.1f} us"
+        row |= zip_longest(("ours", "theirs"), times, fillvalue="")
         request.config.stash.setdefault(ROWS, []).append(row)
-        times = "".join(f"{duration * 1e6:>10.1f} us" for duration in seconds)
+        columns = "".join(f"{text:>13}" for text in times)
         with capsys.disabled():
-            print(f"\n{name:<32} {rival:<44} {ratio:>8.3g}  {bound:<14}{times}", end="")
+            print(
+                f"\n{name:<32} {rival:<44} {ratio:>8.3g}  {bound:<14}{columns}", end=""
+            )
 
     return add
 
@@ -51,27 +52,24 @@ def note(request, capsys):
 def against(note):
     """Times ours beside its rivals; returns seconds of ours.
 
-    Each of the rounds has so many calls. `most` is {rival: largest allowed ours /
-    rival}; `timer` counts processor time of all threads, unless other processes are
-    timed.
+    Each of the rounds has so many calls. `rivals` is {name: (its function, largest
+    allowed ours / rival or None)}; `timer` counts processor time of all threads, unless
+    other processes are timed.
     """
 
-    def run(ours, rivals, *, most=None, calls=20, rounds=25, timer=time.process_time):
-        functions = [*rivals.values(), ours]
+    def run(ours, rivals, *, calls=20, rounds=25, timer=time.process_time):
+        functions = [*(rival for rival, _ in rivals.values()), ours]
         for function in functions:
             function()
-        seconds = [
-            [
-                timeit.timeit(function, number=calls, timer=timer) / calls
-                for function in functions
-            ]
-            for _ in range(rounds)
-        ]
-        mine = statistics.median(row[-1] for row in seconds)
-        for i, name in enumerate(rivals):
-            ratio = statistics.median(row[-1] / row[i] for row in seconds)
-            bound = f"at most {most[name]:.3g}" if name in (most or {}) else "-"
-            note(name, ratio, bound, mine, statistics.median(row[i] for row in seconds))
+        seconds = np.empty((rounds, len(functions)))
+        for place in np.ndindex(seconds.shape):
+            function = functions[place[1]]
+            seconds[place] = timeit.timeit(function, number=calls, timer=timer) / calls
+        *medians, mine = np.median(seconds, axis=0)
+        ratios = np.median(seconds[:, -1:] / seconds, axis=0)
+        for i, (name, (_, most)) in enumerate(rivals.items()):
+            bound = "-" if most is None else f"at most {most:.3g}"
+            note(name, ratios[i], bound, mine, medians[i])
         return mine
 
     return run

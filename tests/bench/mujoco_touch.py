@@ -32,6 +32,7 @@ RATE_DEG_S = 20.0
 LEAD_S = 0.3
 TOUCH_S = 1.8
 RATE_HZ = 100
+G = 9.81
 """Seconds before the arm meets a rigid thing, and after that at the usual speed."""
 PLACE_M = 0.10
 COUNTS_PER_NEWTON = 1000.0
@@ -155,19 +156,19 @@ def joined(numbers):
 def arm_xml(facing_deg, touch):
     """The arm's bodies, and the (row, column) of each pad."""
     links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
+    angles = np.array(CODY_SKIN["column_angles_deg"])
+    facing = np.abs((angles - facing_deg + 180.0) % 360.0 - 180.0) <= FACING_DEG
+    columns = np.flatnonzero(facing).tolist()
+    where = [(row, column) for row in range(ROWS) for column in columns]
     pads = ""
-    where = []
-    for row in range(ROWS):
-        for column, angle in enumerate(CODY_SKIN["column_angles_deg"]):
-            if abs((angle - facing_deg + 180.0) % 360.0 - 180.0) > FACING_DEG:
-                continue
-            out = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-            x, y = ((RADIUS_M - PAD_M) * v for v in out)
-            pads += (
-                f'<body name="pad{len(where)}" pos="{x} {y} {0.18432 - 0.0108 * row}" '
-                f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
-            )
-            where.append((row, column))
+    for number, (row, column) in enumerate(where):
+        angle = math.radians(angles[column])
+        out = math.cos(angle), math.sin(angle)
+        x, y = ((RADIUS_M - PAD_M) * v for v in out)
+        pads += (
+            f'<body name="pad{number}" pos="{x} {y} {0.18432 - 0.0108 * row}" '
+            f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
+        )
     xml = ""
     at = "0 0 0"
     for i, joint in enumerate(ARM.joints):
@@ -240,26 +241,30 @@ def model_of(touch):
     x, y, z = point + ahead * (RADIUS_M + 0.001) + aside
     upper, layer = upper_xml(thing)
     motors = (
-        f'<position joint="j{i}" kp="{CODY_STIFFNESS[i] * touch.stiffness}"/>'
-        for i in range(ARM.dof)
+        f'<position joint="j{i}" kp="{stiffness * touch.stiffness}"/>'
+        for i, stiffness in enumerate(CODY_STIFFNESS)
     )
     slope = touch.slope_rad
-    g = 9.81
-    gravity = joined((*(g * math.sin(slope) * ahead[:2]), -g * math.cos(slope)))
-    words = {**vars(thing), "x": x, "y": y, "floor_m": z - ABOVE_FLOOR_M}
-    words |= {
+    words = {
+        **vars(thing),
+        "x": x,
+        "y": y,
+        "floor_m": z - ABOVE_FLOOR_M,
         "pad_n_m": k,
         "pad_loss": PAD_LOSS_S * k,
         "pad_kg": PAD_KG,
-        "gravity": gravity,
-    }
-    words |= {"contact": RIGID, "dimensions": 3, "turn_rad": heading + touch.yaw_rad}
-    words |= {
+        "gravity": joined((*(G * math.sin(slope) * ahead[:2]), -G * math.cos(slope))),
+        "contact": RIGID,
+        "dimensions": 3,
+        "turn_rad": heading + touch.yaw_rad,
         "foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}",
         "foot_x": HALF_M,
+        "foot_kg": thing.mass_kg * 0.8,
+        "motors": "".join(motors),
+        "arm": arm,
+        "upper": upper,
+        "layer": layer,
     }
-    words |= {"foot_kg": thing.mass_kg * 0.8, "motors": "".join(motors)}
-    words |= {"arm": arm, "upper": upper, "layer": layer}
     if touch.fixed:
         words["joint"] = ""
     if thing.layered:

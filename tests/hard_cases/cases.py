@@ -35,17 +35,19 @@ class Ladder:
     """Values of one parameter, each harder than the one before.
 
     Attributes:
-        parameter: its name, in words with its unit.
+        words: what it is, with its unit.
         values: from easy to hard.
-        at: the case's parameters for a value.
+        parameter: its name.
         recordings: where recordings lie on the same scale: the 856 grasps of SDH-2, and
             the simulated `cody18`.
+        beside: other parameters that differ from those of the case's first hazard.
     """
 
-    parameter: str
+    words: str
     values: Sequence[float]
-    at: Callable[[float], Mapping[str, Any]]
+    parameter: str
     recordings: str = ""
+    beside: Mapping[str, Any] = field(default_factory=dict)
 
 
 def decades(first, last, each=2):
@@ -57,11 +59,6 @@ def decades(first, last, each=2):
 def powers_of_ten(low, high):
     """Numbers between two powers of ten, by their exponents."""
     return st.floats(low, high).map(lambda e: 10.0**e)
-
-
-def seeded(name, /, **more):
-    """A function that puts a value under a name, beside fixed parameters."""
-    return lambda value: {name: value, **more}
 
 
 @dataclass(frozen=True)

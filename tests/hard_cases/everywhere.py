@@ -7,7 +7,7 @@ from onnx.reference import ReferenceEvaluator
 
 from edge.model import onnx_file
 from edge.model.graph import Graph
-from tests.hard_cases.cases import SEEDS, Case, Ladder, seeded
+from tests.hard_cases.cases import SEEDS, Case, Ladder
 from tests.hard_cases.models import converted, session, usual_pipeline
 from tests.hard_cases.neighbours import near_duplicates
 from tests.hard_cases.outputs import (
@@ -108,14 +108,8 @@ CASES = [
         Ladder(
             "vectors at once",
             [1, 10, 100, 400],
-            seeded(
-                "count",
-                name="two threads",
-                kind="contacts",
-                point=2,
-                factor=1.0,
-                seed=0,
-            ),
+            "count",
+            beside={"name": "two threads", "point": 2},
         ),
         engine_usual,
         examples=6,

@@ -13,7 +13,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker
 from tests.edge.touch.test_region import SHAPES, by_scipy, by_us
-from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 
 FULL_SCALE = "3554 and 24331"
 FOREARM = SkinLayout(
@@ -119,8 +119,9 @@ CASES = [
         Ladder(
             "counts",
             [255, 4095, 16383, 65535],
-            seeded("peak", density=0.6, seed=0),
+            "peak",
             FULL_SCALE,
+            {"density": 0.6},
         ),
         seam_usual,
         examples=60,
@@ -143,7 +144,7 @@ CASES = [
         Ladder(
             "shortest step, s",
             decades(-3, -16),
-            seeded("shortest", seed=0),
+            "shortest",
             "0.018, 0.010 s",
         ),
         bound=1e-15,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from edge.touch.arm import Chain, Joint
 from edge.touch.joint_stream import Joints
-from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, seeded
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades
 
 
 def orthonormal_error(steps, reach):
@@ -81,7 +81,7 @@ CASES = [
         orthonormal_error,
         [{"steps": 1_000_000, "reach": 2.0}],
         {"steps": st.just(2000), "reach": st.floats(0, 1e6)},
-        Ladder("radians a step", decades(0, 18, 1), seeded("reach", steps=2000)),
+        Ladder("radians a step", decades(0, 18, 1), "reach", "", {"steps": 2000}),
         examples=8,
         bound=5e-15,
     ),
@@ -99,7 +99,7 @@ CASES = [
             for turns in (-1000, 0, 1)
         ],
         {"angle": st.floats(-1e15, 1e15), "seed": SEEDS},
-        Ladder("radians", decades(0, 300, 0.1), seeded("angle", seed=0)),
+        Ladder("radians", decades(0, 300, 0.1), "angle"),
         examples=25,
         bound=1e-15,
     ),
@@ -113,7 +113,8 @@ CASES = [
         Ladder(
             "radians between two lines",
             [1e-9, 1e-3, 1.0, 3.1, 3.2],
-            seeded("step", angle=3.0),
+            "step",
+            beside={"angle": 3.0},
         ),
         bound=2e-12,
     ),

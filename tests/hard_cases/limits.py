@@ -17,7 +17,7 @@ from edge.recording import load
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten
 from tests.hard_cases.frames import FOREARM, contact_of
 from tests.hard_cases.models import shipped
 
@@ -187,7 +187,7 @@ CASES = [
         Ladder(
             "rows and columns",
             [16, 64, 128, 256, 512],
-            seeded("side", across=True),
+            "side",
             "13 x 13 and 16 x 24",
         ),
     ),
@@ -201,7 +201,7 @@ CASES = [
         Ladder(
             "seconds",
             decades(3, 18, 1),
-            seeded("start"),
+            "start",
             "7.3 and 2.6 s, or the time since the board's start",
         ),
         guard="features",
@@ -226,7 +226,7 @@ CASES = [
         Ladder(
             "seconds between two frames",
             [0.05, 0.08, 0.09, 0.1, 0.3, 1.0, 1e3, 1e6, 1e9],
-            seeded("pause_s", frames=3, unit=1.0),
+            "pause_s",
             "0.046 and 0.010 s",
         ),
         gap_usual,
@@ -240,7 +240,7 @@ CASES = [
         transform_error,
         [{"counts": 51, "scale": 1.0}, {"counts": 65535, "scale": 2250.0}],
         {"counts": st.integers(51, 65535), "scale": powers_of_ten(-12.0, 12.0)},
-        Ladder("counts in a newton", decades(3, -300, 0.1), seeded("scale", counts=51)),
+        Ladder("counts in a newton", decades(3, -300, 0.1), "scale"),
         guard="features",
         bound=1e-15,
     ),

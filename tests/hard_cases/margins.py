@@ -29,16 +29,14 @@ SEEDS = range(5)
 
 def failure(case, ladder, value):
     """How a case fails at a value; "" if it holds."""
-    at = ladder.at(value)
-    for seed in SEEDS if "seed" in at else SEEDS[:1]:
-        try:
-            if (
-                not case.error(**at | ({"seed": seed} if "seed" in at else {}))
-                <= case.bound
-            ):
-                return FAILED
-        except EdgeError:
-            return REFUSED
+    at = {**case.hazard[0], **ladder.beside, ladder.parameter: value}
+    tried = [at | {"seed": seed} for seed in SEEDS] if "seed" in at else [at]
+    try:
+        # `not <=`, as an error may be NaN
+        if not all(case.error(**at) <= case.bound for at in tried):
+            return FAILED
+    except EdgeError:
+        return REFUSED
     return ""
 
 
@@ -60,7 +58,7 @@ def margin(case):
         else:
             words.append("no failure seen")
     lies = f"; recordings lie at {ladder.recordings}" if ladder.recordings else ""
-    return f"{ladder.parameter}: {', '.join(words)}{lies}"
+    return f"{ladder.words}: {', '.join(words)}{lies}"
 
 
 @cache

@@ -2,7 +2,7 @@
 
 import tempfile
 from dataclasses import replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -37,30 +37,41 @@ def shipped():
     return Model(demo.MODEL)
 
 
-def describe(fitted, samples=40):
-    """The shipped model's metadata, with the tasks of a model that was fitted on
-    vectors alone."""
+def describe(fitted, info=None, samples=40):
+    """The metadata of a model that was fitted on vectors alone, with or without
+    decision points; all else is that of `info`, or of the shipped model."""
+    last = getattr(fitted, "decision_points_", [fitted])[-1]
     tasks = {
         task: Task(
-            tuple(map(str, fitted.classes_[task])),
+            tuple(map(str, last.classes_[task])),
             choice.k,
-            fitted.components_[task],
+            last.components_[task],
             choice.scaling,
             0.0,
+            features=choice.features,
+            factors=fitted.products_.get(task, {}),
         )
         for task, choice in fitted.choices.items()
     }
-    rows = len(next(iter(fitted.labels_.values())))
     return replace(
-        shipped().info,
+        info or shipped().info,
         tasks=tasks,
         samples=samples,
-        rows=rows,
+        rows=last.n_trials_,
         trials=(),
-        decision_points_s=(),
-        stopping={},
-        novelty=None,
+        decision_points_s=tuple(getattr(fitted, "decision_points_s", ())),
+        stopping=getattr(fitted, "stopping_", {}),
+        novelty=getattr(fitted, "novelty_", None),
     )
+
+
+def exported(fitted, *of_metadata):
+    """The bytes and the model of a fitted estimator; see `describe`."""
+    data = to_onnx(fitted, describe(fitted, *of_metadata))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.onnx"
+        path.write_bytes(data)
+        return data, Model(path)
 
 
 def labels_for(X, classes=5, seed=0):
@@ -76,14 +87,16 @@ class Ours:
     def __init__(self, X, y=None, choice=USUAL):
         y = labels_for(X) if y is None else y
         self.fitted = ContactClassifier({"t": choice}).fit(X, {"t": y})
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "model.onnx"
-            self.data = to_onnx(self.fitted, describe(self.fitted, X.shape[1] // 3))
-            path.write_bytes(self.data)
-            self.model = Model(path)
-        self.k, self.labels = choice.k, self.fitted.labels_["t"].tolist()
+        self.data, self.model = exported(self.fitted, None, X.shape[1] // 3)
+        self.k = choice.k
+        self.labels = self.fitted.labels_["t"].tolist()
         self.projection = next(iter(self.fitted.projections_.values()))
-        self.rows = self.whole(X)
+        self._X = X
+
+    @cached_property
+    def rows(self):
+        """The exact coordinates of the training vectors."""
+        return self.whole(self._X)
 
     def whole(self, vectors):
         """The exact coordinates of vectors."""
@@ -91,11 +104,9 @@ class Ours:
 
     def alone(self, queries):
         """The graph's answers to queries one by one, as the board asks."""
-        answers = [self.model.run(queries[i : i + 1]) for i in range(len(queries))]
+        answers = [self.model.run(query[None]) for query in queries]
         return {
-            name.removeprefix("t_"): np.concatenate(
-                [answer[name] for answer in answers]
-            )
+            name.removeprefix("t_"): np.concatenate([one[name] for one in answers])
             for name in answers[0]
         }
 
@@ -106,14 +117,13 @@ class Ours:
         wrong = 0
         for i, point in enumerate(self.whole(queries)):
             near, squares = exact.nearest(self.rows, point, self.k)
-            label = exact.winner([self.labels[j] for j in near])
-            distances = [
-                exact.distance(squares[j], self.projection.grid_.unit) for j in near
-            ]
-            answer = (
-                seen[key][i].tolist() for key in ("neighbours", "label", "distances")
-            )
-            wrong += (near, label, distances) != tuple(answer)
+            unit = self.projection.grid_.unit
+            expected = {
+                "neighbours": near,
+                "label": exact.winner([self.labels[j] for j in near]),
+                "distances": [exact.distance(squares[j], unit) for j in near],
+            }
+            wrong += any(seen[k][i].tolist() != v for k, v in expected.items())
         return wrong
 
 

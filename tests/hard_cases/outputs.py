@@ -5,22 +5,16 @@ states. It shares no code with the graph, with `train` or with `edge`: it comput
 whole numbers and fractions, and rounds where IEEE 754 says that an operation rounds.
 """
 
-import tempfile
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
 
-from edge.model.info import Task
-from edge.model.model import Model
-from export.graph import to_onnx
 from tests.hard_cases import exact
-from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten, seeded
-from tests.hard_cases.models import features, shipped
+from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
+from tests.hard_cases.models import exported, features
 from tests.hard_cases.neighbours import near_duplicates, offset_data
 from train.evaluate import stratified_folds
 from train.novelty import CLIP, FARTHEST, STEP_BITS
@@ -85,33 +79,7 @@ class Whole:
         classifier = SequentialClassifier(CHOICES, POINTS_S)
         folds = stratified_folds(self.y["object"])
         self.fitted = classifier.fit(self.X, self.y, folds, [CHOICES] * 10)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "model.onnx"
-            self.data = to_onnx(self.fitted, self._info(n))
-            path.write_bytes(self.data)
-            self.model = Model(path)
-
-    def _info(self, n):
-        tasks = {
-            task: Task(
-                tuple(sorted({*self.y[task]} - {""})),
-                choice.k,
-                self.fitted.decision_points_[-1].components_[task],
-                choice.scaling,
-                0.0,
-                factors=self.fitted.products_.get(task, {}),
-            )
-            for task, choice in CHOICES.items()
-        }
-        return replace(
-            shipped().info,
-            tasks=tasks,
-            rows=n,
-            trials=(),
-            decision_points_s=POINTS_S,
-            stopping=self.fitted.stopping_,
-            novelty=self.fitted.novelty_,
-        )
+        self.data, self.model = exported(self.fitted)
 
     def queries(self, seed, factor, count=10):
         """Vectors between training rows, on them, and `factor` times as far away."""
@@ -208,14 +176,11 @@ def whole(n, kind):
 def differing(seen, expected):
     """Values of the expected outputs that have another bit."""
     assert seen.keys() == expected.keys()
-    return float(
-        sum(
-            int((np.asarray(seen[name]) != value).sum())
-            if np.shape(seen[name]) == value.shape
-            else value.size
-            for name, value in expected.items()
-        )
-    )
+    count = 0
+    for name, value in expected.items():
+        fits = np.shape(seen[name]) == value.shape
+        count += int((np.asarray(seen[name]) != value).sum()) if fits else value.size
+    return float(count)
 
 
 def outputs_error(kind, point, factor, seed):
@@ -329,8 +294,9 @@ AROUND = {
 FARTHER = Ladder(
     "distance over that of training trials",
     decades(0, 160, 0.05),
-    seeded("factor", kind="contacts", point=1, seed=0),
+    "factor",
     "up to 0.5",
+    {"point": 1},
 )
 
 CASES = [

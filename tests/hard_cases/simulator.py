@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten, seeded
+from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten
 from tests.train.simulate.scenes import Trace, slider
 from tests.train.simulate.test_simulate_stability import SPEED, judge
 
@@ -50,7 +50,7 @@ CASES = [
             "mu": st.floats(0.05, 1.0),
             "steps": st.just(30),
         },
-        Ladder("s a step", decades(-3, 3, 1), seeded("h", mu=0.5, steps=30)),
+        Ladder("s a step", decades(-3, 3, 1), "h", "", {"mu": 0.5, "steps": 30}),
         lambda: f"explicit LuGre grows to {lugre(0.01):.0e} at 10 ms",
         examples=4,
     ),

@@ -32,12 +32,12 @@ def refuse(x):
     ],
 )
 def test_a_margin_ends_at_the_first_failure(error, values, words):
-    case = Case("", "", "", error, ladder=Ladder("x", values, lambda x: {"x": x}))
+    case = Case("", "", "", error, ladder=Ladder("x", values, "x"))
     assert margin(case) == words
 
 
 def test_a_case_that_draws_holds_only_if_it_holds_with_every_seed():
-    ladder = Ladder("x", [1, 4, 5, 9], lambda x: {"x": x, "seed": 0}, "3")
+    ladder = Ladder("x", [1, 4, 5, 9], "x", "3", {"seed": 0})
     case = Case("", "", "", lambda x, seed: float(x + seed >= 9), ladder=ladder)
     assert margin(case) == "x: holds to 4, fails from 5; recordings lie at 3"
 
