@@ -110,30 +110,28 @@ def all_or_none(folder, printed):
     return "" if all(changed) else f"{sum(changed)} of {len(changed)} files changed"
 
 
-def together(folder):
-    """The model and its golden file agree, or `verify` says that they do not belong
-    together."""
-    model = folder / "model.onnx"
-    done = called(*EDGE, "verify", "--model", model, "--golden", folder / "golden.npz")
-    if done.returncode == 0 or OTHER_MODEL in done.stderr:
-        return ""
-    return f"verify blames the machine: {done.stdout}{done.stderr}"
-
-
 def agreeing(folder, printed):
-    """The model and its golden file belong together after a whole run."""
-    model = folder / "model.onnx"
-    done = called(*EDGE, "verify", "--model", model, "--golden", folder / "golden.npz")
-    return done.stderr if done.returncode else ""
+    """The model and its golden file belong together."""
+    files = ("--model", folder / "model.onnx", "--golden", folder / "golden.npz")
+    done = called(*EDGE, "verify", *files)
+    return f"{done.stdout}{done.stderr}" if done.returncode else ""
 
 
-def before_teaching(folder):
+def together(folder):
+    """The same, or `verify` says that they do not belong together."""
+    complaint = agreeing(folder, "")
+    return "" if OTHER_MODEL in complaint else complaint
+
+
+def before_exporting(folder):
     touches(folder)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(GOLDEN / name, folder / name)
-    (folder / "source").mkdir()
-    for name in ("model.onnx", "golden.npz"):
-        shutil.copy(GOLDEN / name, folder / "source" / name)
+
+
+def before_teaching(folder):
+    before_exporting(folder)
+    shutil.copytree(GOLDEN, folder / "source")
 
 
 def teaching(folder):
@@ -160,13 +158,7 @@ def readable_map(folder):
 
 def longer_map(folder, printed):
     path = folder / "map.jsonl"
-    return "" if any(True for _ in TouchMap(path)) else "the map holds no touch"
-
-
-def before_exporting(folder):
-    touches(folder)
-    for name in ("model.onnx", "golden.npz"):
-        shutil.copy(GOLDEN / name, folder / name)
+    return "" if any(TouchMap(path)) else "the map holds no touch"
 
 
 def exporting(folder):

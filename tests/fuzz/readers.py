@@ -9,6 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -111,18 +112,13 @@ def recordings():
     """A few frames of two shipped recordings, the second with a mask of readable
     taxels."""
     out = []
-    for name, more in (
-        ("pillow-movable", {}),
-        ("cardboard-box-fixed", {"valid": None}),
-    ):
+    for name in ("pillow-movable", "cardboard-box-fixed"):
         arrays = dict(np.load(DEMO / f"{name}.npz"))
-        frames = len(arrays["t"])
-        arrays = {
-            k: v[10:90] if v.shape[:1] == (frames,) else v for k, v in arrays.items()
-        }
+        arrays |= {key: arrays[key][10:90] for key in ("t", "frames", "joints")}
+        if out:
+            arrays["valid"] = np.ones(arrays["frames"].shape[1:], bool)
         file = io.BytesIO()
-        masks = dict.fromkeys(more, np.ones(arrays["frames"].shape[1:], bool))
-        np.savez(file, **arrays, **masks)
+        np.savez(file, **arrays)
         out.append(file.getvalue())
     return out
 
@@ -157,21 +153,16 @@ def read_chain(path):
 
 HEAD = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
 TOUCH = {
-    **{
-        "event": "decision",
-        "task": "object",
-        "contact": 1,
-        "onset_s": 1.5,
-        "label": "cup",
-    },
-    **{"place": [0.1, 0.2, 0.3], "confidence": 0.5, "flags": ["tie"]},
+    "event": "decision",
+    "task": "object",
+    "contact": 1,
+    "onset_s": 1.5,
+    "label": "cup",
+    "place": [0.1, 0.2, 0.3],
+    "confidence": 0.5,
+    "flags": ["tie"],
 }
 MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
-
-
-def grasps():
-    """The XML of a small grasp of the SDH-2 hand."""
-    return [dsa().encode()]
 
 
 def read_grasp(path):
@@ -190,21 +181,14 @@ def made(write):
 
 def logs():
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
-    ways: tuple[dict[str, Any], ...]
     ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
-    return [
-        made(lambda path, way=way: write_mcap(path, cdr=False, **way)) for way in ways
-    ]
+    return [made(partial(write_mcap, cdr=False, **way)) for way in ways]
 
 
 def bags():
     """A ROS 1 bag of arrays."""
     messages = [array(STORES[1], frame) for frame in FRAMES]
-    return [
-        made(
-            lambda path: write_bag(path.with_suffix(".bag"), 1, messages, joints=False)
-        )
-    ]
+    return [made(lambda log: write_bag(Path(f"{log}.bag"), 1, messages, joints=False))]
 
 
 FRAME_FILES = [
@@ -286,7 +270,7 @@ READERS = (
             for name in ("cody18.toml", "household.toml")
         ],
     ),
-    Reader("sdh2", ".xml", grasps, mutate.of_text, read_grasp),
+    Reader("sdh2", ".xml", lambda: [dsa().encode()], mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
     Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),

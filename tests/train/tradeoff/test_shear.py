@@ -3,26 +3,12 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from train.choose import Chosen
-from train.evaluate import Promise
-from train.pipeline import Choice
+from tests.train.tradeoff.made import chosen
 from train.tradeoff import shear
 from train.tradeoff.shear import KNOWN, UNMET, Answers, Compared
 from train.tradeoff.wires import microcontroller, waited_s
-
-
-def chosen(right, unmet=None):
-    """A choice that answers so many of 10 trials rightly."""
-
-    def result(count):
-        return Promise(count, 10, hits=np.arange(10) < count)
-
-    left_out = "trial" if unmet is None else "object"
-    other = result(right if unmet is None else unmet)
-    return Chosen(Choice("IV", 1, 1), other, result(right), left_out)
 
 
 def answers(shares, unmet=None, early=()):
@@ -30,7 +16,7 @@ def answers(shares, unmet=None, early=()):
     unmet = unmet or [None] * len(shares)
     points = {}
     for i, (share, other) in enumerate(zip(shares, unmet, strict=True)):
-        points[round(0.2 * (i + 1), 1)] = {"mobility": chosen(share, other)}
+        points[round(0.2 * (i + 1), 1)] = {"mobility": chosen(share, other, of=10)}
     rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
     return Answers(points, {"mobility": SimpleNamespace(certified=rules)})
 

@@ -1,59 +1,39 @@
 """The first screen: the accuracy after each time, without and with a script."""
 
-from pathlib import Path
+from contextlib import contextmanager
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from tests.browser import chromium
-from train.choose import Chosen
+from tests.train.tradeoff.made import chosen, measured
 from train.evaluate import Promise
-from train.pipeline import Choice
 from train.report.page import write
 from train.report.section import Section
-from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.measured import Measured
 from train.tradeoff.slider import reached, slider
 
-
-def chosen(right, left_out="trial"):
-    return Chosen(Choice("IV", 1, 1), Promise(73, 100), Promise(right, 100), left_out)
-
-
 ANSWERS = {
-    0.4: {"mobility": chosen(60, "object"), "<b>": chosen(50)},
-    1.0: {"mobility": chosen(97, "object"), "<b>": chosen(80)},
-    1.2: {"mobility": chosen(99, "object"), "<b>": chosen(91)},
+    0.4: {"mobility": chosen(60, 73), "<b>": chosen(50)},
+    1.0: {"mobility": chosen(97, 73), "<b>": chosen(80)},
+    1.2: {"mobility": chosen(99, 73), "<b>": chosen(91)},
 }
-
-
-def measured(**changes):
-    """Measurements of two tasks, whose early decisions about mobility take 0.5 s."""
-    rule = SimpleNamespace(
-        asked=0.1, folds=5, mean_s=0.5, wrong=0.05, result=Promise(95, 100)
-    )
-    early = {"mobility": [rule], "<b>": []}
-    facts = {
-        "y": dict.fromkeys(early, np.array(["a"])),
-        "points": ANSWERS,
-        "comparisons": {
-            task: SimpleNamespace(certified=rules) for task, rules in early.items()
-        },
-        "costs": [
-            {"change": "96 taxels", "mobility, points": "-3 (-6 to +1)"},
-            {"change": "70 of 140 trials", "mobility, points": "-9 (-15 to -3)"},
-        ],
-        "board": SimpleNamespace(arithmetic_s=0.002, name="a board"),
-        "commands": Commands(("mine",), Path("build/tradeoff")),
-        "wire_s": 0.0,
-    }
-    return Measured(**{**facts, "breakaways": {}, **changes})
+RULE = SimpleNamespace(
+    asked=0.1, folds=5, mean_s=0.5, wrong=0.05, result=Promise(95, 100)
+)
+MEASURED = measured(
+    ANSWERS,
+    {"mobility": [RULE], "<b>": []},
+    costs=[
+        {"change": "96 taxels", "mobility, points": "-3 (-6 to +1)"},
+        {"change": "70 of 140 trials", "mobility, points": "-9 (-15 to -3)"},
+    ],
+    board=SimpleNamespace(arithmetic_s=0.002, name="a board"),
+)
 
 
 def shown():
-    return slider(measured())
+    return slider(MEASURED)
 
 
 def test_the_interval_is_that_which_the_front_promises():
@@ -68,7 +48,7 @@ def test_the_time_of_an_accuracy_is_told_early_and_fixed():
 
 
 def test_a_task_that_never_is_so_right_is_told():
-    assert reached(measured(), 0.97).endswith("<b> never")
+    assert reached(MEASURED, 0.97).endswith("<b> never")
 
 
 def test_the_names_of_the_front_and_the_other_prices_have_a_line_each():
@@ -93,14 +73,21 @@ def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
     assert "<td>&lt;b&gt;</td>" in text
 
 
-@pytest.mark.parametrize("width", [1440, 390])
-def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
-    report = write(tmp_path, "Title", [], [Section("Answer", widget=shown())])
+@contextmanager
+def in_a_browser(folder, width, slider):
+    """The page with the slider of a class at its beginning."""
+    report = write(folder, "Title", [], [Section("Answer", widget=shown())])
     with chromium(width, report.resolve().as_uri()) as browser:
         browser.execute_script(
-            "const i = document.querySelector('.waits'); i.value = 0;"
+            f"const i = document.querySelector('.{slider}'); i.value = 0;"
             "i.dispatchEvent(new Event('input'));"
         )
+        yield browser
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
+    with in_a_browser(tmp_path, width, "waits") as browser:
         text = browser.find_element("css selector", ".slider").text
         browser.find_element("css selector", "button").click()
         copied = browser.execute_script("return getSelection().toString()")
@@ -111,12 +98,7 @@ def test_in_a_browser_the_slider_moves_the_time(tmp_path, width):
 
 
 def test_in_a_browser_the_other_slider_moves_the_accuracy(tmp_path):
-    report = write(tmp_path, "Title", [], [Section("Answer", widget=shown())])
-    with chromium(390, report.resolve().as_uri()) as browser:
-        browser.execute_script(
-            "const i = document.querySelector('.levels'); i.value = 0;"
-            "i.dispatchEvent(new Event('input'));"
-        )
+    with in_a_browser(tmp_path, 390, "levels") as browser:
         text = browser.find_element("css selector", ".slider").text
         spoken = browser.execute_script(
             "return [...document.querySelectorAll('input')]"

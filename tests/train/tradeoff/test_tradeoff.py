@@ -5,7 +5,6 @@ import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,17 +18,14 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
-from train.choose import Chosen
+from tests.train.tradeoff.made import chosen, measured
 from train.commands.tradeoff import cost
 from train.dataset import read
-from train.evaluate import Promise
-from train.pipeline import Choice
 from train.rules import Course
 from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, unseen
-from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.run import Options, tradeoff
 from train.tradeoff.wires import spread, wire, wire_time_s, wires
@@ -51,10 +47,8 @@ class TestWires:
         assert three.every(100.0) == 1
 
     def test_a_single_taxel_is_one_chip_on_one_bus(self):
-        names = [
-            choice.name for choice in wires(SkinLayout(rows=1, cols=1, wraps=False))
-        ]
-        assert names == [
+        choices = wires(SkinLayout(rows=1, cols=1, wraps=False))
+        assert [choice.name for choice in choices] == [
             "AD7147, 1 bus at 400 kHz",
             "microcontroller, 1 bus at 1000 kHz",
         ]
@@ -76,15 +70,9 @@ class TestWires:
         assert 0.005 < wire_time_s([simulated], forearm, 100.0) < 0.02
 
 
-def chosen(hits, left_out="trial"):
-    """A choice that answers these trials rightly, trials left out."""
-    result = Promise(int(np.sum(hits)), len(hits), hits=np.array(hits, dtype=bool))
-    return Chosen(Choice("IV", 1, 1), Promise(1, 2), result, left_out)
-
-
 def test_the_front_has_the_windows_that_no_other_beats_in_both():
     shares = {0.2: 50, 0.4: 70, 0.6: 70, 0.8: 90, 1.0: 80}
-    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
+    points = {w: {"t": chosen(share)} for w, share in shares.items()}
     best = ParetoFront.of(points, "t", 0.01).points
     assert [(p.window_s, p.milliseconds, p.accuracy) for p in best] == [
         (0.2, 210.0, 0.5),
@@ -96,8 +84,8 @@ def test_the_front_has_the_windows_that_no_other_beats_in_both():
 
 
 def test_objects_never_met_have_a_figure_only_where_they_were_left_out():
-    assert unseen(chosen([1, 0])) is None
-    assert unseen(chosen([1, 0], "object")).accuracy == 0.5
+    assert unseen(chosen(50)) is None
+    assert unseen(chosen(60, 50)).accuracy == 0.5
 
 
 @pytest.fixture(scope="module")
@@ -106,11 +94,8 @@ def fronted(recordings, tmp_path_factory):
     path = tmp_path_factory.mktemp("front") / "front.json"
     dataset = followed(read([recordings]))
     points = {0.4: make_choice(dataset, 0.4)}
-    path.write_text(
-        json.dumps(
-            ParetoFront.of(points, "category", 0.01, quick=True).to_dict(dataset.digest)
-        )
-    )
+    front = ParetoFront.of(points, "category", 0.01, quick=True)
+    path.write_text(json.dumps(front.to_dict(dataset.digest)))
     return path, points[0.4]["category"]
 
 
@@ -177,13 +162,9 @@ class TestCosts:
 
 
 def test_prices_are_two_numbers():
+    both = "wrong=1,second=1"
     assert cost("second=0,wrong=2.5") == (2.5, 0.0)
-    for text in (
-        "wrong=10",
-        "wrong=-1,second=1",
-        "wrong=inf,second=1",
-        "wrong=1,second=1,x=1",
-    ):
+    for text in ("wrong=10", "wrong=-1,second=1", "wrong=inf,second=1", f"{both},x=1"):
         with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
             cost(text)
 
@@ -191,36 +172,21 @@ def test_prices_are_two_numbers():
 def test_the_dearer_an_error_the_longer_it_pays_to_wait():
     """Errors fall by 40 of 100 for 0.4 s, then by 5 for 0.4 s more."""
     shares = {0.4: 50, 0.8: 90, 1.2: 95}
-    points = {w: {"t": chosen(np.arange(100) < share)} for w, share in shares.items()}
-    fixed = SimpleNamespace(
-        y={"t": None},
-        after_s=0.0,
-        comparisons={"t": SimpleNamespace(certified=[])},
-        commands=Commands(("mine",), Path("build/tradeoff")),
-    )
-    fixed.results = lambda task: {
-        w: tasks[task].by_trial for w, tasks in points.items()
-    }
+    points = {w: {"t": chosen(share)} for w, share in shares.items()}
     best = []
-    for fixed.wrong, fixed.second in ((0.5, 1.0), (2.0, 1.0), (10.0, 1.0)):
+    for wrong in (0.5, 2.0, 10.0):
+        fixed = measured(points, {"t": []}, wrong=wrong, second=1.0)
         best.append(answer.prices(fixed).tables[0].rows[0]["best use"])
     assert best == ["after 0.4 s", "after 0.8 s", "after 1.2 s"]
 
 
 def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
-    points = {1.2: {"t": chosen(np.arange(100) < 95)}}
     right = np.arange(100) < 94
     rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
-    measured = SimpleNamespace(
-        y={"t": None},
-        after_s=0.0,
-        wrong=10.0,
-        second=1.0,
-        comparisons={"t": SimpleNamespace(certified=[rule])},
-        commands=Commands(("mine",), Path("build/tradeoff")),
-        results=lambda task: {w: tasks[task].by_trial for w, tasks in points.items()},
+    early_or_late = measured(
+        {1.2: {"t": chosen(95)}}, {"t": [rule]}, wrong=10.0, second=1.0
     )
-    (row,) = answer.prices(measured).tables[0].rows
+    (row,) = answer.prices(early_or_late).tables[0].rows
     assert row["best use"] == "early, at most 10% wrong"
     assert row["mean price"] == 1.2  # 10 times 6 %, and 0.6 s
     low, high = rule.result.interval
@@ -244,11 +210,9 @@ def share_right(*shares):
 
 class TestEarly:
     def test_a_calibrated_confidence_has_no_calibration_error(self):
-        compared = comparison(share_right(0.5, 0.5, 0.5))
-        assert compared.calibration_error == pytest.approx(0.0)
-        assert comparison(
-            share_right(0.9, 0.9, 0.9)
-        ).calibration_error == pytest.approx(0.4)
+        for share, error in ((0.5, 0.0), (0.9, 0.4)):
+            compared = comparison(share_right(share, share, share))
+            assert compared.calibration_error == pytest.approx(error)
 
     def test_a_rule_that_serves_two_error_rates_is_listed_once(self):
         compared = comparison(share_right(0.5, 0.7, 0.9))
@@ -280,16 +244,13 @@ class TestEarly:
         dataset = followed(read([save_touches(tmp_path, 20)]))
         compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
         assert compared.right.all()
-        rule = next(
-            certified for certified in compared.certified if certified.asked == 0.15
-        )
+        rules = {rule.asked: rule for rule in compared.certified}
+        rule = rules[0.15]
         assert rule.folds == early.FOLDS
         assert rule.wrong == 0.0
         assert rule.mean_s == 0.6
         # Forty trials certify no rate as low as the smallest one.
-        assert (
-            min(certified.asked for certified in compared.certified) > early.ERRORS[0]
-        )
+        assert min(rules) > early.ERRORS[0]
 
     def test_features_of_kernels_have_the_tables_of_the_other_folds(
         self, tmp_path, monkeypatch
@@ -304,15 +265,12 @@ class TestEarly:
         from train.simulate.scene import load
 
         floors = breakaway_times(load(SCENE))
+        box = floors["cardboard box"]
         # mu_s m g / (k v): equal arms, so the ratio of two objects is that of mu_s m.
-        assert floors["plastic bin"] / floors["cardboard box"] == pytest.approx(
-            0.28 / 0.6
-        )
+        assert floors["plastic bin"] / box == pytest.approx(0.28 / 0.6)
         # The chair tips: 0.4 / (2 * 0.7) instead of 0.6.
-        assert floors["chair"] / floors["cardboard box"] == pytest.approx(
-            (4 * 0.4 / 1.4) / 0.6
-        )
-        assert 0.3 < floors["cardboard box"] < 0.5
+        assert floors["chair"] / box == pytest.approx((4 * 0.4 / 1.4) / 0.6)
+        assert 0.3 < box < 0.5
 
 
 class TestBoard:
@@ -322,17 +280,10 @@ class TestBoard:
         path = board_file(tmp_path / "board.json", "0" * 64)
         whole = path.read_text()
         assert board.read(path).memory_mb == 61.5
-        changes = (
-            ("decision", "something"),
-            ("cold_start_ms", "start"),
-            ("100.0", "NaN"),
-        )
-        for wrong in (
-            "[" * 100_000,
-            whole[:50],
-            *(whole.replace(*change) for change in changes),
-        ):
-            path.write_text(wrong)
+        wrong = ["[" * 100_000, whole[:50]]
+        wrong += [whole.replace(name, "x") for name in ("decision", "cold_start_ms")]
+        for text in (*wrong, whole.replace("100.0", "NaN")):
+            path.write_text(text)
             with pytest.raises(InputError, match="not a board file: .*; make one with"):
                 board.read(path)
 
@@ -342,19 +293,15 @@ class TestBoard:
 
 
 def board_file(path, digest):
-    stage = {"median_us": 100.0, "p99_us": 200.0, "n": 40}
-    board_ = {
+    stage = {"median_us": 100.0, "p99_us": 200.0}
+    content = {
         "machine": {"kind": "a board", "name": "here"},
-        "model": {
-            "sha256": "ab" * 32,
-            "data_digest": digest,
-            "features": ["a", "b", "c"],
-        },
+        "model": {"sha256": "ab" * 32, "data_digest": digest},
         "stages": dict.fromkeys(("track", "features", "decision"), stage),
         "memory_mb": 61.5,
         "cold_start_ms": 812.0,
     }
-    path.write_text(json.dumps(board_))
+    path.write_text(json.dumps(content))
     return path
 
 

@@ -1,0 +1,42 @@
+"""Choices and measurements that are made up, for tests of the trade-off."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from train.choose import Chosen
+from train.evaluate import Promise
+from train.pipeline import Choice
+from train.tradeoff.commands import Commands
+from train.tradeoff.measured import Measured
+
+
+def chosen(right, unmet=None, of=100):
+    """A choice that answers so many trials rightly, and so many of objects never met
+    where these were left out."""
+
+    def result(count):
+        return Promise(count, of, hits=np.arange(of) < count)
+
+    left_out = "trial" if unmet is None else "object"
+    accuracy = result(right if unmet is None else unmet)
+    return Chosen(Choice("IV", 1, 1), accuracy, result(right), left_out)
+
+
+def measured(points, certified, **changes):
+    """Measurements of {window: {task: choice}} with {task: certified rules}, on a
+    board that takes no time."""
+    facts = {
+        "y": dict.fromkeys(certified, np.array(["a"])),
+        "points": points,
+        "comparisons": {
+            task: SimpleNamespace(certified=rules) for task, rules in certified.items()
+        },
+        "costs": [],
+        "board": SimpleNamespace(arithmetic_s=0.0, name="a board"),
+        "commands": Commands(("mine",), Path("build/tradeoff")),
+        "wire_s": 0.0,
+        "breakaways": {},
+    }
+    return Measured(**{**facts, **changes})
