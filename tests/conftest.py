@@ -179,6 +179,13 @@ def python(*arguments, **options):
     return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, **options)
 
 
+def started(*arguments, **options) -> subprocess.Popen:
+    """A process of `edge-classify` that has been started, with its stderr as text."""
+    words = [sys.executable, "-m", "edge", *map(str, arguments)]
+    options = {"stderr": subprocess.PIPE, "text": True, **options}
+    return subprocess.Popen(words, cwd=ROOT, **options)
+
+
 PAPER = ("--features", "paper", "--projection", "pca", "--samples", "40")
 """Options of `make export` that fix the paper's features, for tests that need no
 choice."""

@@ -149,22 +149,30 @@ def _relabel(
 def _delete(
     arguments: argparse.Namespace, output: Output, paths: Sequence[Path]
 ) -> int:
-    """Delete recordings, so that they can be brought back."""
+    """Show what is deleted, ask, and delete it."""
     for path in paths:
         output.text(f"{path}: is deleted")
     if not _agreed(arguments, output, len(paths)):
         return 1
-    for folder in sorted({path.parent for path in paths}):
-        bin_ = folder / DELETED
-        with refusing(f"{folder}: its recordings cannot be deleted"):
-            shutil.rmtree(bin_, ignore_errors=True)
-            bin_.mkdir()
-            for path in paths:
-                if path.parent == folder:
-                    path.rename(bin_ / path.name)
-        (folder / UNDO).unlink(missing_ok=True)
+    delete(paths)
     output.text(f"{counted(len(paths), 'recording')} deleted; --undo brings them back")
     return 0
+
+
+def delete(paths: Sequence[Path]) -> None:
+    """Delete recordings, so that `take_back` can bring them back.
+
+    Raises:
+        InputError: the system refuses it.
+    """
+    for folder in sorted({path.parent for path in paths}):
+        with refusing(f"{folder}: its recordings cannot be deleted"):
+            shutil.rmtree(folder / DELETED, ignore_errors=True)
+            (folder / DELETED).mkdir()
+            (folder / UNDO).unlink(missing_ok=True)
+            for path in paths:
+                if path.parent == folder:
+                    path.rename(folder / DELETED / path.name)
 
 
 def undo(data: Sequence[str], output: Output) -> int:
@@ -178,8 +186,7 @@ def undo(data: Sequence[str], output: Output) -> int:
     for folder in folders:
         if not folder.is_dir():
             raise InputError(f"{folder}: --undo takes the folder of the recordings")
-        brought += _brought_back(folder)
-        brought += _carry_out(folder / UNDO)
+        brought += take_back(folder)
     if not brought:
         where = ", ".join(map(str, folders))
         raise InputError(f"{where}: there is no change to take back")
@@ -188,11 +195,11 @@ def undo(data: Sequence[str], output: Output) -> int:
     return 0
 
 
-def _brought_back(folder: Path) -> list[Path]:
-    """Bring the deleted recordings of a folder back.
+def take_back(folder: Path) -> list[Path]:
+    """Take the last change or deletion of recordings in a folder back; which they are.
 
     Raises:
-        InputError: another one has the name of one of them by now.
+        InputError: by now, another recording has the name of a deleted one.
     """
     deleted = sorted((folder / DELETED).glob("*.npz"))
     places = [folder / path.name for path in deleted]
@@ -201,7 +208,7 @@ def _brought_back(folder: Path) -> list[Path]:
             raise InputError(f"{place}: exists again; rename it, and undo then")
     for path, place in zip(deleted, places, strict=True):
         path.rename(place)
-    return places
+    return [*places, *_carry_out(folder / UNDO)]
 
 
 def _carry_out(journal: Path) -> list[Path]:
@@ -223,7 +230,8 @@ def _carry_out(journal: Path) -> list[Path]:
         if path.is_file():
             recording = load(path)
             if recording.labels != labels:
-                save(path, with_labels(recording, labels))
+                meta = {**recording.meta, "labels": labels}
+                save(path, replace(recording, meta=meta))
                 relabelled.append(path)
     journal.unlink()
     return relabelled
@@ -311,11 +319,6 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
         output.text(sentence)
     for sentence in slips(labels):
         output.text(f"probably a slip: {sentence}")
-
-
-def with_labels(recording: Recording, labels: Mapping[str, str]) -> Recording:
-    """The recording with other labels."""
-    return replace(recording, meta={**recording.meta, "labels": dict(labels)})
 
 
 def changed(

@@ -11,18 +11,14 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.events import Decided, Event, Onset
-from edge.files import read_bytes, refusing
-from edge.recording import LARGEST_BYTES, Recording, load
-from edge.saving import save
+from edge.recording import Recording, load
 from edge.skin.loop import Schedule
-from edge.tools import review
-from edge.tools.label import changed, with_labels
+from edge.tools import label, review
 from edge.tools.web import WebServer
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
-from edge.writing import write_whole
 
 PICTURE_S = 0.1
 """Between two pictures."""
@@ -80,8 +76,8 @@ class Page:
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
         """Number of changes of the list of trials."""
-        self._undo: tuple[str, bytes] | None = None
-        """The file that the last action changed or deleted, as it was before."""
+        self._undo: str | None = None
+        """The file that the last action changed or deleted."""
         self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
@@ -133,7 +129,7 @@ class Page:
             "recording": self.recording,
             "trials": self._version,
             "notices": list(self._notices),
-            "undo": None if self._undo is None else self._undo[0],
+            "undo": self._undo,
         }
         if frame.shear is not None:
             picture["shear"] = frame.shear.reshape(-1, 2).tolist()
@@ -243,30 +239,25 @@ class Page:
         if name not in list(self._trials):
             raise InputError(f"{name!r} is none of the trials that this page shows")
         path = folder / str(name)
-        before = read_bytes(path, LARGEST_BYTES)
         if action["do"] == "delete":
-            with refusing(f"{path}: cannot be deleted"):
-                path.unlink(missing_ok=True)
+            label.delete([path])
             del self._trials[path.name]
             self._version += 1
         else:
             trial = load(path)
             accepts = action["do"] == "accept"
             labels = _accepted(path.name, trial) if accepts else _labels(action)
-            trial = with_labels(trial, changed(str(path), trial.meta, labels))
-            save(path, trial)
-            self.saved(path, trial)
-        self._undo = path.name, before
+            label.change_all({path: label.changed(str(path), trial.meta, labels)})
+            self._show_trial(path)
+        self._undo = path.name
 
     def _take_back(self, folder: Path) -> None:
-        """Bring back the file that the last action changed or deleted."""
+        """Bring back what the last action changed or deleted."""
         if self._undo is None:
             raise InputError("there is nothing to undo")
-        name, before = self._undo
-        with write_whole(folder / name) as file:
-            file.write(before)
+        for path in label.take_back(folder):
+            self._show_trial(path)
         self._undo = None
-        self._show_trial(folder / name)
 
 
 def _decision(event: Decided) -> dict[str, Any]:

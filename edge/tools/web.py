@@ -47,7 +47,7 @@ SLOW_S = 2.0
 """A browser that has not sent its request by then, or takes no bytes for so long, is
 dropped."""
 WATCHED_S = 2.0
-"""After so long without a request for a picture, nobody watches."""
+"""After so long without a stream, nobody watches."""
 PICTURE_S = 0.1
 """Time between two pictures of a stream."""
 LARGEST_HEAD = 4096
@@ -135,15 +135,6 @@ class WebServer:
     def show(self, picture: Mapping[str, Any]) -> None:
         """Leave a picture, which must not change afterwards, for the browsers."""
         self._picture = picture
-
-    def picture(self) -> bytes:
-        """The latest picture as JSON, or nothing if there is none yet."""
-        self._asked_at = time.monotonic()
-        if self._picture is None:
-            return b""
-        return json.dumps(
-            self._picture, allow_nan=False, separators=(",", ":")
-        ).encode()
 
     def close(self) -> None:
         """Stop serving."""
@@ -234,14 +225,9 @@ class WebServer:
         return from_here and (name or host).removesuffix(".local") in hosts
 
     def _contents(self, path: str) -> bytes:
-        """The answer with a file, or with the latest picture."""
+        """The answer with a file, or the beginning of a stream of pictures."""
         if path == "/events":
-            self._asked_at = time.monotonic()
             return STREAM
-        if path == "/picture":
-            picture = self.picture()
-            status = HTTPStatus.OK if picture else HTTPStatus.NO_CONTENT
-            return _answer(status, picture, JSON)
         if path in FILES:
             contents = (self._pages / (path[1:] or "page.html")).read_bytes()
             kind = f"text/{FILES[path]}; charset=utf-8"
@@ -267,10 +253,11 @@ class WebServer:
         """Send a browser every new picture until it goes."""
         sent = None
         while not reader.at_eof():
-            latest = self._picture
             self._asked_at = time.monotonic()
+            latest = self._picture
             if latest is not sent:
-                await _send(writer, b"data: " + self.picture() + b"\n\n")
+                data = json.dumps(latest, allow_nan=False, separators=(",", ":"))
+                await _send(writer, f"data: {data}\n\n".encode())
                 sent = latest
             await asyncio.sleep(PICTURE_S / 2)
 

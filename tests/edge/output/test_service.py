@@ -7,7 +7,6 @@ import shlex
 import shutil
 import signal
 import subprocess
-import sys
 from configparser import ConfigParser
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import pytest
 
 from edge import demo
 from edge.cli import parser
-from tests.conftest import ROOT
+from tests.conftest import ROOT, started
 from train.touch_map import TouchMap
 
 UNIT = ROOT / "docs" / "examples" / "service" / "edge-classify.service"
@@ -23,28 +22,10 @@ TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
 
 
 def start(manager, *arguments):
-    fake = ("--fake", str(TOUCH), "--loop")
-    return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "edge",
-            "run",
-            "--model",
-            str(demo.MODEL),
-            *fake,
-            *arguments,
-        ],
-        cwd=ROOT,
-        env={
-            **os.environ,
-            "NOTIFY_SOCKET": manager.getsockname(),
-            "WATCHDOG_USEC": "200000",
-        },
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    watched = {"NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"}
+    given = ("--model", demo.MODEL, "--fake", TOUCH, "--loop", *arguments)
+    environment = {**os.environ, **watched}
+    return started("run", *given, env=environment, stdout=subprocess.PIPE)
 
 
 def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
@@ -66,9 +47,8 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
     assert out.endswith("\n")
     lines = [json.loads(line) for line in out.splitlines()]
     assert lines[-1]["event"] == "end"
-    assert len(list(TouchMap(place))) == len(
-        {line["contact"] for line in lines if line["event"] == "decision"}
-    )
+    decided = {line["contact"] for line in lines if line["event"] == "decision"}
+    assert len(list(TouchMap(place))) == len(decided)
 
 
 @pytest.fixture
@@ -83,11 +63,8 @@ def examples():
     """The arguments in the unit's environment file: those that hold, and those in a
     comment."""
     lines = UNIT.with_suffix(".env").read_text().splitlines()
-    return [
-        line.partition("=")[2]
-        for line in lines
-        if line.lstrip("#").startswith("ARGUMENTS=")
-    ]
+    named = [line.lstrip("#").partition("=") for line in lines]
+    return [value for name, _, value in named if name == "ARGUMENTS"]
 
 
 def test_the_units_command_with_and_without_an_arm_is_one_that_edge_classify_takes(
@@ -124,12 +101,7 @@ def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):
     shutil.which("systemd-analyze") is None, reason="no systemd-analyze here"
 )
 def test_systemd_finds_the_unit_little_exposed():
-    command = [
-        "systemd-analyze",
-        "security",
-        "--offline=true",
-        "--threshold=25",
-        str(UNIT),
-    ]
+    given = ["security", "--offline=true", "--threshold=25", str(UNIT)]
+    command = ["systemd-analyze", *given]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-500:]

@@ -22,20 +22,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import MAX_CONTACTS, ContactTracker
 from train.touch_map import TouchMap
 
+MODEL = Model(demo.MODEL)
 FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
-
-
-def follow(tracks, pictures, t=0.0):
-    """Pushes pictures of text ('#' 100 counts, '+' 15, '.' none); contacts after
-    each."""
-    out = []
-    for i, picture in enumerate(pictures):
-        counts = np.zeros(FLAT.shape, dtype=np.uint16)
-        for r, row in enumerate(picture.split("/")):
-            for c, taxel in enumerate(row):
-                counts[r, c] = {"#": 100, "+": 15}.get(taxel, 0)
-        out.append(list(tracks.push(Frame(t + i / 100, counts))))
-    return out
 
 
 MERGED, PARTED = ".######", "##.###"
@@ -74,7 +62,14 @@ FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
     ],
 )
 def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
-    contacts = follow(ContactTracker(FLAT, max_contacts=MAX_CONTACTS), pictures)[-1]
+    """Pictures are rows of taxels: '#' has 100 counts, '+' 15, '.' none."""
+    tracks = ContactTracker(FLAT, max_contacts=MAX_CONTACTS)
+    levels = {"#": 100, "+": 15, ".": 0}
+    for i, picture in enumerate(pictures):
+        counts = np.zeros(FLAT.shape, dtype=np.uint16)
+        for r, row in enumerate(picture.split("/")):
+            counts[r, : len(row)] = [levels[taxel] for taxel in row]
+        contacts = list(tracks.push(Frame(i / 100, counts)))
     assert [contact.series().area.tolist() for contact in contacts] == areas
     assert [contact.ended for contact in contacts] == ended
 
@@ -82,14 +77,11 @@ def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
 def test_a_single_contact_is_followed_as_by_the_largest_region():
     """One code for onset, series and decision: the same events but for number and
     place."""
-    model = Model(demo.MODEL)
     for path in demo.recordings():
         recording = load(path)
-        alone = Classifier(model)
-        several = Classifier(model, max_contacts=8)
         expected, seen = (
-            [e.to_dict() for f in recording for e in w.push(f)]
-            for w in (alone, several)
+            [event.to_dict() for event in classifier.classify(recording)]
+            for classifier in (Classifier(MODEL), Classifier(MODEL, max_contacts=8))
         )
         number = next(e["contact"] for e in seen if e["event"] == "decision")
         mine = [e for e in seen if e["contact"] == number]
@@ -97,9 +89,8 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
 
 
 def strip(event):
-    return {
-        k: v for k, v in event.items() if k not in ("contact", "place", "latency_ms")
-    }
+    others = ("contact", "place", "latency_ms")
+    return {key: value for key, value in event.items() if key not in others}
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +120,7 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
     decisions = [line for line in lines if line["event"] == "decision"]
     assert len({line["contact"] for line in decisions}) == 2
     found = TouchMap(place)
-    assert found.head[:2] == (Model(demo.MODEL).info.chain.base, "metre")
+    assert found.head[:2] == (MODEL.info.chain.base, "metre")
     first, second = touches = list(found)
     assert first.labels == {
         "category": "rigid-fixed",
@@ -183,7 +174,7 @@ def write(path, info, events):
 
 def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
     path = tmp_path / "map.jsonl"
-    info = Model(demo.MODEL).info
+    info = MODEL.info
     event = {
         "event": "decision",
         "contact": 1,
@@ -228,7 +219,7 @@ def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sen
     path = tmp_path / "notes.txt"
     path.write_text(text + "\n")
     with pytest.raises(InputError, match=sentence):
-        touchmap.map_writer(path, Model(demo.MODEL).info)
+        touchmap.map_writer(path, MODEL.info)
     assert path.read_text() == text + "\n"
 
 
@@ -240,7 +231,7 @@ def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(
 ):
     path = tmp_path / "map.jsonl"
     path.write_text(left)
-    write(path, Model(demo.MODEL).info, [])
+    write(path, MODEL.info, [])
     assert list(TouchMap(path)) == []
 
 
@@ -258,7 +249,7 @@ def test_a_full_disk_costs_lines_and_not_decisions():
 
 def test_only_the_head_of_a_long_map_is_read_before_a_run(tmp_path):
     path = tmp_path / "map.jsonl"
-    info = Model(demo.MODEL).info
+    info = MODEL.info
     write(path, info, [])
     before = path.stat().st_size
     os.truncate(path, 1 << 31)  # takes no room
@@ -276,4 +267,4 @@ def test_what_is_no_file_is_refused_as_a_map(tmp_path):
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", tmp_path, "/dev/null", "a\0b"):
         with pytest.raises(InputError, match="cannot be (read|written)"):
-            touchmap.map_writer(path, Model(demo.MODEL).info)
+            touchmap.map_writer(path, MODEL.info)

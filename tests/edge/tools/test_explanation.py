@@ -25,10 +25,13 @@ BY_HAND = Space(
 a mean."""
 
 
+def by_hand(space=BY_HAND, voters=(0,)):
+    touch = np.array([11.0, 12.0, 0.25])
+    return explain(space, touch, voters, 0, ["force", "area"], [2, 1])
+
+
 def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
-    why = explain(
-        BY_HAND, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1]
-    )
+    why = by_hand()
     # z = (0.5 + 1, 0.5); to (2, 0): 0.25 + 0.25 = |z|^2 + |b|^2 - 6 = 2.5 + 4 - 6.
     assert why.voters == (Near(0, 0, np.sqrt(0.5), {"force": 6.0, "area": 0.0}),)
     assert why.rival == Near(1, 1, np.sqrt(12.5), {"force": -6.0, "area": 0.0})
@@ -42,10 +45,7 @@ def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
 def test_the_feature_that_has_to_change_least_comes_first():
     # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples,
     # or 3.5.
-    space = BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]]))
-    why = explain(
-        space, np.array([11.0, 12.0, 0.25]), [0], 0, ["force", "area"], [2, 1]
-    )
+    why = by_hand(BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]])))
     assert [change.feature for change in why.changes] == ["force", "area"]
 
 
@@ -63,10 +63,11 @@ def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
     # The nearest other trial is as near where the first coordinate is 1; a fifth more
     # makes it nearer. Across, a trial of the answer lies in between for up to four
     # times as much.
-    assert why.changes == tuple(
-        Change(name, 1, pytest.approx(size), pytest.approx(size))
-        for name, size in (("quick", 2.4), ("across", 4.0), ("slow", 4.8))
-    )
+    sizes = {"quick": 2.4, "across": 4.0, "slow": 4.8}
+    assert [change.feature for change in why.changes] == list(sizes)
+    for change, size in zip(why.changes, sizes.values(), strict=True):
+        assert change.label == 1
+        assert change.size == change.mean == pytest.approx(size)
 
 
 VOTES = Space(
@@ -81,10 +82,13 @@ VOTES = Space(
 no label."""
 
 
+def votes(space, voters=(0, 1, 2), label=0):
+    return explain(space, np.zeros(1), voters, label, ["force"], [1])
+
+
 @pytest.mark.parametrize("outvoted", [-1.0, -2.5], ids=["the nearest", "the farthest"])
 def test_a_change_is_found_where_a_trial_was_outvoted(outvoted):
-    space = VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]]))
-    why = explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1])
+    why = votes(VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]])))
     assert why.rival.row == 0
     assert why.rival.distance == -outvoted
     # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
@@ -97,7 +101,7 @@ def test_a_trial_on_the_way_makes_the_least_change_smaller():
         rows=np.array([[0.0, 0.0], [2.0, 0.0], [0.6, 2.5]]),
         labels=np.array([0, 1, 1]),
     )
-    why = explain(space, np.zeros(1), [0], 0, ["force"], [1])
+    why = votes(space, voters=[0])
     assert why.rival.row == 1
     assert why.changes == (Change("force", 1, 0.5, 0.5),)
 
@@ -105,21 +109,18 @@ def test_a_trial_on_the_way_makes_the_least_change_smaller():
 def test_an_answer_that_its_votes_do_not_give_has_no_change():
     """Tasks that are decided together may give it; a label of its votes would be no
     change."""
-    assert explain(VOTES, np.zeros(1), [0, 1, 2], 1, ["force"], [1]).changes == ()
+    assert votes(VOTES, label=1).changes == ()
 
 
 def test_a_trial_without_a_label_is_no_rival():
-    space = VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))
-    assert explain(space, np.zeros(1), [0, 1, 2], 0, ["force"], [1]).rival is None
+    assert votes(VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))).rival is None
 
 
-def why_of(model, task, vector, decision):
+def why_of(model, space, vector, rows, label):
     """The explanation of a model's decision, and the distances of the trials that
     voted."""
-    rows = decision.neighbours.tolist()
-    label = model.info.tasks[task].labels.index(decision.label)
-    named = (model.info.features, model.info.widths)
-    why = explain(Space.of(model, task), vector, rows, label, *named)
+    info = model.info
+    why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
     return why, [near.distance for near in why.voters]
 
 
@@ -143,22 +144,20 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
     _, model = fitted_model(tmp_path / "model.onnx", info, choices, X, y)
     assert model.decide(vectors[-1])["partial"].out_of_range
     for name, task in model.info.tasks.items():
+        space = Space.of(model, name)
         for vector in vectors:
             decision = model.decide(vector)[name]
-            why, distances = why_of(model, name, vector, decision)
+            answer = task.labels.index(decision.label)
+            why, distances = why_of(model, space, vector, decision.neighbours, answer)
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
 
 
 def test_without_another_label_there_is_no_rival():
-    space = BY_HAND._replace(labels=np.array([0, 0]))
-    why = explain(
-        space, np.array([11.0, 12.0, 0.25]), [1], 0, ["force", "area"], [2, 1]
-    )
-    assert why == Explanation(
-        (Near(1, 0, np.sqrt(12.5), {"force": -6.0, "area": 0.0}),)
-    )
+    why = by_hand(BY_HAND._replace(labels=np.array([0, 0])), voters=[1])
+    pulls = {"force": -6.0, "area": 0.0}
+    assert why == Explanation((Near(1, 0, np.sqrt(12.5), pulls),))
 
 
 @pytest.mark.parametrize("name", ["golden", "exported"])
@@ -171,21 +170,17 @@ def test_the_parts_add_up_to_the_graphs_distances(name, exported):
         space = Space.of(model, task)
         reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
         for i in range(24):
-            rows = golden[f"{task}_neighbours"][i]
             label = int(golden[f"{task}_label"][i])
             vector = golden["vectors"][i]
-            why = explain(
-                space, vector, rows.tolist(), label, info.features, info.widths
-            )
+            expected = golden[f"{task}_distances"][i]
+            rows = golden[f"{task}_neighbours"][i]
+            why, distances = why_of(model, space, vector, rows, label)
+            assert distances == pytest.approx(expected, abs=1e-5 * reach)
             z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
-            for near, distance in zip(
-                why.voters, golden[f"{task}_distances"][i], strict=True
-            ):
-                parts = z @ z + space.rows[near.row] @ space.rows[near.row]
-                assert near.distance == pytest.approx(distance, abs=1e-5 * reach)
-                assert parts - sum(near.pulls.values()) == pytest.approx(
-                    distance**2, abs=1e-5 * reach**2
-                )
+            for near, distance in zip(why.voters, expected, strict=True):
+                row = space.rows[near.row]
+                square = z @ z + row @ row - sum(near.pulls.values())
+                assert square == pytest.approx(distance**2, abs=1e-5 * reach**2)
             assert space.vote(z, info.tasks[task].k) == label
             assert why.rival.label != label
             assert why.rival.distance >= why.voters[0].distance

@@ -201,11 +201,11 @@ def test_a_recording_of_several_contacts_is_relabelled_no_more_than_by_label(
 
 
 def test_what_cannot_be_deleted_is_one_sentence(folder_page, monkeypatch):
-    def refuse(path, missing_ok):
+    def refuse(path, target):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "unlink", refuse)
-    with pytest.raises(InputError, match="a.npz: cannot be deleted: Permission denied"):
+    monkeypatch.setattr(Path, "rename", refuse)
+    with pytest.raises(InputError, match="cannot be deleted: Permission denied"):
         folder_page._act({"do": "delete", "file": "a.npz"})
     assert "a.npz" in folder_page._trials
 

@@ -5,8 +5,6 @@ import io
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
@@ -24,7 +22,7 @@ from edge.saving import save
 from edge.tools import terminal
 from edge.tools.record import Recorder, Trials, trial_path
 from edge.touch.frame import Frame
-from tests.conftest import ROOT, full_pipe
+from tests.conftest import full_pipe, started
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -160,26 +158,10 @@ def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record
 
 
 def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
-    out, (reading, writing) = tmp_path / "trials", full_pipe()
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "edge",
-            "record",
-            "--fake",
-            str(parted),
-            "--loop",
-            "--label",
-            "object=a",
-            "--out",
-            str(out),
-        ],
-        cwd=ROOT,
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    out = tmp_path / "trials"
+    reading, writing = full_pipe()
+    given = ("--fake", parted, "--loop", "--label", "object=a", "--out", out)
+    process = started("record", *given, stdout=writing)
     while len(list(out.glob("a-*.npz"))) < 3:
         assert process.poll() is None
         time.sleep(0.02)
@@ -224,14 +206,8 @@ def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
         ([], "give --label TASK=LABEL"),
         (["--web", "127.0.0.1:0", "--out", "one.npz"], "give --label TASK=LABEL"),
         (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
-        (
-            ["--label", "a=b", "--out", "a" * 300 + ".npz"],
-            "cannot be written: File name too long",
-        ),
-        (
-            ["--label", "a=b", "--out", "a" * 300],
-            "cannot be written: File name too long",
-        ),
+        (["--label", "a=b", "--out", "a" * 300 + ".npz"], "File name too long"),
+        (["--label", "a=b", "--out", "a" * 300], "File name too long"),
         (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
     ],
 )
@@ -261,10 +237,8 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
     monkeypatch.setattr("edge.tools.page.Page.push", push)
     monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
 
-    status, events, _ = edge(
-        "record", "--fake", parted, "--web", "127.0.0.1:0", "--out", tmp_path
-    )
-
+    given = ("--web", "127.0.0.1:0", "--out", tmp_path)
+    status, events, _ = edge("record", "--fake", parted, *given)
     assert status == 0
     saved = [event for event in events if event["event"] == "saved"]
     assert {event["labels"]["object"] for event in saved} == {"from the page"}
@@ -297,11 +271,8 @@ def test_keys_choose_the_label_and_delete_the_last_trial(
     monkeypatch.setattr(terminal, "is_interactive", lambda: True)
     monkeypatch.setattr(terminal, "keys", keys)
     labels = ("--label", "touch=soft", "--label", "touch=hard", "--label", "hand=left")
-
-    status, events, err = edge(
-        "record", "--fake", parted, "--loop", "--trials", 3, "--out", trials, *labels
-    )
-
+    given = ("--fake", parted, "--loop", "--trials", 3, "--out", trials, *labels)
+    status, events, err = edge("record", *given)
     assert status == 0
     assert [(e["event"], Path(e["file"]).name) for e in events] == [
         ("saved", "soft-left-001.npz"),

@@ -2,10 +2,9 @@
 
 import os
 import pty
-import subprocess
-import sys
 
 from edge.tools import view
+from tests.conftest import started
 
 
 def test_view_draws_the_skin_at_a_bounded_rate(edge, exported, recordings):
@@ -37,18 +36,8 @@ def test_view_draws_a_picture_each_time_one_is_due(edge, recordings, monkeypatch
 
 def test_a_terminal_that_goes_away_ends_view_with_a_sentence(recordings):
     terminal, own_side = pty.openpty()
-    command = [
-        sys.executable,
-        "-m",
-        "edge",
-        "view",
-        "--loop",
-        "--fake",
-        recordings / "hard_0.npz",
-    ]
-    process = subprocess.Popen(
-        command, stdin=own_side, stdout=own_side, stderr=subprocess.PIPE, text=True
-    )
+    given = ("--loop", "--fake", recordings / "hard_0.npz")
+    process = started("view", *given, stdin=own_side, stdout=own_side)
     os.close(own_side)
     os.read(terminal, 100)
     os.close(terminal)
