@@ -66,10 +66,10 @@ class Mean:
             means[window] = float(np.mean(known)) if known else None
         return means
 
-    def early_s(self, task, level):
+    def early_s(self, task, kind, level):
         """The mean time of early decisions; None where a seed never reaches the
         level."""
-        times = [answers.early_s(task, level) for answers in self.seeds]
+        times = [answers.early_s(task, kind, level) for answers in self.seeds]
         return None if None in times else float(np.mean(times))
 
 

@@ -1,6 +1,6 @@
 """Early decisions compared with fixed windows, on held-out trials."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.stopping import StoppingRule
-from train.choose import TRIAL
+from train.choose import TRIAL, groupable
 from train.dataset import DataSet
-from train.evaluate import Promise, Result, finest, stratified_folds
+from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
 from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
@@ -95,25 +95,44 @@ def compare_stopping(
     dataset: DataSet,
     decision_points_s: Sequence[float],
     *,
+    leave_out: str = TRIAL,
     quick: bool = True,
     jobs: int = 1,
 ) -> dict[str, StoppingComparison]:
     """{task: early decisions compared with fixed windows}.
 
     Each fold is held out once, and an export of the other folds decides its trials. The
-    other folds have trials of the same objects, so the export leaves out single trials
-    too.
+    export leaves out what the folds do: single trials, or entire groups.
 
     Args:
         dataset: the trials.
         decision_points_s: the windows.
+        leave_out: `trial`, or a label of which entire groups are held out. Tasks whose
+            classes have too few groups are left out then.
         quick: whether the export tries few candidates.
         jobs: processes.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    folds = stratified_folds(y[finest(y)], FOLDS)
+    if leave_out == TRIAL:
+        folds = stratified_folds(y[finest(y)], FOLDS)
+    else:
+        groups = dataset.groups(leave_out)
+        if groups is None:
+            return {}
+        y.pop(leave_out, None)
+        y = {task: labels for task, labels in y.items() if groupable(labels, groups)}
+        folds = group_folds(groups, FOLDS)
+    if not y:
+        return {}
     tests = [folds == k for k in range(FOLDS)]
-    cases = [(dataset, test, decision_points_s, quick) for test in tests]
+    options: dict[str, Any] = {
+        "leave_out": leave_out,
+        "decision_points_s": decision_points_s,
+        "tasks": tuple(y),
+        "quick": quick,
+        "jobs": 1,
+    }
+    cases = [(dataset, test, options) for test in tests]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
     shape = len(decision_points_s), len(dataset.trials)
     comparisons = {}
@@ -145,23 +164,18 @@ def compare_stopping(
 def _held_out(
     dataset: DataSet,
     test: NDArray[np.bool_],
-    decision_points_s: Sequence[float],
-    quick: bool,
+    options: Mapping[str, Any],
 ) -> tuple[Any, ...]:
     """The model that was fitted without a fold, and its answers to the fold's trials
     (`judged`)."""
-    options: dict[str, Any] = {
-        "leave_out": TRIAL,
-        "decision_points_s": decision_points_s,
-    }
-    fitted = fit(dataset.part(~test), quick=quick, jobs=1, **options)
+    fitted = fit(dataset.part(~test), **options)
     model = fitted.sequential
     test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
     new = np.stack(
         [
             test_set.features(s, fitted.samples, fitted.dataset.names)
-            for s in decision_points_s
+            for s in model.decision_points_s
         ]
     )
     truth = {task: test_set.labels(task) for task in model.choices}

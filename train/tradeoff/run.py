@@ -11,6 +11,7 @@ import numpy as np
 
 from edge.errors import InputError
 from edge.writing import write_whole
+from train.choose import LEAVE_OUT
 from train.dataset import DataSet, read
 from train.report.page import write
 from train.report.section import Row, Section, counted
@@ -118,7 +119,11 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     )
     sheared = None
     if dataset.layout.axes:
-        measured_with = shear.Answers(points, comparisons)
+        unmet = early.compare_stopping(
+            dataset, WINDOWS_S, leave_out=LEAVE_OUT, quick=quick, jobs=options.jobs
+        )
+        by_kind = {shear.KNOWN: comparisons, shear.UNMET: unmet}
+        measured_with = shear.Answers(points, by_kind)
         sheared = shear.compared(dataset, measured_with, workers, quick=quick)
     rows = costs.measure(raw, dataset, points, rate, workers)
     notes = list(ready.notes)

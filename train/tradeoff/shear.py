@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.touch.measures import SHEAR, feature
-from train.choose import Chosen
+from train.choose import LEAVE_OUT, TRIAL, Chosen
 from train.dataset import DataSet
 from train.report.figures import PHONE, STROKES, legend, picture
 from train.report.score import paired, percent, points
@@ -31,25 +31,27 @@ class Answers:
 
     Attributes:
         points: the choices at each window.
-        early: {task: early decisions}.
+        early: {kind of objects: {task: early decisions}}, for `KNOWN` and `UNMET`.
     """
 
     points: Points
-    early: Mapping[str, StoppingComparison]
+    early: Mapping[str, Mapping[str, StoppingComparison]]
 
     @property
     def tasks(self) -> list[str]:
         """The tasks."""
-        return list(self.early)
+        return list(self.early[KNOWN])
 
     def shares(self, task: str, kind: str) -> dict[float, float | None]:
         """{window: accuracy}; None if no group was left out."""
         hits = {w: right(tasks[task], kind) for w, tasks in self.points.items()}
         return {w: None if h is None else float(h.mean()) for w, h in hits.items()}
 
-    def early_s(self, task: str, level: float) -> float | None:
+    def early_s(self, task: str, kind: str, level: float) -> float | None:
         """The shortest mean time of early decisions of an accuracy."""
-        rules = self.early[task].certified
+        if task not in self.early[kind]:
+            return None
+        rules = self.early[kind][task].certified
         times = [rule.mean_s for rule in rules if 1.0 - rule.wrong >= level]
         return min(times, default=None)
 
@@ -79,10 +81,13 @@ def answers(
     cases = [(dataset, window) for window in windows]
     results = workers.map("windows", partial(chosen, quick=quick), cases)
     points = [window for window in windows if window <= WINDOWS_S[-1]]
-    return Answers(
-        dict(zip(windows, results, strict=True)),
-        compare_stopping(dataset, points, quick=quick, jobs=workers.jobs),
-    )
+    early = {
+        kind: compare_stopping(
+            dataset, points, leave_out=leave_out, quick=quick, jobs=workers.jobs
+        )
+        for kind, leave_out in ((KNOWN, TRIAL), (UNMET, LEAVE_OUT))
+    }
+    return Answers(dict(zip(windows, results, strict=True)), early)
 
 
 def compared(
@@ -128,9 +133,11 @@ def times(compared: Compared) -> list[Row]:
                 }
                 for kind, of_kind in shares.items()
             }
-            reached[f"early, {KNOWN}"] = {
-                name: side.early_s(task, level) for name, side in sides.items()
-            }
+            for kind in (KNOWN, UNMET):
+                reached[f"early, {kind}"] = {
+                    name: side.early_s(task, kind, level)
+                    for name, side in sides.items()
+                }
             for decision, seconds in reached.items():
                 row: Row = {"task": task, "right": f"{level:.0%}", "decision": decision}
                 for name, value in seconds.items():

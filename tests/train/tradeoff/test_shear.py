@@ -18,7 +18,8 @@ def answers(shares, unmet=None, early=()):
     for i, (share, other) in enumerate(zip(shares, unmet, strict=True)):
         points[round(0.2 * (i + 1), 1)] = {"mobility": chosen(share, other, of=10)}
     rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
-    return Answers(points, {"mobility": SimpleNamespace(certified=rules)})
+    known = {"mobility": SimpleNamespace(certified=rules)}
+    return Answers(points, {KNOWN: known, UNMET: {}})
 
 
 def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
@@ -36,9 +37,10 @@ def test_objects_never_met_have_times_of_their_own():
 
 def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
     made = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
-    assert made.early_s("mobility", 0.9) == 0.5
-    assert made.early_s("mobility", 0.95) == 0.8
-    assert made.early_s("mobility", 0.99) is None
+    assert made.early_s("mobility", KNOWN, 0.9) == 0.5
+    assert made.early_s("mobility", KNOWN, 0.95) == 0.8
+    assert made.early_s("mobility", KNOWN, 0.99) is None
+    assert made.early_s("mobility", UNMET, 0.9) is None
 
 
 def test_gains_are_paired_differences():

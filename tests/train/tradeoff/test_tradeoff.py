@@ -12,6 +12,7 @@ import pytest
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.model.stopping import StoppingRule
+from edge.saving import save
 from edge.skin import file as skinfile
 from edge.statistics import wilson
 from edge.touch.layout import SkinLayout
@@ -251,6 +252,30 @@ class TestEarly:
         assert rule.mean_s == 0.6
         # Forty trials certify no rate as low as the smallest one.
         assert min(rules) > early.ERRORS[0]
+
+    def test_objects_never_met_are_decided_by_models_that_never_met_them(
+        self, tmp_path, make_touch, monkeypatch
+    ):
+        for kind in ("hard", "soft"):
+            for number in range(16):
+                labels = {"softness": kind, "object": f"{kind} {number % 4}"}
+                touch = make_touch(kind=kind, seed=number, labels=labels)
+                save(tmp_path / f"{kind}-{number}.npz", touch)
+        dataset = followed(read([str(tmp_path)]))
+        met = []
+
+        def spy(trials, **options):
+            met.append(set(trials.labels("object")))
+            return fit(trials, **options)
+
+        fit = early.fit
+        monkeypatch.setattr(early, "fit", spy)
+        compared = early.compare_stopping(dataset, (0.6, 1.2), leave_out="object")
+        objects = set(dataset.labels("object"))
+        assert list(compared) == ["softness"]
+        assert sorted(name for names in met for name in objects - names) == sorted(
+            objects
+        )
 
     def test_features_of_kernels_have_the_tables_of_the_other_folds(
         self, tmp_path, monkeypatch
