@@ -100,14 +100,6 @@ Plan = tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]
 
 
 @dataclass(frozen=True)
-class Nested:
-    """Which answers are nested: those to left-out trials, and to left-out groups."""
-
-    trials: bool
-    groups: bool
-
-
-@dataclass(frozen=True)
 class EarlySettings:
     """The settings of the decision points before the full window.
 
@@ -231,36 +223,38 @@ class Choosing:
         self,
         vectors: Vectors,
         tried: Sequence[Candidate],
-        nested: Nested,
         what: str,
+        *,
+        nested: bool,
+        repeated: bool = True,
     ) -> tuple[AnswerTable, AnswerTable]:
         """The candidates' answers to left-out trials, and to left-out groups where
         there are any.
 
         Without groups, both are the answers to left-out trials.
         """
+        other_folds = self._other_folds if repeated else []
         grids = [grid for candidate in tried for grid in candidate.grids]
         answers = partial(evaluate, jobs=self._jobs)
-        total = fits(self._folds, nested.trials)
-        total += sum(fits(folds, False) for folds in self._other_folds)
+        total = fits(self._folds, nested)
+        total += sum(fits(folds, False) for folds in other_folds)
         if self._grouped:
-            total += fits(self._group_folds, nested.groups)
+            total += fits(self._group_folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
         with bar(
             total=total, desc=what, unit=" fits", disable=not self._progress
         ) as progress:
             answers = partial(answers, progress=progress.update)
-            trials = answers(vectors, self._folds, grids, nested=nested.trials)
-            repeated = [
-                answers(vectors, folds, grids, nested=False)
-                for folds in self._other_folds
+            trials = answers(vectors, self._folds, grids, nested=nested)
+            others = [
+                answers(vectors, folds, grids, nested=False) for folds in other_folds
             ]
-            trials = replace(trials, repeated=tuple(repeated))
+            trials = replace(trials, repeated=tuple(others))
             if not self._grouped:
                 return trials, trials
             vectors = replace(vectors, y=self._of_groups(grids))
             unseen = self._unseen(grids)
-            groups = answers(vectors, self._group_folds, unseen, nested=nested.groups)
+            groups = answers(vectors, self._group_folds, unseen, nested=nested)
         return trials, groups
 
     def _unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
@@ -286,8 +280,8 @@ class Choosing:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
         vectors = self._vectors(self._features(window_s))
-        plain = Nested(trials=False, groups=False)
-        trials, groups = self._tables(vectors, self.tried, plain, f"{window_s:g} s")
+        what = f"{window_s:g} s"
+        trials, groups = self._tables(vectors, self.tried, what, nested=False)
         right: dict[str, NDArray[np.float64]] = {}
         for task in self._y:
             table = groups if task in self._grouped else trials
@@ -349,8 +343,7 @@ class Choosing:
             [fold]{task: the choice made without the fold's trials}.
         """
         vectors = self._vectors(self._features(window_s))
-        nested = Nested(trials=True, groups=True)
-        trials, groups = self._tables(vectors, self.tried, nested, "choosing")
+        trials, groups = self._tables(vectors, self.tried, "choosing", nested=True)
         settled = {task: self._settle(task, trials, groups) for task in self._y}
         chosen = {task: settings.chosen for task, settings in settled.items()}
         without = _by_fold(
@@ -378,45 +371,51 @@ class Choosing:
         as those of the full window; None without candidates for them."""
         if not self._tried_early:
             return None
-        sets = [name for candidate in self._tried_early for name in candidate.sets]
-        dataset = self._dataset.of(expand(sets))
-        widths = dataset.widths(self._samples)
-        nested = Nested(trials=True, groups=False)
-        by_trial = []
-        by_group = []
-        for share in EARLY_SHARES:
-            X = dataset.features(share * window_s, self._samples)
-            vectors = Vectors(X, self._y, dataset.names, tuple(widths))
-            what = f"{share * window_s:g} s"
-            trials, groups = self._tables(vectors, self._tried_early, nested, what)
-            by_trial.append(trials)
-            by_group.append(groups)
-        trials = averaged(by_trial)
-        groups = averaged(by_group)
+        tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
+        trials = averaged([by_trial for by_trial, _ in tables])
+        groups = averaged([by_group for _, by_group in tables])
         known = {}
         usual = {}
         for task in self._y:
             k = chosen[task].choice.k
-            known[task] = self._settle_early(task, trials, trials, k)
+            known[task] = self._settle_early(task, trials, k, 0.0)
             usual[task] = known[task]
             if task in self._grouped:
-                usual[task] = self._settle_early(task, trials, groups, k)
+                usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
         return EarlySettings(_early(window_s, usual), _early(window_s, known))
 
+    def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
+        """The answers of the candidates for early decision points at one of them."""
+        tried = self._tried_early
+        sets = [name for candidate in tried for name in candidate.sets]
+        dataset = self._dataset.of(expand(sets))
+        X = dataset.features(window_s, self._samples)
+        widths = tuple(dataset.widths(self._samples))
+        vectors = Vectors(X, self._y, dataset.names, widths)
+        what = f"{window_s:g} s"
+        return self._tables(vectors, tried, what, nested=False, repeated=False)
+
     def _settle_early(
-        self, task: str, trials: AnswerTable, table: AnswerTable, k: int
+        self, task: str, table: AnswerTable, k: int, margin: float
     ) -> list[Choice]:
         """A task's settings by a table, and those chosen without each fold of the
         trials.
 
-        The graph has one number of neighbours, `k`, for all decision points.
+        The graph has one number of neighbours, `k`, for all decision points. The fits
+        behind the answers may have seen the fold's trials, which take no part in the
+        choice otherwise.
         """
         choices = table.choices[task]
-        prices = costs(choices, self._widths)
-        margin = 0.0 if table is trials else UNSEEN_MARGIN
-        rule = Rule(prices, margin, np.flatnonzero([c.k == k for c in choices]))
-        best = choices[table.chosen(task, prices, rule.allowed, margin)]
-        return [best, *without_folds(task, trials, table, rule)]
+        rule = Rule(
+            prices=costs(choices, self._widths),
+            margin=margin,
+            allowed=np.flatnonzero([choice.k == k for choice in choices]),
+        )
+        answers = table.held_out(task)
+        places = [rule(answers)]
+        for fold in range(int(self._folds.max()) + 1):
+            places.append(rule(answers[:, self._folds != fold]))
+        return [choices[place] for place in places]
 
     def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
         """A task's settings, by the answers to left-out trials and to left-out

@@ -278,9 +278,7 @@ def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
         task: np.mean([table.right[task] for table in tables], axis=0)
         for task in first.right
     }
-    repeats = zip(*(table.repeated for table in tables), strict=True)
-    repeated = [averaged(same) for same in repeats]
-    return replace(first, right=right, repeated=tuple(repeated))
+    return replace(first, right=right)
 
 
 def choose(

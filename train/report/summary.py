@@ -13,7 +13,7 @@ from edge.errors import printable
 from edge.touch import measures
 from train.choose import TRIAL, Chosen
 from train.dataset import DataSet
-from train.feature_sets import moves
+from train.feature_sets import SETS, expand, moves
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, squared_distances
@@ -110,9 +110,9 @@ def accuracy(chosen: Chosen) -> str:
 
 def _described(choice: Choice, fitted: Fitted) -> str:
     """The settings of a choice as text."""
-    combinations = {
-        grid.features: c.name for c in fitted.candidates[::-1] for grid in c.grids
-    }
+    combinations = {expand([name]): name for name in SETS}
+    for candidate in reversed(fitted.candidates):
+        combinations |= {grid.features: candidate.name for grid in candidate.grids}
     name = combinations.get(choice.features, " ".join(choice.features))
     how = f"{choice.projection} of {name}, scaling {choice.scaling}"
     if choice.projection == "lda":
