@@ -235,9 +235,17 @@ shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
 	$(BIN)/python -m tests.bench.shifts --model $(OUT)/shifts/model.onnx
 
-ifndef DATA
-stopping: $(SIMULATED)/.made
+# Each folder of DATA is a data set of its own; by default five seeds of the scene.
+ifdef DATA
+STOPPED := $(DATA)
+else
+STOPPED := $(foreach seed,2012 2013 2014 2015 2016,$(OUT)/stopping/$(seed))
+stopping: $(addsuffix /.made,$(STOPPED))
 endif
+
+$(OUT)/stopping/%/.made: $(READY) $(SCENE)
+	$(BIN)/python -m train simulate $(SCENE) --seed $* --out $(@D)
+	@touch $@
 
 # An environment of its own: aeon 1.6.0 does not take the numpy and pandas that
 # constraints.txt pins.
@@ -251,7 +259,7 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	@touch $@
 
 stopping: $(PEERS)/.ready
-	$(PEERS)/bin/python -m tests.bench.stopping --data $(RECORDINGS) $(STOPPING)
+	$(PEERS)/bin/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
 # FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
 faults: $(DEV)
