@@ -17,9 +17,9 @@ data set they treat the two shares as independent, which overstates them.
 
 The other tables are of the first data set. The second has rules that choose their mean
 time themselves: aeon's TEASER (Schäfer and Leser, TEASER: early and accurate time series
-classification, 2020) and its threshold of the probability, 0.85. Both ask extra trees about the paper's three
-features at each frame until then, every 0.2 s. aeon teaches TEASER which answers to
-trust by answers to whole series.
+classification, 2020) and its threshold of the probability, 0.85. Both ask extra trees
+about the paper's three features at each frame until then, every 0.2 s. aeon teaches
+TEASER which answers to trust by answers to whole series.
 """
 
 from __future__ import annotations
