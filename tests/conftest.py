@@ -155,6 +155,11 @@ def lines(text):
     return [json.loads(line) for line in text.splitlines()]
 
 
+def decided(events: list[dict], key: str) -> list:
+    """What each decision among events has under a key."""
+    return [event[key] for event in events if event["event"] == "decision"]
+
+
 def rows_of(path):
     """The rows of a CSV file, by their columns."""
     return list(csv.DictReader(path.read_text().splitlines()))

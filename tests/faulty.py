@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from edge.bus.protocol import Transfer, bus_error, write
-from edge.fake.bus import FakeBus
+from edge.fake.bus import NACK_BITS, FakeBus
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses
 from edge.fake.tca9548a import FakeTCA9548A
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
-
-NACK_BITS = 11
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class FaultyBus(FakeBus):
         if fault.kind == "error":
             self._fail(fault, first)
         if fault.kind == "foreign":
-            for mux in self._muxes():
+            for mux in self.muxes():
                 mux.write(_another(mux.read(1, 0.0)), 0.0)
                 mux.stop()
         if fault.kind == "reset":
@@ -149,9 +147,6 @@ class FaultyBus(FakeBus):
                 self.met += 1
                 return fault
         return Fault("none")
-
-    def _muxes(self):
-        return [chip for chip in self.chips.values() if isinstance(chip, FakeTCA9548A)]
 
     def _route(self, address):
         if address not in self.chips:

@@ -103,12 +103,15 @@ class FakeBus:
         if not chips:
             raise bus_error(errno.EREMOTEIO, self.name, address)
 
+    def muxes(self) -> list[FakeTCA9548A]:
+        """The muxes on the bus."""
+        return [chip for chip in self.chips.values() if isinstance(chip, FakeTCA9548A)]
+
     def chips_at(self, address: int) -> list[FakeChip]:
         """Every chip that hears the address."""
         rooms = [self.chips]
-        for mux in self.chips.values():
-            if isinstance(mux, FakeTCA9548A):
-                rooms += [mux.channels[n] for n in mux.connected]
+        for mux in self.muxes():
+            rooms += [mux.channels[n] for n in mux.connected]
         return [room[address] for room in rooms if address in room]
 
     def _carry(self, message: Message, chips: Sequence[FakeChip]) -> None:
@@ -124,9 +127,8 @@ class FakeBus:
 
     def stop(self) -> None:
         """End a transaction."""
-        for chip in self.chips.values():
-            if isinstance(chip, FakeTCA9548A):
-                chip.stop()
+        for mux in self.muxes():
+            mux.stop()
 
     def spend(self, bits: int) -> None:
         """Count bits on the wire, and let their time pass where timed."""

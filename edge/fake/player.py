@@ -28,13 +28,16 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
+Counts = NDArray[np.uint16]
+"""Counts or raw values of taxels."""
+Integers = NDArray[np.int64]
 NOISE_FRAMES = 97
 NOISE_STEP_S = 0.001
 """The noise is this many frames, repeated, each of which lasts for this many
 seconds."""
 PAUSES = 2.0
 """Times `release_s` that a looped recording pauses before it starts again."""
-Scene = Callable[[float], NDArray[np.uint16]]
+Scene = Callable[[float], Counts]
 """Counts above baseline (rows, cols) at a time in seconds since the start."""
 
 
@@ -76,7 +79,7 @@ class Playback:
         after = np.searchsorted(self._t, t + TIME_ROUNDING_S, side="right")
         return max(0, int(after) - 1)
 
-    def __call__(self, t: float) -> NDArray[np.uint16]:
+    def __call__(self, t: float) -> Counts:
         """Counts above baseline (rows, cols) at `t`."""
         return self._frames[self._index(t)].counts
 
@@ -184,7 +187,7 @@ def _sense(
     chip: ChipSpec,
     scene: Scene,
     calibration: TaxelCalibration,
-    noise: NDArray[np.int64],
+    noise: Integers,
 ) -> Sense:
     """The function that gives a chip its raw values: rest values, and the scene with
     its sign and noise. A stage without a taxel rests."""
@@ -193,11 +196,11 @@ def _sense(
     rest = calibration.baseline.ravel()[taxels]
     at_rest = np.where(wired, rest, chip.traits.rest).astype(np.int64)
 
-    def noise_at(t: float, shift: int = 0) -> NDArray[np.int64]:
+    def noise_at(t: float, shift: int = 0) -> Integers:
         step = int((t + TIME_ROUNDING_S) / NOISE_STEP_S)
         return np.asarray(noise[(step + shift) % len(noise)][taxels])
 
-    def normal(t: float) -> NDArray[np.uint16]:
+    def normal(t: float) -> Counts:
         counts = scene(t).reshape(-1)[taxels].astype(np.int64)
         raw = at_rest + wired * (chip.sign * counts + noise_at(t))
         return np.asarray(np.clip(raw, 1, chip.traits.highest), dtype=np.uint16)
@@ -207,7 +210,7 @@ def _sense(
     shear_rest = calibration.shear_baseline.reshape(-1, 2)[taxels].astype(np.int64)
     shear_of = getattr(scene, "shear", lambda t: None)
 
-    def three_axes(t: float) -> NDArray[np.uint16]:
+    def three_axes(t: float) -> Counts:
         # Other rows of the noise than the normal axis has.
         raw = shear_rest + np.column_stack([noise_at(t, 31), noise_at(t, 62)])
         shear = shear_of(t)

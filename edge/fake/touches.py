@@ -20,6 +20,7 @@ from edge.skin.decoder import taxel_map
 from edge.skin.file import SkinFile
 from edge.touch.layout import SkinLayout
 
+Floats = NDArray[np.float64]
 PITCH_M = 0.01
 """Assumed pitch of a skin whose own is unknown."""
 STRENGTH = (0.8, 1.25)
@@ -52,18 +53,15 @@ def touches(
     """
     sources = [(path, load(path)) for path in demo.recordings()]
 
-    def trial(
-        kind: int, *number: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def trial(kind: int, *number: int) -> tuple[Floats, Floats]:
         rng = np.random.default_rng([seed, kind, *number])
         return _mapped(sources[kind][1], file.layout, file.reading.rate_hz, rng)
 
     counts_per_newton = file.layout.counts_per_newton
     if counts_per_newton is None:
         weakest = min(trial(kind)[1].max() for kind in range(len(sources)))
-        counts_per_newton = (
-            WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET) / weakest
-        )
+        least = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET)
+        counts_per_newton = least / weakest
     most = reach(file)
     covered = taxel_map(file).served.reshape(file.layout.shape)
     for number in range(trials):
@@ -78,19 +76,17 @@ def touches(
                 "source": f"a simulated touch of the demo ({path.stem}), mapped onto this skin",
                 "trial": name,
             }
-            yield (
-                name,
-                Recording(
-                    t,
-                    counts.astype(np.uint16),
-                    valid=None if covered.all() else covered,
-                    meta=meta,
-                    shear=_shear(counts, number) if file.layout.axes else None,
-                ),
+            recording = Recording(
+                t,
+                counts.astype(np.uint16),
+                valid=None if covered.all() else covered,
+                meta=meta,
+                shear=_shear(counts, number) if file.layout.axes else None,
             )
+            yield name, recording
 
 
-def _shear(counts: NDArray[np.float64], number: int) -> NDArray[np.int16]:
+def _shear(counts: Floats, number: int) -> NDArray[np.int16]:
     """A pull of each taxel in proportion to its force, which grows and turns from trial
     to trial: it only shows where the arrows point."""
     grows = np.linspace(0.0, LARGEST_RATIO, len(counts))[:, None, None]
@@ -133,7 +129,7 @@ def pitch(layout: SkinLayout) -> tuple[float, float]:
 
 def _mapped(
     source: Recording, onto: SkinLayout, rate_hz: float, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Times (n,) and forces (n, rows, cols) of one trial."""
     row, col = (rng.uniform(0.25, 0.75) * (n - 1) for n in onto.shape)
     if onto.wraps:
@@ -149,16 +145,13 @@ def _mapped(
     share = (frame - former)[:, None, None]
     played = (1.0 - share) * forces[former] + share * forces[former + 1]
     played[at < source.t[0]] = 0.0
-    along, around = (
-        _spread(source.layout, onto, axis, middle, centre)
-        for axis, (middle, centre) in enumerate(
-            zip(_middle(forces), (row, col), strict=True)
-        )
-    )
+    middle_row, middle_col = _middle(forces)
+    along = _spread(source.layout, onto, 0, middle_row, row)
+    around = _spread(source.layout, onto, 1, middle_col, col)
     return t, along.T @ played @ around
 
 
-def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
+def _middle(forces: Floats) -> tuple[float, float]:
     """Row and column of the centre of a contact's forces; the column on the circle."""
     total = forces.sum(axis=0)
     rows, cols = total.shape
@@ -169,7 +162,7 @@ def _middle(forces: NDArray[np.float64]) -> tuple[float, float]:
 
 def _spread(
     source: SkinLayout, onto: SkinLayout, axis: int, middle: float, centre: float
-) -> NDArray[np.float64]:
+) -> Floats:
     """(sources, taxels) shares of each source row (axis 0) or column on each row or
     column.
 
@@ -188,7 +181,6 @@ def _spread(
     # A contact that is wider than the skin goes round it as often as it must.
     for turn in range(-2, 3) if axis == 1 and onto.wraps else range(1):
         low = edges + turn * taxels
-        shares += np.maximum(
-            0.0, np.minimum(left + ratio, low + 1.0) - np.maximum(left, low)
-        )
+        overlap = np.minimum(left + ratio, low + 1.0) - np.maximum(left, low)
+        shares += np.maximum(0.0, overlap)
     return shares / ratio

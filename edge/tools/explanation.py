@@ -16,6 +16,7 @@ from edge.files import parsing
 from edge.model.graph import Graph
 from edge.model.model import Model
 
+Floats = NDArray[np.float64]
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
 """Multiples of the change at which two trials become equally near. A further trial on
 the way may take less, several votes more."""
@@ -36,10 +37,10 @@ class Space(NamedTuple):
     """
 
     columns: NDArray[np.int64]
-    mean: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    rows: NDArray[np.float64]
+    mean: Floats
+    gain: Floats
+    weights: Floats
+    rows: Floats
     labels: NDArray[np.int64]
     reach: float = np.inf
     limit: float = np.inf
@@ -86,17 +87,17 @@ class Space(NamedTuple):
                 limit=float(value(limits[1])) * float(unit),
             )
 
-    def differences(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    def differences(self, vector: Floats) -> Floats:
         """(p,) scaled differences of a feature vector from the mean."""
         scaled = (vector[self.columns] - self.mean) * self.gain
         return np.clip(scaled, -self.reach, self.reach)
 
-    def coordinates(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, differences: Floats) -> Floats:
         """(c,) coordinates of scaled differences."""
         z = np.clip(differences, -self.reach, self.reach) @ self.weights
         return np.clip(z, -self.limit, self.limit)
 
-    def vote(self, z: NDArray[np.float64], k: int) -> int:
+    def vote(self, z: Floats, k: int) -> int:
         """The label of the k nearest trials; of tied ones that of the nearest."""
         squares = ((self.rows - z) ** 2).sum(axis=1)
         voters = self.labels[squares.argsort(kind="stable")[:k]]
@@ -153,7 +154,7 @@ class Explanation(NamedTuple):
 
 def explain(
     space: Space,
-    vector: NDArray[np.float64],
+    vector: Floats,
     voters: Sequence[int],
     label: int,
     features: Sequence[str],
@@ -223,7 +224,7 @@ class _Touch:
     def __init__(
         self,
         space: Space,
-        vector: NDArray[np.float64],
+        vector: Floats,
         features: Sequence[str],
         widths: Sequence[int],
     ) -> None:
@@ -240,7 +241,7 @@ class _Touch:
         self.z = space.coordinates(self.differences)
         self.squares = ((space.rows - self.z) ** 2).sum(axis=1)
 
-    def pulls(self, towards: NDArray[np.float64]) -> dict[str, float]:
+    def pulls(self, towards: Floats) -> dict[str, float]:
         """{feature: how much it pulls in a direction (c,)}, the strongest first."""
         strengths = (2.0 * self.shifts @ towards).tolist()
         by_feature = zip(self.members, strengths, strict=True)
@@ -259,7 +260,7 @@ class _Touch:
     def change(
         self,
         feature: str,
-        direction: NDArray[np.float64],
+        direction: Floats,
         gap: float,
         k: int,
         label: int,

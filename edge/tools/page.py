@@ -20,6 +20,8 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 
+Json = dict[str, Any]
+"""A JSON object."""
 PICTURE_S = 0.1
 """Between two pictures."""
 LAST_TRIALS = 200
@@ -72,7 +74,7 @@ class Page:
         self._folder = folder
         self.labels = dict(labels or {})
         self.recording = bool(self.labels)
-        self._trials: dict[str, dict[str, Any]] = {}
+        self._trials: dict[str, Json] = {}
         self._notices: deque[str] = deque(maxlen=LAST_NOTICES)
         self._version = 0
         """Number of changes of the list of trials."""
@@ -81,7 +83,7 @@ class Page:
         self.look()
         self._tracker = ContactTracker(layout, horizon_s=CURVE_S)
         self._contact: Contact | None = None
-        self._decisions: dict[str, dict[str, Any]] = {}
+        self._decisions: dict[str, Json] = {}
         self._due = -float("inf")
         self._scale = layout.counts_per_newton or 1.0
         self._fixed = {
@@ -160,7 +162,7 @@ class Page:
         except InputError as error:
             self.notice(f"{error}; it is left out of the list")
 
-    def _curves(self) -> dict[str, Any] | None:
+    def _curves(self) -> Json | None:
         """The last contact: its taxels, and its features since onset."""
         contact = self._contact
         if contact is None:
@@ -193,7 +195,7 @@ class Page:
             if path.name not in self._trials:
                 self._show_trial(path)
 
-    def _act(self, action: dict[str, Any]) -> list[dict[str, Any]] | None:
+    def _act(self, action: Json) -> list[Json] | None:
         """Carry out an action of the page; the list of trials where it asks for it.
 
         Raises:
@@ -229,7 +231,7 @@ class Page:
             raise InputError("give a label first; a trial without one teaches nothing")
         self.recording = on
 
-    def _change(self, folder: Path, action: dict[str, Any]) -> None:
+    def _change(self, folder: Path, action: Json) -> None:
         """Label or delete a trial, so that it can be taken back.
 
         Raises:
@@ -260,7 +262,7 @@ class Page:
         self._undo = None
 
 
-def _decision(event: Decided) -> dict[str, Any]:
+def _decision(event: Decided) -> Json:
     """A decision for the page, with the nearest training trials."""
     neighbours: list[tuple[str, float]] = []
     if event.decision is not None:
@@ -281,7 +283,7 @@ def _accepted(name: str, trial: Recording) -> dict[str, str]:
     return labels
 
 
-def _labels(action: dict[str, Any]) -> dict[str, str]:
+def _labels(action: Json) -> dict[str, str]:
     """The labels of an action.
 
     Raises:

@@ -70,20 +70,14 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
     """
     labels = meta.get("labels", {})
     decided = decisions(meta)
-    names = set()
-    if not labels or any(task not in labels for task in decided):
-        names.add("unlabelled")
+    belongs = dict.fromkeys(KINDS, False)
+    belongs["unlabelled"] = not labels or not labels.keys() >= decided.keys()
     for task, answer in decided.items():
-        if _is_unsure(answer):
-            names.add("unsure")
-        if task in labels and labels[task] != answer["label"]:
-            names.add("wrong")
-    return [kind for kind in KINDS if kind in names]
-
-
-def _is_unsure(answer: Mapping[str, Any]) -> bool:
-    confidence = answer["confidence"]
-    return confidence is None or confidence < UNSURE or UNKNOWN in answer["flags"]
+        sure = answer["confidence"]
+        unsure = sure is None or sure < UNSURE or UNKNOWN in answer["flags"]
+        belongs["unsure"] |= unsure
+        belongs["wrong"] |= labels.get(task, answer["label"]) != answer["label"]
+    return [kind for kind in KINDS if belongs[kind]]
 
 
 def accepted(meta: Mapping[str, Any]) -> dict[str, str]:

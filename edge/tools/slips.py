@@ -1,5 +1,6 @@
 """Labels that are probably slips of whoever gave them."""
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
@@ -12,6 +13,7 @@ FEW_SHARE = 0.25
 """A label is a slip of another one if it is at most so frequent in comparison."""
 ALIKE = 0.85
 """Similarity of two spellings, from 0 to 1, from which one is a slip of the other."""
+SPACES = re.compile(r"[\s_-]+")
 MOST = 8
 """Sentences of a kind."""
 
@@ -80,8 +82,8 @@ def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
 
 
 def _alike(name: str, other: str) -> bool:
-    plain = "".join(name.casefold().replace("_", " ").replace("-", " ").split())
-    plain_other = "".join(other.casefold().replace("_", " ").replace("-", " ").split())
+    plain = SPACES.sub("", name.casefold())
+    plain_other = SPACES.sub("", other.casefold())
     if plain == plain_other:
         return True
     if any(part.isdigit() for part in plain + plain_other) or len(plain) < 4:
@@ -92,17 +94,15 @@ def _alike(name: str, other: str) -> bool:
 def _contradictions(labels: Labels) -> list[str]:
     """Sentences on trials whose category is not that of their softness and mobility."""
     product, *factors = JOINED
-    wrong = 0
-    example = ""
+    contradictions = []
     for trial in labels:
         if trial.keys() >= set(JOINED):
             implied = "-".join(trial[factor] for factor in factors)
             if trial[product] != implied:
-                wrong += 1
-                example = example or f"{trial[product]!r} beside {implied!r}"
-    if not wrong:
+                contradictions.append(f"{trial[product]!r} beside {implied!r}")
+    if not contradictions:
         return []
     return [
-        f"{product} contradicts {' and '.join(factors)} on {wrong} of {len(labels)} "
-        f"recordings, such as {example}"
+        f"{product} contradicts {' and '.join(factors)} on {len(contradictions)} of "
+        f"{len(labels)} recordings, such as {contradictions[0]}"
     ]

@@ -75,10 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
             of_label = f"{counted(trials, 'trial')} of the new label {label!r}"
             if not new:
                 of_label = f"left out {of_label}; --new-labels adds it"
-            LOG.warning(
-                f"{task}: "
-                f"{of_label}{spelled_like(label, model.info.tasks[task].labels)}"
-            )
+            question = spelled_like(label, model.info.tasks[task].labels)
+            LOG.warning(f"{task}: {of_label}{question}")
     LOG.info(
         f"{target}: its accuracy is not measured, and no error rate is certified any "
         "more"

@@ -10,19 +10,22 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError, about, printable
 from edge.files import parsing
-from edge.model.graph import Graph, coordinates_of
+from edge.model.graph import Array, Graph, coordinates_of
 from edge.model.info import METADATA_KEY, ModelInfo, Task
 from edge.model.model import Model
 from edge.model.onnx_file import Node
 from edge.tools.rewriting import rewritten
 
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Labels = Mapping[str, str]
+"""{task: label} of a trial."""
 NOVELTY_COLUMNS = "columns of novelty"
 NOVELTY_LENGTHS = "lengths of novelty"
 """Constants in which a graph that scores novelty holds the training trials."""
@@ -32,7 +35,7 @@ JOINED = ("category", "softness", "mobility")
 """A task, and the two tasks whose labels its own are made of, joined by a hyphen."""
 
 
-def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+def nearest_of_label(sizes: Integers) -> Integers:
     """Number of trials that stand for a label: a twentieth of its own, at least three.
 
     A label with fewer than three trials is represented by all of them. With a share
@@ -41,7 +44,7 @@ def nearest_of_label(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
 
-def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[Any]]:
+def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
     """The constants from which a graph takes the distances of labels.
 
     Args:
@@ -68,7 +71,7 @@ def label_tables(labels: NDArray[np.int64], classes: int) -> dict[str, NDArray[A
     }
 
 
-def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str, str]:
+def joined(labels: Labels, tasks: Sequence[str] = JOINED) -> dict[str, str]:
     """{task: label} of a trial, with the labels of `tasks` that follow from its others.
 
     Args:
@@ -85,7 +88,7 @@ def joined(labels: Mapping[str, str], tasks: Sequence[str] = JOINED) -> dict[str
 
 
 def unknown_labels(
-    info: ModelInfo, labels: Sequence[Mapping[str, str]]
+    info: ModelInfo, labels: Sequence[Labels]
 ) -> dict[str, dict[str, int]]:
     """{task: {label that the model does not know: its number of trials}}, sorted.
 
@@ -145,8 +148,8 @@ def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> Mo
 def taught(
     model: Model,
     names: Sequence[str],
-    vectors: NDArray[np.float64],
-    labels: Sequence[Mapping[str, str]],
+    vectors: Floats,
+    labels: Sequence[Labels],
     *,
     new_labels: bool = False,
 ) -> bytes:
@@ -175,7 +178,7 @@ def taught(
     ):
         _check_reach(model, name, trial)
         _check_labels(info, name, trial_labels)
-    changed: dict[str, NDArray[Any]] = {}
+    changed: dict[str, Array] = {}
     with parsing(model.path, "a model that can be taught", "; export it again"):
         graph = Graph(model.contents)
         for task, entry in info.tasks.items():
@@ -202,7 +205,7 @@ def taught(
     return rewritten(model.contents.data, changed, metadata)
 
 
-def _check_reach(model: Model, name: str, trial: NDArray[np.float64]) -> None:
+def _check_reach(model: Model, name: str, trial: Floats) -> None:
     """Refuse a trial (decision points, width) far outside those of the model."""
     for point, vector in enumerate(trial):
         with about(name):
@@ -218,7 +221,7 @@ def _far_outside(name: str) -> InputError:
     )
 
 
-def within_reach(graph: Graph, task: str, z: NDArray[np.float64]) -> NDArray[np.bool_]:
+def within_reach(graph: Graph, task: str, z: Floats) -> NDArray[np.bool_]:
     """(m,) which trials at coordinates z (points, m, components) may become rows.
 
     Squared distances add up exactly, as long as no row is longer than the longest row
@@ -233,7 +236,7 @@ def within_reach(graph: Graph, task: str, z: NDArray[np.float64]) -> NDArray[np.
     return np.asarray((lengths <= longest**2).all(axis=0))
 
 
-def _check_labels(info: ModelInfo, name: str, labels: Mapping[str, str]) -> None:
+def _check_labels(info: ModelInfo, name: str, labels: Labels) -> None:
     """Refuse a trial without a label that the model knows."""
     tasks = info.tasks
     if any(labels.get(task) in entry.labels for task, entry in tasks.items()):
@@ -250,16 +253,14 @@ def _check_labels(info: ModelInfo, name: str, labels: Mapping[str, str]) -> None
 
 
 def label_indices(
-    classes: Sequence[str], task: str, labels: Sequence[Mapping[str, str]]
-) -> NDArray[np.int64]:
+    classes: Sequence[str], task: str, labels: Sequence[Labels]
+) -> Integers:
     """(m,) index of each trial's label for a task; -1 where it has none."""
     index = {label: i for i, label in enumerate(classes)}
     return np.array([index.get(trial.get(task, ""), -1) for trial in labels])
 
 
-def _novelty_rows(
-    graph: Graph, vectors: NDArray[np.float64]
-) -> dict[str, NDArray[Any]]:
+def _novelty_rows(graph: Graph, vectors: Floats) -> dict[str, Array]:
     """The constants of the novelty's rows with further ones.
 
     A trial beyond the reach of the stored type is placed at its edge.
@@ -285,24 +286,18 @@ def _sources(graph: Graph, node: Node) -> set[str]:
     return sources
 
 
-def _values(
-    graph: Graph, name: str, vectors: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _values(graph: Graph, name: str, vectors: Floats) -> Floats:
     """(points, m, ...) a value of the graph for vectors (points, m, width)."""
     points = enumerate(vectors)
     return np.stack([_value(graph, name, point, features=x) for point, x in points])
 
 
-def _value(
-    graph: Graph, name: str, point: int, **inputs: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _value(graph: Graph, name: str, point: int, **inputs: Floats) -> Floats:
     """A value of the graph at a decision point."""
     return graph.run([name], {"decision_point": np.array([point]), **inputs})[0]
 
 
-def _rows(
-    graph: Graph, task: str, z: NDArray[np.float64], indices: NDArray[np.int64]
-) -> dict[str, NDArray[Any]]:
+def _rows(graph: Graph, task: str, z: Floats, indices: Integers) -> dict[str, Array]:
     """The constants of a task's rows with further ones at coordinates `z`.
 
     A trial without a label for the task is infinitely far away.
@@ -317,9 +312,7 @@ def _rows(
     return _extended(graph, further)
 
 
-def _extended(
-    graph: Graph, further: Mapping[str, NDArray[Any]]
-) -> dict[str, NDArray[Any]]:
+def _extended(graph: Graph, further: Mapping[str, Array]) -> dict[str, Array]:
     """Constants with further values along their last axis."""
     changed = {}
     for name, values in further.items():
@@ -335,11 +328,11 @@ def _votes(
     graph: Graph,
     entry: Task,
     task: str,
-    rows: Mapping[str, NDArray[Any]],
-) -> dict[str, NDArray[Any]]:
+    rows: Mapping[str, Array],
+) -> dict[str, Array]:
     """The constants that count a task's labels, where its rows change them."""
     classes = len(entry.labels)
-    tables: dict[str, NDArray[Any]] = {}
+    tables: dict[str, Array] = {}
     if classes > len(model.info.tasks[task].labels):
         tables["ballots"] = np.eye(classes + 1, classes)
         tables["k"] = np.array([entry.k])

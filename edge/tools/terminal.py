@@ -21,6 +21,8 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import find_regions
 
+Colours = NDArray[np.uint8]
+"""Numbers in the 256-colour palette."""
 CLEAR = "\x1b[2J"
 HOME = "\x1b[H"
 HIDE = "\x1b[?25l"
@@ -39,7 +41,7 @@ LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be 
 
 def skin_colours(
     frame: Frame, layout: SkinLayout, full: int
-) -> tuple[NDArray[np.uint8], list[Region]]:
+) -> tuple[Colours, list[Region]]:
     """256-colour numbers (rows, cols), and the regions.
 
     The colours show force on a logarithmic scale up to `full` counts.
@@ -60,16 +62,16 @@ def skin_colours(
     return colours, regions
 
 
-def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> Colours:
     """A palette's colour for each share from 0 to 1; others get the colour of the
     nearer end."""
     steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)
-    shades: NDArray[np.uint8] = np.array(palette, dtype=np.uint8)[steps.astype(int)]
+    shades: Colours = np.array(palette, dtype=np.uint8)[steps.astype(int)]
     return shades
 
 
 def picture(
-    colour: NDArray[np.uint8],
+    colour: Colours,
     *,
     wide: int = 2,
     arrows: Sequence[Sequence[str]] | None = None,

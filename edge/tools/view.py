@@ -39,13 +39,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
     """One picture: the skin, its caption, the decisions and the legend."""
-    scale = layout.counts_per_newton
-    threshold = layout.threshold_counts
-    full = (
-        FULL_FACTOR * max(threshold, 1)
-        if scale is None
-        else round(FULL_NEWTONS * scale)
-    )
+    full = FULL_FACTOR * max(layout.threshold_counts, 1)
+    if layout.counts_per_newton is not None:
+        full = round(FULL_NEWTONS * layout.counts_per_newton)
     colour, regions = terminal.skin_colours(frame, layout, full)
     columns = shutil.get_terminal_size().columns
     wide = 2 if 2 * layout.cols <= columns else 1

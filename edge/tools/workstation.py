@@ -8,18 +8,18 @@ from pathlib import Path
 
 import edge
 
-COMMANDS = {
-    "export": "export",
-    "import": "train",
-    "simulate": "train",
-    "study": "train",
-    "tradeoff": "train",
-    "show": "train",
-    "split": "train",
-    "thresholds": "train",
-    "save": "train",
-}
-"""The package of each command."""
+COMMANDS = (
+    "export",
+    "import",
+    "simulate",
+    "study",
+    "tradeoff",
+    "show",
+    "split",
+    "thresholds",
+    "save",
+)
+"""`export` is a program of its own; `python -m train` runs the others."""
 
 
 def run(words: Sequence[str]) -> int:
@@ -28,16 +28,15 @@ def run(words: Sequence[str]) -> int:
     Elsewhere a sentence says where it runs, and the status is 2.
     """
     command, *options = words
-    package = COMMANDS[command]
+    module = ["export"] if command == "export" else ["train", command]
     checkout = Path(edge.__file__).resolve().parents[1]
-    if not (checkout / package / "__main__.py").is_file():
+    if not (checkout / module[0] / "__main__.py").is_file():
         print(
             f"edge-classify: {command} runs on the workstation, in a checkout of the "
             "project (see its README): this machine has the board's package alone",
             file=sys.stderr,
         )
         return 2
-    module = [package] if package == command else [package, command]
     paths = [str(checkout), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     program = [sys.executable, "-m", *module, *options]

@@ -19,6 +19,18 @@ def model(exported):
 
 
 @pytest.fixture
+def refused(edge):
+    """Run `edge-classify`, which refuses its input with status 2; returns stderr."""
+
+    def run(*arguments):
+        status, _, err = edge(*arguments)
+        assert status == 2
+        return err
+
+    return run
+
+
+@pytest.fixture
 def interruptible():
     """A shell that runs the tests in the background lets them ignore SIGINT."""
     inherited = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -14,7 +14,7 @@ import pytest
 
 from edge import demo
 from edge.cli import parser
-from tests.conftest import ROOT, started
+from tests.conftest import ROOT, decided, started
 from train.touch_map import TouchMap
 
 UNIT = ROOT / "docs" / "examples" / "service" / "edge-classify.service"
@@ -47,8 +47,7 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
     assert out.endswith("\n")
     lines = [json.loads(line) for line in out.splitlines()]
     assert lines[-1]["event"] == "end"
-    decided = {line["contact"] for line in lines if line["event"] == "decision"}
-    assert len(list(TouchMap(place))) == len(decided)
+    assert len(list(TouchMap(place))) == len(set(decided(lines, "contact")))
 
 
 @pytest.fixture

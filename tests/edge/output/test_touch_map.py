@@ -20,6 +20,7 @@ from edge.touch.arm import Chain
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import MAX_CONTACTS, ContactTracker
+from tests.conftest import decided
 from train.touch_map import TouchMap
 
 MODEL = Model(demo.MODEL)
@@ -83,7 +84,7 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
             [event.to_dict() for event in classifier.classify(recording)]
             for classifier in (Classifier(MODEL), Classifier(MODEL, max_contacts=8))
         )
-        number = next(e["contact"] for e in seen if e["event"] == "decision")
+        number = decided(seen, "contact")[0]
         mine = [e for e in seen if e["contact"] == number]
         assert [strip(e) for e in mine] == [strip(e) for e in expected]
 
@@ -117,8 +118,7 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
     given = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz", "--map", place)
     status, lines, _ = edge("run", *given)
     assert status == 0
-    decisions = [line for line in lines if line["event"] == "decision"]
-    assert len({line["contact"] for line in decisions}) == 2
+    assert len(set(decided(lines, "contact"))) == 2
     found = TouchMap(place)
     assert found.head[:2] == (MODEL.info.chain.base, "metre")
     first, second = touches = list(found)

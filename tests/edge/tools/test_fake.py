@@ -44,13 +44,11 @@ def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeyp
     assert plugged == []
 
 
-def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(edge, tmp_path):
+def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(tmp_path, refused):
     skin = tmp_path / "serial.toml"
     skin.write_text(one_chip(1, 2, bus='serial = "/dev/ttyACM0"', at=""))
-    status, _, err = edge("fake", "--skin", skin, "--plug")
-    assert status == 2
+    err = refused("fake", "--skin", skin, "--plug")
     assert "/dev/ttyACM0 is a serial port" in err
     given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
-    status, _, err = edge("fake", *given)
-    assert status == 2
+    err = refused("fake", *given)
     assert "name its own skin file" in err

@@ -7,6 +7,7 @@ from edge.errors import InputError
 from edge.events import Decided
 from edge.recording import load
 from edge.tools.keep import reasons, reasons_of
+from tests.conftest import decided
 
 
 def decision(confidence, *flags):
@@ -14,7 +15,7 @@ def decision(confidence, *flags):
 
 
 @pytest.mark.parametrize(
-    ("decided", "expected"),
+    ("doubted", "expected"),
     [
         (decision(0.95), {"all"}),
         (decision(0.8), {"all"}),
@@ -24,8 +25,8 @@ def decision(confidence, *flags):
         (decision(0.95, "unknown"), {"all", "unknown"}),
     ],
 )
-def test_a_touch_is_kept_for_what_is_not_sure_of_it(decided, expected):
-    assert reasons_of([decision(1.0), decided]) == expected
+def test_a_touch_is_kept_for_what_is_not_sure_of_it(doubted, expected):
+    assert reasons_of([decision(1.0), doubted]) == expected
 
 
 def test_reasons_are_a_list_of_names():
@@ -47,20 +48,17 @@ def test_a_kept_touch_has_the_frames_and_the_decision(edge, tmp_path):
     kept = load(path)
     assert kept.labels == {}
     assert kept.joints is not None
-    decided = {e["task"]: e for e in lines if e["event"] == "decision"}
-    assert kept.meta["decided"].keys() == decided.keys()
-    for task, answer in kept.meta["decided"].items():
-        assert answer["label"] == decided[task]["label"]
-        assert answer["confidence"] == decided[task]["confidence"]
-        assert answer["flags"] == decided[task]["flags"]
+    answers = kept.meta["decided"]
+    assert list(answers) == decided(lines, "task")
+    for key in ("label", "confidence", "flags"):
+        assert [answer[key] for answer in answers.values()] == decided(lines, key)
 
 
 def test_a_kept_touch_is_decided_again_as_it_was(edge, tmp_path):
     _, lines, _ = run(edge, tmp_path, "--keep-if", "all")
     (path,) = tmp_path.glob("kept-*.npz")
     _, again, _ = edge("replay", "--model", demo.MODEL, path)
-    labels = [line["label"] for line in lines if line["event"] == "decision"]
-    assert [e["label"] for e in again if e["event"] == "decision"] == labels
+    assert decided(again, "label") == decided(lines, "label")
 
 
 def test_what_is_sure_is_not_kept(edge, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from edge import recording, saving
 from edge.recording import load
 from edge.skin import file as skinfile
-from tests.conftest import PAPER, export
+from tests.conftest import PAPER, decided, export
 
 
 @pytest.fixture
@@ -30,32 +30,17 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     saving.save(tmp_path / "rest.npz", rest)
     assert edge("check", skin)[0] == 0
     assert edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
-    assert (
-        edge(
-            "calibrate", "--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20
-        )[0]
-        == 0
-    )
+    at_rest = ("--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)
+    assert edge("calibrate", *at_rest)[0] == 0
 
     trials = tmp_path / "trials"
     shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(2)]
     for name in shown:
-        labels = load(recordings / f"{name}.npz").labels
-        given = [
-            part for task in labels for part in ("--label", f"{task}={labels[task]}")
-        ]
-        status, (event,), _ = edge(
-            "record",
-            "--skin",
-            skin,
-            "--fake",
-            recordings / f"{name}.npz",
-            "--out",
-            trials,
-            "--length",
-            1.3,
-            *given,
-        )
+        touch = recordings / f"{name}.npz"
+        given = ["--skin", skin, "--fake", touch, "--out", trials, "--length", 1.3]
+        for task, label in load(touch).labels.items():
+            given += ["--label", f"{task}={label}"]
+        status, (event,), _ = edge("record", *given)
         assert status == 0
         assert event["complete"]
     assert len(list(trials.iterdir())) == len(shown)
@@ -68,16 +53,10 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     board.mkdir()
     shutil.copy(tmp_path / "build" / "model.onnx", board)
     for name in ("hard_1", "soft_0"):
-        status, events, _ = edge(
-            "run",
-            "--model",
-            board / "model.onnx",
-            "--skin",
-            skin,
-            "--fake",
-            recordings / f"{name}.npz",
-        )
-        said = {e["task"]: e["label"] for e in events if e["event"] == "decision"}
+        touch = recordings / f"{name}.npz"
+        given = ("--model", board / "model.onnx", "--skin", skin, "--fake", touch)
+        status, events, _ = edge("run", *given)
         assert status == 0
-        assert said["category"] == load(recordings / f"{name}.npz").labels["category"]
+        assert decided(events, "task") == ["category", "object"]
+        assert decided(events, "label")[0] == load(touch).labels["category"]
         assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]

@@ -9,7 +9,7 @@ import pytest
 
 from edge.cli import main
 from edge.tools.replay import Summary, compared
-from tests.conftest import ROOT, python
+from tests.conftest import ROOT, decided, python
 
 
 @pytest.fixture
@@ -27,9 +27,8 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
     keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
     assert all(keys <= set(e) for e in decisions)
     # Every trial is its own nearest neighbour here, so nothing can be wrong.
-    assert all(
-        e["label"] == e["expected"] for e in decisions if e["task"] == "category"
-    )
+    category = [e for e in decisions if e["task"] == "category"]
+    assert all(e["label"] == e["expected"] for e in category)
     assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
     assert "rigid-fixed            8           ." in err
     assert "16 of 16 recordings match a training trial to the last bit" in err
@@ -38,21 +37,12 @@ def test_a_folder_is_replayed_and_summed_up(replay, recordings):
 def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_path):
     good = recordings / "hard_0.npz"
     (tmp_path / "short.npz").write_bytes(good.read_bytes()[:5000])
-    np.savez(
-        tmp_path / "skin.npz",
-        t=np.zeros(1),
-        frames=np.zeros((1, 3, 3), np.uint16),
-        meta="{}",
-    )
-    missing = tmp_path / "missing.npz"
-    status, events, err = replay(
-        tmp_path / "short.npz", missing, good, tmp_path / "skin.npz"
-    )
+    frames = np.zeros((1, 3, 3), np.uint16)
+    np.savez(tmp_path / "skin.npz", t=np.zeros(1), frames=frames, meta="{}")
+    paths = [tmp_path / f"{name}.npz" for name in ("short", "missing", "skin")]
+    status, events, err = replay(*paths, good)
     assert status == 2
-    assert [e["task"] for e in events if e["event"] == "decision"] == [
-        "category",
-        "object",
-    ]
+    assert decided(events, "task") == ["category", "object"]
     said = err.splitlines()
     assert len(said) == 3
     assert "short.npz: not a readable .npz file" in said[0]
@@ -85,19 +75,11 @@ def verify(exported, edge):
 def test_the_golden_file_is_met(verify, exported):
     status, checks, err = verify(exported / "golden.npz")
     assert status == 0
-    assert [c["name"] for c in checks] == [
-        "series length",
-        "series counts",
-        "onset",
-        "features",
-        *(
-            f"category_{part}"
-            for part in ("label", "neighbours", "scores", "distances")
-        ),
-        *(f"object_{part}" for part in ("label", "neighbours", "scores", "distances")),
-        "out_of_range",
-        "the same in numpy",
-    ]
+    names = ["series length", "series counts", "onset", "features"]
+    for task in ("category", "object"):
+        parts = ("label", "neighbours", "scores", "distances")
+        names += [f"{task}_{part}" for part in parts]
+    assert [c["name"] for c in checks] == [*names, "out_of_range", "the same in numpy"]
     assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
     assert "all 14 results agree with the golden file" in err
 
@@ -168,31 +150,28 @@ def test_output_without_room_is_one_sentence(exported, recordings):
     assert run.stderr.count("\n") == 1
 
 
-def test_a_label_cannot_send_escape_sequences_to_the_terminal():
+def summed(*pairs):
+    """A summary of one task: labels, and what was decided."""
     summary = Summary({"object": None})
-    event = {
-        "event": "decision",
-        "task": "object",
-        "label": "\x1b]0;a\x07",
-        "flags": [],
-    }
-    summary.add({"object": "\u202ebox\x9b"}, [event])
-    assert all(line.isprintable() for line in summary.text().splitlines())
-    assert "\\x1b]0;a\\x07" in summary.text()
+    for number, (label, answer) in enumerate(pairs):
+        event = {"event": "decision", "task": "object", "label": answer, "flags": []}
+        summary.add({"object": label}, [event], str(number))
+    return summary
+
+
+def test_a_label_cannot_send_escape_sequences_to_the_terminal():
+    text = summed(("\u202ebox\x9b", "\x1b]0;a\x07")).text()
+    assert all(line.isprintable() for line in text.splitlines())
+    assert "\\x1b]0;a\\x07" in text
 
 
 def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
-    summary = Summary({"object": None})
     labels = [f"a thing with a long name {i:02d}" for i in range(12)]
-    for label in labels:
-        event = {"event": "decision", "task": "object", "label": label, "flags": []}
-        summary.add({"object": label}, [event])
-    head, *rows = summary.text().splitlines()[-13:]
-    assert (
-        head.split()
-        == [row.split()[0] for row in rows]
-        == [str(i + 1) for i in range(12)]
-    )
+    text = summed(*zip(labels, labels, strict=True)).text()
+    head, *rows = text.splitlines()[-13:]
+    numbers = [str(i + 1) for i in range(12)]
+    assert head.split() == numbers
+    assert [row.split()[0] for row in rows] == numbers
     assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12
 
 
@@ -202,17 +181,12 @@ def test_two_models_are_compared_on_the_same_recordings(exported, recordings, ed
         "replay", "--model", path, "--model", path, recordings, "--summary"
     )
     assert status == 0
-    decisions = [event for event in events if event["event"] == "decision"]
-    assert len(decisions) == 2 * 2 * 16
+    assert len(decided(events, "task")) == 2 * 2 * 16
     assert "object: 0 gained, 0 lost of 16: +0.0 points (95 % interval +0.0" in err
 
 
 def test_a_comparison_counts_what_is_gained_and_lost():
-    first = Summary({"t": None})
-    other = Summary({"t": None})
-    for i in range(10):
-        decided = [{"event": "decision", "task": "t", "label": "a", "flags": []}]
-        first.add({"t": "a" if i < 4 else "b"}, decided, str(i))
-        other.add({"t": "a" if i >= 2 else "b"}, decided, str(i))
+    first = summed(*[("a", "a")] * 4, *[("b", "a")] * 6)
+    other = summed(*[("b", "a")] * 2, *[("a", "a")] * 8)
     text = compared("A", first, "B", other)
-    assert "t: 6 gained, 2 lost of 10: +40.0 points" in text
+    assert "object: 6 gained, 2 lost of 10: +40.0 points" in text

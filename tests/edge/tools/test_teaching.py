@@ -23,14 +23,8 @@ from edge.tools.teaching import (
 
 
 def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
-    assert nearest_of_label(np.array([0, 2, 3, 59, 61, 100])).tolist() == [
-        0,
-        2,
-        3,
-        3,
-        4,
-        5,
-    ]
+    sizes = np.array([0, 2, 3, 59, 61, 100])
+    assert nearest_of_label(sizes).tolist() == [0, 2, 3, 3, 4, 5]
 
 
 def test_the_tables_of_labels_name_the_trials_of_each():
@@ -45,33 +39,21 @@ def test_labels_follow_from_a_category_and_the_reverse():
     whole = {"category": "soft-fixed", "softness": "soft", "mobility": "fixed"}
     assert joined({"category": "soft-fixed"}) == whole
     assert joined({"softness": "soft", "mobility": "fixed"}) == whole
-    assert joined({"category": "none", "object": "cup"}) == {
-        "category": "none",
-        "object": "cup",
-    }
+    unrelated = {"category": "none", "object": "cup"}
+    assert joined(unrelated) == unrelated
 
 
 def test_labels_that_are_not_known_are_counted_and_become_the_last_ones(model):
-    info = model.info
-    info = replace(
-        info, tasks={task: replace(e, k=5) for task, e in info.tasks.items()}
-    )
+    tasks = {task: replace(e, k=5) for task, e in model.info.tasks.items()}
+    info = replace(model.info, tasks=tasks)
     labels = [{"object": "mug"}, {"object": "cup"}, {"object": "mug", "lid": "x"}, {}]
     unknown = unknown_labels(info, [*labels, {"category": "soft-fixed"}])
     assert unknown == {"category": {}, "object": {"cup": 1, "mug": 2}}
     after = with_labels(info, unknown).tasks
-    assert after["object"].labels == (
-        "hard 0",
-        "hard 1",
-        "soft 0",
-        "soft 1",
-        "cup",
-        "mug",
-    )
-    assert {task: entry.k for task, entry in after.items()} == {
-        "category": 5,
-        "object": 1,
-    }
+    known = info.tasks["object"].labels
+    assert after["object"].labels == (*known, "cup", "mug")
+    assert after["category"].k == 5
+    assert after["object"].k == 1
 
 
 def test_no_label_is_added_to_tasks_that_are_decided_together(model):
@@ -102,10 +84,8 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
     data = (exported / "model.onnx").read_bytes()
     contents = onnx_file.read(data, "model")
     assert rewritten(data, {}, {}) == data
-    same = {
-        name: contents.constant(name)
-        for name in ("columns of category", "columns of object")
-    }
+    names = ("columns of category", "columns of object")
+    same = {name: contents.constant(name) for name in names}
     again = rewritten(data, same, {})
     (tmp_path / "model.onnx").write_bytes(again)
     assert len(again) == len(data)
