@@ -21,10 +21,12 @@ from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact, FeatureSeries
+from edge.touch.feature import KERNELS, Feature
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout, for_device
+from edge.touch.measurer import features as features_of
 from edge.touch.still import WatchfulTracker
 from edge.touch.track import ContactTracker
 from train.arms import arm_of, joint_angles
@@ -197,11 +199,11 @@ class DataSet:
         tables = {
             name: kernel_table(
                 [kernel_channels(series, window_s, name) for series in felt],
-                measures.KERNELS[name],
+                KERNELS[name],
                 alike=name == "taxel_kernels",
             )
             for name in self.names
-            if name in measures.KERNELS
+            if name in KERNELS
         }
         return replace(self, kernels=tables)
 
@@ -209,7 +211,7 @@ class DataSet:
         """The same trials with some of the features measured, in the order of
         `self.names`."""
         measured_names = tuple(name for name in self.names if name in names)
-        types = measures.features(measured_names)
+        types = features_of(measured_names)
         return replace(
             self,
             names=measured_names,
@@ -297,7 +299,7 @@ def load_trials(  # noqa: PLR0913 - independent options, all with defaults
         InputError: a file cannot be used, the skins differ, or nothing is labelled or
             touched.
     """
-    types = measures.features(tuple(features))
+    types = features_of(tuple(features))
     recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
     layout = with_thresholds(recordings.of_owner[0].layout, threshold, onset)
     layout = replace(layout, dead=_dead(recordings.recordings), axes=axes(types))
@@ -382,9 +384,7 @@ class Posed:
     without_joints: tuple[Path, ...]
 
 
-def with_poses(
-    data: Recordings, types: Sequence[measures.Feature], arm: Chain | None
-) -> Posed:
+def with_poses(data: Recordings, types: Sequence[Feature], arm: Chain | None) -> Posed:
     """Leave out recordings without joint angles, where most have them.
 
     Raises:

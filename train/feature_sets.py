@@ -36,7 +36,7 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 | `slant` | taxel^2 | and times row times column |
 
 `taxels`: every taxel in its place, or cells of several where the skin is large
-(`edge.touch.measures.Cells`). `sqrt_taxels`: the same of their square roots.
+(`edge.touch.cells.Cells`). `sqrt_taxels`: the same of their square roots.
 
 | feature, of each cell | unit | from |
 |---|---|---|
@@ -47,7 +47,7 @@ roots. Forces spread over decades; their square roots lie evenly, as those of co
 `kernels`: the share of the window in which kernels of nine samples, applied to sums of
 the skin's cells, lie above values that training gave (`edge.touch.kernels`).
 `zone_kernels`: the same of the eight whole numbers of each zone
-(`edge.touch.measures.ZONE_WIDTH`), which goes with `moments`.
+(`edge.touch.zones.ZONE_WIDTH`), which goes with `moments`.
 
 | feature | unit | from |
 |---|---|---|
@@ -79,8 +79,9 @@ of the normal one. It nears the coefficient of friction before a contact slides.
 
 from collections.abc import Sequence
 
+from edge.touch.feature import KERNELS, PAPER, Feature
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import KERNELS, PAPER, QUANTITIES, SHEAR, Feature
+from edge.touch.measures import QUANTITIES, SHEAR
 
 _TAXELS = (
     "taxel_force@10",

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
 from edge.model.novelty import Novelty, unusual
-from edge.touch import measures
+from edge.touch import measurer
 from edge.touch.contact import FeatureSeries
+from edge.touch.feature import KERNELS
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
@@ -300,20 +301,18 @@ def _kernels(
     """{feature: its table} of convolution features."""
     tables = {}
     for name in names:
-        if name in measures.KERNELS:
-            from edge.touch.kernels import KernelTable, channels_of
+        if name in KERNELS:
+            from edge.touch.kernels import KernelTable
 
             table = meta.table("kernels").table(name)
-            channels = channels_of(name, layout)
-            biases = measures.KERNELS[name]
-            tables[name] = KernelTable.from_table(table, channels, biases)
+            tables[name] = KernelTable.from_table(table, name, layout)
     return tables
 
 
 def _check_features(info: ModelInfo, name: str) -> None:
     """Refuse features that do not exist, or contradict the joints."""
     try:
-        types = measures.features(info.features)
+        types = measurer.features(info.features)
     except InputError as error:
         raise InputError(
             f"{name}: was made for the features {', '.join(info.features)}; {error}; "

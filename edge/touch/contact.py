@@ -13,7 +13,7 @@ from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import Measurer
+from edge.touch.measurer import Measurer
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector
@@ -42,10 +42,10 @@ class FeatureSeries:
             for.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
-        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.measures`; 12
+        zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 12
             with those of its shear.
         force_motion: (n,) as `motion`, of the force-weighted centroid, or None.
-        taxels: (n, cells) value of each cell of the skin (`edge.touch.measures.Cells`),
+        taxels: (n, cells) value of each cell of the skin (`edge.touch.cells.Cells`),
             or None.
         kernel_cells: (n, cells) likewise, of the larger cells that kernels take, or
             None.
@@ -164,7 +164,9 @@ class Contact:
             self._forget_last()
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
-        zones = measurer.measure(active, region, frame.shear)
+        zones: list[int] = []
+        if measurer.zones is not None:
+            zones = measurer.zones.measure(active, region, frame.shear)
         row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
         row["same"] = self._repeats(frame)
         row["beside"] = region is not None and active.has_other(
@@ -175,10 +177,8 @@ class Contact:
             self.joints = frame.joints
         counted = [*self._plain(region), *zones]
         row["counted"] = np.array(counted, dtype=np.int64)
-        if measurer.cells is not None:
-            row["taxels"] = measurer.cells.read(frame)
-        if measurer.kernel_cells is not None:
-            row["kernel_cells"] = measurer.kernel_cells.read(frame)
+        for name, cells in measurer.cells.items():
+            row[name] = cells.read(frame)
         if measurer.joints:
             row["joints"] = self._joints_of(frame)
         self._rows.append(row)
@@ -285,8 +285,6 @@ class Contact:
         }
         counted = columns.pop("counted")
         zones = self._measurer.zones
-        width = self._measurer.width
-        sums = counted[:, PLAIN:].reshape(len(counted), len(zones), width)
         return FeatureSeries(
             **columns,
             peak=counted[:, 0],
@@ -294,7 +292,7 @@ class Contact:
             sums=counted[:, 2:PLAIN],
             layout=self.layout,
             ended=self.ended,
-            zones={zone: sums[:, i] for i, zone in enumerate(zones)},
+            zones={} if zones is None else zones.split(counted[:, PLAIN:]),
         )
 
 

@@ -21,16 +21,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from edge.config import ConfigTable
+from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
+from edge.touch.feature import KERNELS, not_measured
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import (
-    KERNEL_CELLS,
-    ZONE_WIDTH,
-    ZONES,
-    Cells,
-    feature,
-    not_measured,
-)
+from edge.touch.measures import ZONES
+from edge.touch.zones import ZONE_WIDTH
 
 SAMPLES = 40
 """Times of the window at which a channel is taken."""
@@ -42,7 +38,7 @@ BIAS_BITS = 21
 2^`BITS`."""
 LOWEST = -(2**BIAS_BITS)
 """Least bias; no result is above it where a sample does not count."""
-KERNELS = np.array(
+WEIGHTS = np.array(
     [
         [2 if tap in heavy else -1 for tap in range(TAPS)]
         for heavy in combinations(range(TAPS), 3)
@@ -55,7 +51,7 @@ DILATIONS = (1, 2, 3, 4)
 BIASES = {1008: (5, 3, 2, 2), 504: (3, 1, 1, 1)}
 """Numbers of biases that a feature may have, and how many of them a kernel has at each
 dilation."""
-CONVOLUTIONS = len(DILATIONS) * len(KERNELS)
+CONVOLUTIONS = len(DILATIONS) * len(WEIGHTS)
 MIXED = (1, 1, 1, 2, 2, 3, 4, 6, 9)
 """How many channels a convolution may sum up; each entry is as likely as the others."""
 SEED = 2021
@@ -76,12 +72,16 @@ class KernelTable:
     biases: tuple[int, ...]
 
     @classmethod
-    def from_table(cls, table: ConfigTable, channels: int, biases: int) -> KernelTable:
-        """Read the table from a model's metadata, which holds its `vars`.
+    def from_table(
+        cls, table: ConfigTable, name: str, layout: SkinLayout
+    ) -> KernelTable:
+        """Read the table of a feature from a model's metadata, which holds its `vars`.
 
         Raises:
             InputError: the table has another number of channels or biases.
         """
+        channels = channels_of(name, layout)
+        biases = KERNELS[name]
         shifts = table.numbers("shifts", channels, low=-48, high=BITS)
         limits = table.numbers("biases", biases, low=-(2**BIAS_BITS), high=2**BIAS_BITS)
         table.done()
@@ -92,7 +92,7 @@ class KernelTable:
 def convolution_of_bias(biases: int) -> NDArray[np.int64]:
     """(biases,) the convolution that each bias belongs to, from the number of
     biases."""
-    repeats = np.repeat(BIASES[biases], len(KERNELS))
+    repeats = np.repeat(BIASES[biases], len(WEIGHTS))
     return np.repeat(np.arange(CONVOLUTIONS), repeats)
 
 
@@ -103,7 +103,7 @@ def _inside() -> NDArray[np.bool_]:
     Every other kernel counts only where all its taps lie inside the window; the rest
     count everywhere, with zeros beyond the window's ends.
     """
-    inside = np.ones((len(DILATIONS), len(KERNELS), SAMPLES), dtype=np.bool_)
+    inside = np.ones((len(DILATIONS), len(WEIGHTS), SAMPLES), dtype=np.bool_)
     for i, dilation in enumerate(DILATIONS):
         reach = dilation * (TAPS // 2)
         inside[i, 1 - i % 2 :: 2, :reach] = inside[i, 1 - i % 2 :: 2, -reach:] = False
@@ -145,14 +145,14 @@ def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
     # Sums of nine such numbers are below 2^18: float32 holds them exactly, whatever the
     # order.
     mixed = (_mixes(len(channels)) @ channels.astype(np.float32)).astype(np.int32)
-    mixed = mixed.reshape(len(DILATIONS), len(KERNELS), SAMPLES)
+    mixed = mixed.reshape(len(DILATIONS), len(WEIGHTS), SAMPLES)
     results = np.empty_like(mixed)
     for dilation, rows, result in zip(DILATIONS, mixed, results, strict=True):
         reach = dilation * (TAPS // 2)
-        padded = np.zeros((len(KERNELS), SAMPLES + 2 * reach), dtype=np.int32)
+        padded = np.zeros((len(WEIGHTS), SAMPLES + 2 * reach), dtype=np.int32)
         padded[:, reach:-reach] = rows
         taps = sliding_window_view(padded, 2 * reach + 1, axis=1)[..., ::dilation]
-        np.einsum("kt,kst->ks", KERNELS, taps, out=result)
+        np.einsum("kt,kst->ks", WEIGHTS, taps, out=result)
     return results.reshape(CONVOLUTIONS, SAMPLES)
 
 
@@ -195,7 +195,7 @@ def kernel_channels(
         zones = [sums[:, :ZONE_WIDTH] for sums in series.zones.values()]
         rows = np.column_stack(zones) if complete else None
     if rows is None:
-        raise not_measured(feature(name))
+        raise not_measured(name)
     step_s = window_s / (SAMPLES - 1)
     times = np.arange(SAMPLES) * step_s + CLOCK_ROUNDING_S
     return np.asarray(rows[series.t.searchsorted(times, side="right") - 1].T)

@@ -18,9 +18,10 @@ from edge.touch.contact import (
     region_time,
     released,
 )
+from edge.touch.feature import PAPER
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import PAPER, Measurer
+from edge.touch.measurer import Measurer
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain

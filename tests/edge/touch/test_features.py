@@ -169,18 +169,6 @@ def test_too_few_samples_and_an_empty_series_are_refused():
         feature_vector(series([], []), 1.2)
 
 
-@pytest.mark.parametrize("power", [-1000, -600, 0, 600, 1000])
-def test_a_deviation_loses_no_digit_where_its_squares_leave_the_range_of_floats(power):
-    peaks = [100, 230, 410, 90, 0]
-    scale = 2.0**-power
-    course = series([0.0, 0.25, 0.5, 0.75, 1.0], peaks, [1] * 5, scale=scale)
-    (deviation,) = feature_vector(course, 1.0, 5, ["max_force_deviation"])
-    variance = Fraction(sum(p * p for p in peaks), 5) - Fraction(sum(peaks), 5) ** 2
-    assert math.ldexp(deviation, -power) == pytest.approx(
-        math.sqrt(variance), rel=1e-15
-    )
-
-
 def test_what_is_too_large_is_refused_and_not_taken_for_unknown():
     large = series([0.0, 0.5, 1.2], [10, 20, 30], scale=1e-308)
     with pytest.raises(InputError, match="max_force is too large"):

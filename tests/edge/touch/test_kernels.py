@@ -183,14 +183,16 @@ def test_kernels_have_no_transform_summary_or_times(name):
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"shifts": [0], "biases": [0] * 504},
-        {"shifts": [0, 0], "biases": [0] * 503},
-        {"shifts": [0, 60], "biases": [0] * 504},
-        {"shifts": [0, 0], "biases": [1 << 22] * 504},
+        {"shifts": [0], "biases": [0] * 1008},
+        {"shifts": [0, 0], "biases": [0] * 1007},
+        {"shifts": [0, 60], "biases": [0] * 1008},
+        {"shifts": [0, 0], "biases": [1 << 22] * 1008},
     ],
 )
 def test_a_damaged_table_is_refused(wrong):
-    right = KernelTable((0, -3), (5,) * 504)
-    assert KernelTable.from_table(ConfigTable(vars(right), "m"), 2, 504) == right
+    skin = SkinLayout(1, 2)
+    right = KernelTable((0, -3), (5,) * 1008)
+    stored = ConfigTable(vars(right), "m")
+    assert KernelTable.from_table(stored, "taxel_kernels", skin) == right
     with pytest.raises(InputError, match="^m: "):
-        KernelTable.from_table(ConfigTable(wrong, "m"), 2, 504)
+        KernelTable.from_table(ConfigTable(wrong, "m"), "taxel_kernels", skin)

@@ -12,20 +12,15 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels
-from edge.touch.features import FEATURES, feature_vector
+from edge.touch.cells import MOST_CELLS, Cells
+from edge.touch.feature import PAPER
+from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import (
-    MOST_CELLS,
-    QUANTITIES,
-    ZONES,
-    Cells,
-    Measurer,
-    feature,
-    features,
-    names,
-)
+from edge.touch.measurer import features
+from edge.touch.measures import QUANTITIES, ZONES, feature, names
 from edge.touch.region import largest_region
+from edge.touch.zones import Zones
 from tests.edge.touch.pressed import followed, pressed
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -100,9 +95,9 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(
     frame = frame_of(seed, shape, density, high)
     active = ActiveTaxels(frame.counts, 10, valid=frame.valid, wraps=wraps)
     contact = active.largest()
-    measurer = Measurer(layout, ALL)
-    assert measurer.zones == ZONES
-    row = measurer.measure(active, contact)
+    zones = Zones(layout, features(ALL))
+    assert zones.names == ZONES
+    row = zones.measure(active, contact, None)
     if contact is None:
         assert row == [0] * 32
         return
@@ -117,7 +112,8 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     layout = SkinLayout(rows, cols, wraps=wraps)
     frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
     active = ActiveTaxels(frame.counts, 0)
-    row = Measurer(layout, ["skin_length"]).measure(active, active.largest())
+    zones = Zones(layout, features(["skin_length"]))
+    row = zones.measure(active, active.largest(), None)
     line = sum(range(cols))
     squares = sum(c * c for c in range(cols))
     sums = (
@@ -270,7 +266,7 @@ def test_zones_that_no_feature_calls_for_are_not_measured():
 
 
 def test_the_papers_three_are_the_default_and_come_first():
-    assert FEATURES == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
+    assert PAPER == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
     assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
     assert [feature(name).name for name in ALL] == ALL
 

@@ -1,0 +1,61 @@
+"""What a feature is, and the three of the paper."""
+
+from dataclasses import dataclass
+
+from edge.errors import InputError
+
+KERNELS = {"taxel_kernels": 1008, "zone_kernels": 504}
+"""Quantities that kernels make (`edge.touch.kernels`), and how many values each has.
+They are applied to the skin's cells, at most `edge.touch.cells.KERNEL_CELLS`, and to
+the whole numbers of all zones."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature type.
+
+    Attributes:
+        name: users select it by this name.
+        zone: one of `edge.touch.measures.ZONES`, or `arm`.
+        quantity: one of `QUANTITIES` or `SHEAR` there, or of those of `ALONE`.
+        transforms: of its value, in the order in which they are applied.
+        summary: one of `SUMMARIES`, or empty for its course.
+        samples: times at which it is taken; 0 for the model's number.
+        zones: the zones whose sums it needs, besides the region's own peak and area.
+        wide: whether it has many values a frame.
+        kernels: how many values kernels make of it; 0 of a feature without kernels.
+    """
+
+    name: str
+    zone: str
+    quantity: str
+    transforms: tuple[str, ...] = ()
+    summary: str = ""
+    samples: int = 0
+    zones: tuple[str, ...] = ()
+    wide: bool = False
+    kernels: int = 0
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether it is made of the joint angles."""
+        return self.zone == "arm"
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one number for the window (for each cell, kernel or joint)."""
+        return self.summary not in ("", "rate") or self.kernels > 0
+
+
+OF_PAPER = {
+    "max_force": Feature("max_force", "contact", "max_force"),
+    "contact_area": Feature("contact_area", "contact", "area"),
+    "contact_motion": Feature("contact_motion", "contact", "motion"),
+}
+PAPER = tuple(OF_PAPER)
+"""The three features of the paper's section III-B, in its order."""
+
+
+def not_measured(name: str) -> InputError:
+    """The error for a feature that the contact's series lacks."""
+    return InputError(f"{name} was not measured; name it where contacts are followed")

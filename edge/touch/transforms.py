@@ -1,0 +1,84 @@
+"""Transforms and summaries of a feature's samples."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.touch.feature import Feature
+from edge.touch.layout import SkinLayout
+
+FORCES = ("max_force", "force", "pressure", "taxel_force", "shear_size")
+"""Quantities whose logarithm takes the smallest force of a taxel in contact as
+floor."""
+MOTION_FLOOR = 0.1
+"""Motion that counts as noise of the centroid, in distances between rows."""
+
+
+def force_floor(layout: SkinLayout) -> float:
+    """The smallest force of a taxel in contact."""
+    return (layout.threshold_counts + 1) / (layout.counts_per_newton or 1.0)
+
+
+def length_floor(layout: SkinLayout) -> float:
+    """The shortest motion that is no noise."""
+    return MOTION_FLOOR * layout.pitch[0]
+
+
+def _floor(feature: Feature, layout: SkinLayout) -> float:
+    if feature.quantity in FORCES:
+        return force_floor(layout)
+    if feature.quantity in ("motion", "force_motion"):
+        return length_floor(layout)
+    return 0.0 if feature.quantity == "stiffness" else 1.0
+
+
+def transformed(
+    values: NDArray[Any], group: Sequence[Feature], layout: SkinLayout
+) -> NDArray[Any]:
+    """Samples (rows, times) after the transforms of their features, which are of one
+    kind."""
+    floors = np.array([[_floor(feature, layout)] for feature in group])
+    first = group[0]
+    for transform in first.transforms:
+        values = _transformed(values, transform, floors, first.wide)
+        floors = np.ones_like(floors)
+    return values
+
+
+def _transformed(
+    values: NDArray[np.float64],
+    transform: str,
+    floors: NDArray[np.float64],
+    wide: bool,
+) -> NDArray[np.float64]:
+    """A transform of samples (rows, times); `wide` rows are those of one feature."""
+    if transform == "log":
+        above = values + floors
+        return np.asarray(np.log(np.where(above > 0.0, above, 1.0)))
+    if transform == "sqrt":
+        return np.asarray(np.copysign(np.sqrt(np.abs(values)), values))
+    # The cells or joints of one feature share one largest value.
+    largest = np.abs(values).max(axis=None if wide else 1, keepdims=True)
+    shares = np.zeros_like(values)
+    return np.asarray(np.divide(values, largest, out=shares, where=largest > 0.0))
+
+
+def summarised(
+    values: NDArray[np.float64], summary: str, step_s: float
+) -> NDArray[Any]:
+    """A summary of samples (rows, times) that are `step_s` apart."""
+    if summary == "rate":
+        return np.asarray(np.gradient(values, step_s, axis=1))
+    if summary == "mean":
+        return np.asarray(values.mean(axis=1))
+    if summary == "deviation":
+        # Powers of two change no digit, and keep the squares within the range of
+        # floats.
+        power = np.frexp(np.abs(values).max(axis=1, keepdims=True))[1]
+        deviation = np.ldexp(values, -power).std(axis=1)
+        return np.asarray(np.ldexp(deviation, power[:, 0]))
+    if summary == "roughness":
+        return np.asarray(np.abs(np.diff(values, axis=1)).mean(axis=1))
+    return values
