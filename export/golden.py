@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.model import Model
-from edge.model.verify import answers, first_series
+from edge.model.verify import answers, first_series, integers_of
 from edge.recording import Recording
 from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
@@ -75,7 +75,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
     arrays["onset_s"] = np.array(onsets_s)
     arrays["series_start"] = _starts(course.t for course in series)
     arrays["series_t"] = np.concatenate([course.t for course in series])
-    arrays["series_counts"] = np.concatenate([course.integers for course in series])
+    arrays["series_counts"] = np.concatenate([integers_of(course) for course in series])
     arrays["vectors"] = _vectors(model, series, X)
     if info.decision_points_s:
         arrays["decision_point_vectors"] = _early_vectors(model, series)

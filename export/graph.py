@@ -21,6 +21,7 @@ from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
+from edge.model.metadata import to_json
 from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
 from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
@@ -334,7 +335,7 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     proto.ir_version = IR_VERSION
     proto.producer_name = "edge-classify"
     proto.doc_string = "scaler, PCA and k-NN of a touch; see the metadata"
-    helper.set_model_props(proto, {METADATA_KEY: info.to_json()})
+    helper.set_model_props(proto, {METADATA_KEY: to_json(info)})
     onnx.checker.check_model(proto, full_check=True)
     data: bytes = proto.SerializeToString(deterministic=True)
     onnx_file.check(onnx_file.read(data, "the exported model"), "the exported model")

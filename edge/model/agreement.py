@@ -2,6 +2,7 @@
 with them."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -49,3 +50,31 @@ def product_label(factors: Factors, indices: Mapping[str, int]) -> int:
     """The index of the product's label for the factors' labels (indices)."""
     pairs = list(zip(*factors.values(), strict=True))
     return pairs.index(tuple(indices[factor] for factor in factors))
+
+
+def factors_fit(
+    factors: Factors, labels: Mapping[str, tuple[str, ...]], task: str
+) -> bool:
+    """Whether each pair of the factors' labels is one label of the task.
+
+    Args:
+        factors: of the task.
+        labels: {task: its labels} of a model.
+        task: the product.
+    """
+    ranges = [range(len(labels[factor])) for factor in factors if factor in labels]
+    lengths = {len(indices) for indices in factors.values()}
+    if len(ranges) != 2 or lengths != {len(labels[task])}:
+        return False
+    pairs = list(zip(*factors.values(), strict=True))
+    if sorted(pairs) != list(product(*ranges)):
+        return False
+    # Labels that are made of their factors' labels, as `rigid-fixed` is, stand for
+    # these. Labels may have other names.
+    first, second = (labels[factor] for factor in factors)
+    forward = [f"{first[a]}-{second[b]}" for a, b in pairs]
+    backward = [f"{second[b]}-{first[a]}" for a, b in pairs]
+    return all(
+        tuple(names) == labels[task] or set(names) != set(labels[task])
+        for names in (forward, backward)
+    )

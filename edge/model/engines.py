@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
+from edge.files import parsing
 from edge.interrupt import delayed
 from edge.model.onnx_file import Contents
 
@@ -72,7 +73,10 @@ def open_engine(path: str, contents: Contents, engine: str | None) -> Engine:
             )
         else:
             return OnnxRuntime(path, contents, onnxruntime)
-    return Numpy(contents)
+    from edge.model.graph import Graph  # most boards have ONNX Runtime
+
+    with parsing(path, "an ONNX model", "; copy or export it again"):
+        return Graph(contents)
 
 
 class OnnxRuntime:
@@ -128,29 +132,3 @@ class OnnxRuntime:
         """{output: its type and shape}."""
         values = self._session.get_outputs()
         return {value.name: (value.type, value.shape) for value in values}
-
-
-class Numpy:
-    """The graph in numpy."""
-
-    name = "numpy"
-
-    def __init__(self, contents: Contents) -> None:
-        from edge.model.graph import Graph  # most boards have ONNX Runtime
-
-        self._contents = contents
-        self._graph = Graph(contents)
-
-    def run(
-        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
-    ) -> list[NDArray[Any]]:
-        """The named outputs of the graph."""
-        return self._graph.run(names, inputs)
-
-    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{input: its type and shape}, as the file declares them."""
-        return self._contents.inputs
-
-    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{output: its type and shape}, as the file declares them."""
-        return self._contents.outputs

@@ -12,8 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.model.onnx_file import TYPES, Contents, Node
+from edge.model.onnx_file import Contents, Message, Node, messages, text_of
 
+TYPES = {1: "<f4", 5: "<i2", 7: "<i8", 9: "|b1", 11: "<f8"}
+"""{type of a TensorProto: its numbers}."""
+TENSORS = {
+    1: "tensor(float)",
+    5: "tensor(int16)",
+    7: "tensor(int64)",
+    9: "tensor(bool)",
+    11: "tensor(double)",
+}
+"""{type of a TensorProto: its name in ONNX Runtime}."""
+Declared = tuple[str, list[int | None]]
+"""Type and shape of an input or output."""
 Array = NDArray[Any]
 Attributes = Mapping[str, int]
 
@@ -135,6 +147,25 @@ OPERATORS: dict[str, Callable[..., Any]] = {
 """By name. Each takes its inputs and `attributes`, and gives its output or outputs."""
 
 
+def _constant(tensor: Any) -> Array:
+    """The numbers of a TensorProto."""
+    values = np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]])
+    return values.reshape(tensor.get(1, []))
+
+
+def _declared(value: Message) -> Declared:
+    """Type and shape of a ValueInfoProto; a size that is not known is None."""
+    kind = "another type"
+    sizes: list[int | None] = []
+    for declared in messages(value, 2):
+        for tensor in messages(declared, 1):
+            kind = TENSORS.get(tensor[1][-1], kind)
+            for shape in messages(tensor, 2):
+                for dimension in messages(shape, 1):
+                    sizes.append(dimension[1][-1] if 1 in dimension else None)
+    return kind, sizes
+
+
 class Graph:
     """A graph whose values can be asked for by name.
 
@@ -145,10 +176,14 @@ class Graph:
     >>> Graph(contents).run(["mobility_label"], {"features": features})[0].shape
     (1,)
 
+    It is an engine of `edge.model.engines`.
+
     Attributes:
         makers: {value: the node that makes it}.
         constants: {name: value}.
     """
+
+    name = "numpy"
 
     def __init__(self, contents: Contents) -> None:
         """Read the constants of a model file.
@@ -156,13 +191,24 @@ class Graph:
         Raises:
             InputError: the file uses an operator in a form that no export writes.
         """
-        self.constants = {name: contents.constant(name) for name in contents.tensors}
+        tensors = contents.tensors.items()
+        self.constants = {name: _constant(tensor) for name, tensor in tensors}
+        self._inputs = {text_of(v, 1): _declared(v) for v in contents.inputs}
+        self._outputs = {text_of(v, 1): _declared(v) for v in contents.outputs}
         self.makers: dict[str, Node] = {}
         self._plans: dict[tuple[str, ...], list[Node]] = {}
         self._nodes = contents.nodes
         for node in contents.nodes:
             for output in node.outputs:
                 self.makers[output] = node
+
+    def inputs(self) -> dict[str, Declared]:
+        """{input: its type and shape}, as the file declares them."""
+        return self._inputs
+
+    def outputs(self) -> dict[str, Declared]:
+        """{output: its type and shape}, as the file declares them."""
+        return self._outputs
 
     def run(self, names: Sequence[str], inputs: Mapping[str, Array]) -> list[Array]:
         """Values of the graph, in the order of the names.

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from itertools import product
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -28,10 +26,6 @@ if TYPE_CHECKING:
 
 METADATA_KEY = "edge-classify"
 FORMAT = 7
-OPTIONAL = (
-    "decision_points_s stopping novelty joints kernels name trials taught usual".split()
-)
-"""Keys that are left out where they would be empty."""
 
 
 @dataclass(frozen=True)
@@ -178,27 +172,9 @@ class ModelInfo:
             motion_on_skin=motion_on_skin,
         )
 
-    def to_json(self) -> str:
-        """The metadata as JSON text, as the model file holds it."""
-        entries = vars(self) | {
-            "format": FORMAT,
-            "tasks": {name: vars(task) for name, task in self.tasks.items()},
-            "skin": self.layout.to_dict(),
-            "tracking": {"debounce": self.debounce},
-            "arm": None if self.chain is None else self.chain.to_dict(),
-            "stopping": {task: asdict(rules) for task, rules in self.stopping.items()},
-            "novelty": self.novelty and asdict(self.novelty),
-            "kernels": {name: vars(table) for name, table in self.kernels.items()},
-        }
-        del entries["layout"], entries["chain"], entries["debounce"]
-        for key in OPTIONAL:
-            if not entries[key]:
-                del entries[key]
-        return json.dumps(entries, sort_keys=True, allow_nan=False, ensure_ascii=False)
-
     @classmethod
     def from_json(cls, text: str, name: str) -> Self:
-        """Read the text that `to_json` wrote.
+        """Read the text that `edge.model.metadata.to_json` wrote.
 
         Raises:
             InputError: something is missing or of the wrong kind; the sentence names
@@ -358,8 +334,12 @@ def _contradiction_of_task(info: ModelInfo, task: str) -> str:
         return (
             f"task {task!r} has {entry.components} components of {info.width} features"
         )
-    if entry.factors and not _factors_fit(info, task):
-        return f"task {task!r} is not the product of its factors"
+    if entry.factors:
+        from edge.model.agreement import factors_fit  # few models have products
+
+        labels = {name: other.labels for name, other in info.tasks.items()}
+        if not factors_fit(entry.factors, labels, task):
+            return f"task {task!r} is not the product of its factors"
     return ""
 
 
@@ -371,30 +351,6 @@ def _points_fit(info: ModelInfo) -> bool:
         return False
     named = info.novelty is not None and info.novelty.task in info.tasks
     return named and info.stopping.keys() == info.tasks.keys()
-
-
-def _factors_fit(info: ModelInfo, task: str) -> bool:
-    """Whether each pair of the factors' labels is one label of the task."""
-    indices = info.products[task]
-    ranges = [range(len(info.tasks[f].labels)) for f in indices if f in info.tasks]
-    lengths = {len(labels) for labels in indices.values()}
-    if len(ranges) != 2 or lengths != {len(info.tasks[task].labels)}:
-        return False
-    pairs = list(zip(*indices.values(), strict=True))
-    return sorted(pairs) == list(product(*ranges)) and _names_fit(info, task, pairs)
-
-
-def _names_fit(info: ModelInfo, task: str, pairs: Sequence[tuple[int, ...]]) -> bool:
-    """Whether labels that are made of their factors' labels, as `rigid-fixed` is, stand
-    for these. Labels may have other names."""
-    labels = info.tasks[task].labels
-    first, second = (info.tasks[factor].labels for factor in info.products[task])
-    forward = [f"{first[a]}-{second[b]}" for a, b in pairs]
-    backward = [f"{second[b]}-{first[a]}" for a, b in pairs]
-    return all(
-        tuple(names) == labels or set(names) != set(labels)
-        for names in (forward, backward)
-    )
 
 
 def _task(table: ConfigTable) -> Task:

@@ -7,12 +7,9 @@ of its size.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 
@@ -51,20 +48,6 @@ DATA_LOCATION = 14
 
 UNUSUAL = "functions, inner graphs or sparse tensors"
 
-TYPES = {1: "<f4", 5: "<i2", 7: "<i8", 9: "|b1", 11: "<f8"}
-"""{type of a TensorProto: its numbers}."""
-
-TENSORS = {
-    1: "tensor(float)",
-    5: "tensor(int16)",
-    7: "tensor(int64)",
-    9: "tensor(bool)",
-    11: "tensor(double)",
-}
-"""{type of a TensorProto: its name in ONNX Runtime}."""
-Declared = tuple[str, list[int | None]]
-"""Type and shape of an input or output."""
-
 Message = dict[int, list[Any]]
 """{field number: its values}: numbers, or memoryviews of the bytes of a text or an
 inner message. A damaged file may have one where the other belongs."""
@@ -89,20 +72,11 @@ class Contents:
     tensors: dict[str, Message] = field(default_factory=dict)
     """{name of a constant: the fields of its TensorProto}."""
     metadata: dict[str, str] = field(default_factory=dict)
-    inputs: dict[str, Declared] = field(default_factory=dict)
-    outputs: dict[str, Declared] = field(default_factory=dict)
+    inputs: list[Message] = field(default_factory=list)
+    outputs: list[Message] = field(default_factory=list)
+    """The ValueInfoProtos of its inputs and outputs."""
     foreign: list[str] = field(default_factory=list)
     """Its contents that no exported model has, in words."""
-
-    def constant(self, name: str) -> NDArray[Any]:
-        """A constant of the graph.
-
-        Raises:
-            KeyError: the graph has no such constant.
-        """
-        tensor: Any = self.tensors[name]
-        values = np.frombuffer(tensor[9][-1], TYPES[tensor[2][-1]])
-        return values.reshape(tensor.get(1, []))
 
 
 def _varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -146,7 +120,8 @@ def message_of(value: memoryview) -> Message:
     return fields
 
 
-def _messages(message: Message, number: int) -> Sequence[Message]:
+def messages(message: Message, number: int) -> list[Message]:
+    """The inner messages of a field."""
     return [message_of(value) for value in message.get(number, ())]
 
 
@@ -170,9 +145,9 @@ def read(data: bytes, name: str) -> Contents:
         model = message_of(memoryview(data))
         if FUNCTIONS in model:
             contents.foreign.append(UNUSUAL)
-        for entry in _messages(model, METADATA):
+        for entry in messages(model, METADATA):
             contents.metadata[text_of(entry, 1)] = text_of(entry, 2)
-        for graph in _messages(model, GRAPH):
+        for graph in messages(model, GRAPH):
             _read_graph(graph, contents)
     # A field that runs past its message or is of no known kind; a number in place of
     # bytes.
@@ -189,28 +164,14 @@ def _read_graph(graph: Message, contents: Contents) -> None:
     """Take in the nodes, constants, inputs and outputs of a graph."""
     if SPARSE in graph:
         contents.foreign.append(UNUSUAL)
-    for fields in _messages(graph, NODES):
+    for fields in messages(graph, NODES):
         _read_node(fields, contents)
-    for tensor in _messages(graph, INITIALIZERS):
+    for tensor in messages(graph, INITIALIZERS):
         contents.tensors[text_of(tensor, TENSOR_NAME)] = tensor
         if EXTERNAL_DATA in tensor or any(tensor.get(DATA_LOCATION, ())):
             contents.foreign.append("weights in another file")
-    for number, declared in ((INPUTS, contents.inputs), (OUTPUTS, contents.outputs)):
-        for value in _messages(graph, number):
-            declared[text_of(value, 1)] = _declared(value)
-
-
-def _declared(value: Message) -> Declared:
-    """Type and shape of a ValueInfoProto; a size that is not known is None."""
-    kind = "another type"
-    sizes: list[int | None] = []
-    for declared in _messages(value, 2):
-        for tensor in _messages(declared, 1):
-            kind = TENSORS.get(tensor[1][-1], kind)
-            for shape in _messages(tensor, 2):
-                for dimension in _messages(shape, 1):
-                    sizes.append(dimension[1][-1] if 1 in dimension else None)
-    return kind, sizes
+    contents.inputs += messages(graph, INPUTS)
+    contents.outputs += messages(graph, OUTPUTS)
 
 
 def _read_node(fields: Message, contents: Contents) -> None:
@@ -220,7 +181,7 @@ def _read_node(fields: Message, contents: Contents) -> None:
         foreign = f"operator {domain}.{operator}".replace(" .", " ")
         contents.foreign.append(foreign)
     attributes = {}
-    for attribute in _messages(fields, ATTRIBUTES):
+    for attribute in messages(fields, ATTRIBUTES):
         if not attribute.keys() <= NUMBERS:
             contents.foreign.append(UNUSUAL)
         if WHOLE in attribute:

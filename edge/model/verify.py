@@ -8,7 +8,7 @@ by.
 | `series_start` | int64 (m + 1,) | the same for the series |
 | `onset_s` | float64 (m,) | |
 | `series_t` | float64 (s,) | |
-| `series_counts` | int64 (s, c) | `FeatureSeries.integers` |
+| `series_counts` | int64 (s, c) | `integers_of` the series |
 | `vectors` | float64 (v, width) | feature vectors; the first m are the trials', in order |
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
@@ -83,6 +83,14 @@ def first_series(
 ) -> tuple[float, FeatureSeries] | None:
     """Onset and series of a recording's first contact, by the board's own path."""
     return first_contact(recording, model.info.tracker(recording.layout))
+
+
+def integers_of(series: FeatureSeries) -> NDArray[np.int64]:
+    """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
+    cells = [c for c in (series.taxels, series.kernel_cells) if c is not None]
+    return np.column_stack(
+        [series.peak, series.area, series.sums, *series.zones.values(), *cells]
+    )
 
 
 def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
@@ -178,7 +186,7 @@ def _path(
         if contact is None:
             continue
         onsets.append(contact[0])
-        integers.append(contact[1].integers)
+        integers.append(integers_of(contact[1]))
         vectors.append([info.vector(contact[1], window_s) for window_s in windows])
     trials = len(onsets)
     at_windows = np.array(vectors).swapaxes(0, 1)

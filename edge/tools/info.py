@@ -12,6 +12,7 @@ from typing import Any
 
 from edge.commands.output import Output, counted, wrapped
 from edge.model.info import ModelInfo
+from edge.model.metadata import to_json
 from edge.model.model import Model
 
 COARSE = ("kernels", "novelty", "stopping", "units")
@@ -52,7 +53,7 @@ def described(model: Model) -> dict[str, Any]:
         "file": model.path,
         "version": model.version,
         "bytes": len(model.contents.data),
-        **json.loads(model.info.to_json()),
+        **json.loads(to_json(model.info)),
     }
 
 

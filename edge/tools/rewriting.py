@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.model.graph import TYPES
 from edge.model.onnx_file import (
     GRAPH,
     INITIALIZERS,
     METADATA,
     TENSOR_NAME,
-    TYPES,
     fields_of,
     message_of,
     text_of,

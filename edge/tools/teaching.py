@@ -18,6 +18,7 @@ from edge.errors import InputError, about, printable
 from edge.files import parsing
 from edge.model.graph import Array, Graph, coordinates_of
 from edge.model.info import METADATA_KEY, ModelInfo, Task
+from edge.model.metadata import to_json
 from edge.model.model import Model
 from edge.model.onnx_file import Node
 from edge.tools.rewriting import rewritten
@@ -201,7 +202,7 @@ def taught(
         taught=info.taught + len(names),
         data_digest=digest,
     )
-    metadata = {METADATA_KEY: after.to_json()}
+    metadata = {METADATA_KEY: to_json(after)}
     return rewritten(model.contents.data, changed, metadata)
 
 

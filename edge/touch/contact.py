@@ -96,14 +96,6 @@ class FeatureSeries:
         changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
         return replace(self, **changes)
 
-    @property
-    def integers(self) -> NDArray[np.int64]:
-        """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
-        cells = [c for c in (self.taxels, self.kernel_cells) if c is not None]
-        return np.column_stack(
-            [self.peak, self.area, self.sums, *self.zones.values(), *cells]
-        )
-
 
 class Contact:
     """A contact being followed, one row of measurements a frame.

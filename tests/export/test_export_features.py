@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
+from edge.model.metadata import to_json
 from edge.model.model import Model
 from tests.conftest import export
 from train.dataset import load_trials
@@ -68,7 +69,7 @@ def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
         sum(len(table.biases) for table in model.info.kernels.values())
         == model.info.width
     )
-    assert len(json.dumps(model.info.to_json())) < 20_000
+    assert len(json.dumps(to_json(model.info))) < 20_000
     files = ("--model", model.path, "--golden", tmp_path / "golden.npz")
     assert edge("verify", *files, text=True)[0] == 0
     dataset = load_trials([recordings], features=model.info.features).with_kernels(1.2)

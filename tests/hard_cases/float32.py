@@ -12,13 +12,14 @@ import numpy as np
 import openvino
 
 from edge.model import model as model_module
-from edge.model.engines import Numpy, open_engine
+from edge.model.engines import open_engine
+from edge.model.graph import Graph
 from edge.model.model import Model
 from edge.model.verify import verify
 from tests.hard_cases.elsewhere import sets
 
 
-class OpenVino(Numpy):
+class OpenVino(Graph):
     """OpenVINO on the processor, told to compute in float32."""
 
     name = "openvino"

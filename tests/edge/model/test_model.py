@@ -12,7 +12,9 @@ from onnx import TensorProto, helper, numpy_helper
 
 from edge.errors import InputError
 from edge.model import onnx_file
+from edge.model.graph import Graph
 from edge.model.info import FORMAT, METADATA_KEY, ModelInfo
+from edge.model.metadata import to_json
 from edge.model.model import Model
 
 
@@ -51,7 +53,7 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     assert info.motion_frame == "world"
     assert info.chain.dof == 5
     assert len(info.data_digest) == 64
-    assert info.from_json(info.to_json(), "again").to_json() == info.to_json()
+    assert to_json(info.from_json(to_json(info), "again")) == to_json(info)
 
 
 def test_a_decision_is_the_graphs_answer_and_stays_so_after_further_ones(model, golden):
@@ -213,7 +215,7 @@ def with_factors(info, labels, softness, mobility):
         "softness": replace(task, labels=("rigid", "soft")),
         "mobility": replace(task, labels=("fixed", "movable")),
     }
-    return replace(info, tasks=tasks).to_json()
+    return to_json(replace(info, tasks=tasks))
 
 
 def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
@@ -245,11 +247,12 @@ def test_contents_are_those_that_onnx_reads(exported):
         assert node.inputs == list(expected.input)
         assert node.outputs == list(expected.output)
         assert node.attributes == attributes
-    assert contents.inputs["features"] == ("tensor(double)", [None, 120])
-    assert contents.outputs["object_label"] == ("tensor(int64)", [None])
+    graph = Graph(contents)
+    assert graph.inputs()["features"] == ("tensor(double)", [None, 120])
+    assert graph.outputs()["object_label"] == ("tensor(int64)", [None])
     for tensor in proto.graph.initializer:
         np.testing.assert_array_equal(
-            contents.constant(tensor.name), numpy_helper.to_array(tensor)
+            graph.constants[tensor.name], numpy_helper.to_array(tensor)
         )
     assert contents.foreign == []
 

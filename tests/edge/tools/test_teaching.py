@@ -82,10 +82,10 @@ def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
     model, exported, tmp_path
 ):
     data = (exported / "model.onnx").read_bytes()
-    contents = onnx_file.read(data, "model")
+    constants = Graph(onnx_file.read(data, "model")).constants
     assert rewritten(data, {}, {}) == data
     names = ("columns of category", "columns of object")
-    same = {name: contents.constant(name) for name in names}
+    same = {name: constants[name] for name in names}
     again = rewritten(data, same, {})
     (tmp_path / "model.onnx").write_bytes(again)
     assert len(again) == len(data)

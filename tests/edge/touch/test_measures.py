@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.errors import InputError
+from edge.model.verify import integers_of
 from edge.touch.active import ActiveTaxels
 from edge.touch.cells import MOST_CELLS, Cells
 from edge.touch.feature import PAPER
@@ -254,7 +255,7 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
     frames = [pressed(FLAT, *reading) for reading in readings]
     wanted = [*ALL[:3], "skin_force", "force_motion"]
     series = series_of(FLAT, frames, wanted)
-    assert series.integers.shape == (2, 4 + 8 * 2)
+    assert integers_of(series).shape == (2, 4 + 8 * 2)
     assert series.zones["skin"][:, 2].tolist() == [50, 140]
     assert series.force_motion.shape == series.motion.shape == (2,)
 
