@@ -4,16 +4,15 @@
 import time
 from typing import Protocol
 
-TIME_ROUNDING_S = 5e-7
-"""Rounding may put the time of a sample below the sample's true time, by less than
-this."""
-
 
 class Clock(Protocol):
     """Seconds that never go back."""
 
     def now(self) -> float:
         """Seconds since some fixed moment."""
+
+    def real(self) -> float:
+        """Real time on this clock's scale: when another program's line arrives."""
 
     def sleep_until(self, t: float) -> None:
         """Wait until `t`; return at once if it has passed."""
@@ -27,6 +26,7 @@ class SystemClock:
     """
 
     now = staticmethod(time.monotonic)
+    real = staticmethod(time.monotonic)
 
     def sleep_until(self, t: float) -> None:
         """Wait until `t`; return at once if it has passed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -13,6 +14,8 @@ from edge.model.model import Model
 from edge.model.novelty import UNKNOWN, check_rate
 from edge.model.stopping import StoppingRule
 from edge.policy import Policy, Question, rounded
+
+LOG = logging.getLogger(__name__)
 
 
 def policies(model: Model, error: float) -> Mapping[str, Policy]:
@@ -168,3 +171,23 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{'; '.join(reasons)}"
         )
     return rules
+
+
+def log_rules(model: Model, error: float) -> None:
+    """Log how each task is decided under an error rate.
+
+    Raises:
+        InputError: as `stopping_rules`.
+    """
+    for task, rule in stopping_rules(model, error).items():
+        if rule is None:
+            LOG.warning(
+                f"{task}: decided at the end of the window, as an error of {error:g} "
+                f"cannot be certified: {model.info.stopping[task].refusal(error)}"
+            )
+            continue
+        if rule.fixed:
+            time = f"always after {model.decision_points_s[rule.last]:g} s"
+        else:
+            time = f"when sure, in training after {rule.mean_s:.2f} s on average"
+        LOG.info(f"{task}: decided {time}; at most {rule.error:.1%} wrong")

@@ -8,12 +8,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from edge.commands.output import LOG
-from edge.errors import InputError
-
 if TYPE_CHECKING:
     from edge.model.model import Model
-    from edge.touch.arm import Chain
 
 NOISE_COUNTS = 0.7
 """Noise of the fake skins that commands open, below that from which a chip that always
@@ -39,17 +35,6 @@ def within(kind: type, low: float, high: float) -> Callable[[str], float]:
 
 seconds = within(float, 1e-3, 1e9)
 """The type of an option that takes a duration."""
-
-
-def task_label(text: str) -> tuple[str, str]:
-    """The type of an option that takes a task and its label, in printable
-    characters."""
-    task, _, label = (part.strip() for part in text.partition("="))
-    if not (task and label and text.isprintable()):
-        raise argparse.ArgumentTypeError(
-            f"must be TASK=LABEL, such as object=box, not {text!r}"
-        )
-    return task, label
 
 
 def add_skin(parser: argparse.ArgumentParser) -> None:
@@ -116,42 +101,6 @@ def add_reading(parser: argparse.ArgumentParser, web: str = "") -> None:
     )
 
 
-def add_arm(parser: argparse.ArgumentParser, use: str) -> None:
-    """Add `--arm` and, for a URDF, its two links; `open_arm` reads the arm.
-
-    Args:
-        parser: of the command.
-        use: completes the help "the arm that carries the skin, ...".
-    """
-    parser.add_argument(
-        "--arm",
-        metavar="arm.toml|arm.urdf",
-        help=f"the arm that carries the skin, {use}",
-    )
-    parser.add_argument(
-        "--base", metavar="LINK", help="in a URDF, the first link of the arm"
-    )
-    parser.add_argument(
-        "--tip", metavar="LINK", help="in a URDF, the link that carries the skin"
-    )
-
-
-def open_arm(arguments: argparse.Namespace) -> Chain | None:
-    """The arm that the options name, or None.
-
-    Raises:
-        InputError: the file describes no chain of joints, or `--base` and `--tip` do
-            not suit it.
-    """
-    if arguments.arm is not None:
-        from edge.touch.arm import Chain
-
-        return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
-    if arguments.base is not None or arguments.tip is not None:
-        raise InputError("--base and --tip need --arm arm.urdf")
-    return None
-
-
 def add_error(parser: argparse.ArgumentParser) -> None:
     """Add the option that asks for an error rate; `check_error` checks it against the
     model."""
@@ -180,19 +129,7 @@ def check_error(model: Model, error: float | None) -> None:
     Raises:
         InputError: the rate is outside (0, 1), or certified for no task.
     """
-    if error is None:
-        return
-    from edge.early import stopping_rules
+    if error is not None:
+        from edge.early import log_rules  # few runs decide early
 
-    for task, rule in stopping_rules(model, error).items():
-        if rule is None:
-            LOG.warning(
-                f"{task}: decided at the end of the window, as an error of {error:g} "
-                f"cannot be certified: {model.info.stopping[task].refusal(error)}"
-            )
-            continue
-        if rule.fixed:
-            time = f"always after {model.decision_points_s[rule.last]:g} s"
-        else:
-            time = f"when sure, in training after {rule.mean_s:.2f} s on average"
-        LOG.info(f"{task}: decided {time}; at most {rule.error:.1%} wrong")
+        log_rules(model, error)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from edge.commands.output import LOG, Output, event_text
+from edge.commands.output import LOG, Output
 from edge.errors import InputError
 from edge.events import Event
 from edge.output.event_writer import Lines, LineWriter
@@ -34,10 +32,10 @@ def ending_signals() -> list[int]:
     SIGHUP, sent when an ssh session drops, is one unless it was ignored from the start,
     as under nohup.
     """
-    hangup = (
-        [] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else [signal.SIGHUP]
-    )
-    return [signal.SIGINT, signal.SIGTERM, *hangup]
+    signals: list[int] = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        signals.append(signal.SIGHUP)
+    return signals
 
 
 def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
@@ -56,15 +54,13 @@ class Opened:
         lasts_s: how many seconds to read for.
         source: names the skin or the recording in messages and recordings.
         playback: the recording that a fake skin plays; None for a real skin.
-        now: the time on the skin's clock at which another program's line arrives.
         virtual: time is virtual, so that the loop may wait for a slow reader.
     """
 
     skin: Skin
     lasts_s: float
     source: str
-    playback: Playback | None
-    now: Callable[[], float]
+    playback: Playback | None = None
     virtual: bool = False
 
     @property
@@ -95,66 +91,41 @@ def open_skin(
         EdgeError: the skin cannot be read.
     """
     if arguments.fake is not None:
-        opened = _played(arguments, model, arm)
+        opened = _played(arguments, arm)
     elif arguments.loop or arguments.real_time:
         raise InputError("--loop and --real-time work only with --fake REC.npz")
     elif arguments.skin is None:
         raise InputError("give --skin skin.toml, or --fake REC.npz to use no hardware")
     else:
-        file = skinfile.load(arguments.skin)
-        touch_counts = _touch_counts(model, file)
-        skin = Skin.open(file, calibrated=calibrated, touch_counts=touch_counts)
-        lasts_s = arguments.seconds
-        opened = Opened(skin, lasts_s, arguments.skin, None, skin.clock.now)
-    with opened.skin:
-        for status in opened.skin.status():
+        skin = Skin.open(arguments.skin, calibrated=calibrated)
+        opened = Opened(skin, arguments.seconds, arguments.skin)
+    with opened.skin as skin:
+        if model is not None:
+            threshold_counts = for_device(
+                model.info.layout, skin.layout
+            ).threshold_counts
+            skin.touch_counts = min(skin.touch_counts, threshold_counts)
+        for status in skin.status():
             if status.error:
                 LOG.warning(f"{status.error}; left out for now")
         yield opened
 
 
-def _touch_counts(model: Model | None, file: skinfile.SkinFile) -> int | None:
-    """The counts above which a taxel is touched, by the model."""
-    if model is None:
-        return None
-    return for_device(model.info.layout, file.layout).threshold_counts
-
-
-def _played(
-    arguments: argparse.Namespace, model: Model | None, arm: Chain | None
-) -> Opened:
+def _played(arguments: argparse.Namespace, arm: Chain | None) -> Opened:
     """The recording of --fake, played onto fake chips."""
-    from edge.fake.clock import PacedClock, VirtualClock
-    from edge.fake.player import play, skin_file
-    from edge.recording import load
+    from edge.fake.player import play_file  # a robot has a skin
 
-    recording = load(arguments.fake)
-    if arm is not None:
-        recording = recording.for_joints(arm.names, arguments.fake)
-    noise_counts = 0.0
-    if arguments.skin is None:
-        # Nobody calibrates, and the chips serve the recording as it is.
-        file = skin_file(recording.layout)
-    else:
-        file = skinfile.load(arguments.skin)
-        noise_counts = arguments.noise
-    clock = PacedClock() if arguments.real_time else VirtualClock()
-    skin, playback = play(
-        file,
-        recording,
+    skin, playback = play_file(
+        arguments.fake,
+        None if arguments.skin is None else skinfile.load(arguments.skin),
+        joint_names=None if arm is None else arm.names,
+        noise_counts=arguments.noise,
         loop=arguments.loop,
-        clock=clock,
-        noise_counts=noise_counts,
-        touch_counts=_touch_counts(model, file),
+        real_time=arguments.real_time,
     )
-    return Opened(
-        skin,
-        min(playback.ends, arguments.seconds),
-        f"fake {arguments.fake}",
-        playback,
-        now=clock.real,
-        virtual=not arguments.real_time,
-    )
+    lasts_s = min(playback.ends, arguments.seconds)
+    name = f"fake {arguments.fake}"
+    return Opened(skin, lasts_s, name, playback, virtual=not arguments.real_time)
 
 
 @dataclass(frozen=True)
@@ -206,6 +177,8 @@ class Reading:
     ) -> None:
         """Show a frame on the page, if there is one."""
         if self.page is not None:
+            from edge.commands.texts import event_text  # most runs have no page
+
             for fault in faults:
                 self.page.notice(event_text(fault).strip())
             self.page.push(frame, events, self.loop.schedule)
@@ -256,67 +229,22 @@ def reading(
         opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
+        joints: JointSource | None = opened.playback if opened.dof else None
         if arguments.joints is not None:
-            angles = _joints(arguments.joints, arm, dof, opened)
-            joints: JointSource | None = stack.enter_context(angles)
-        else:
-            joints = _own_joints(opened, model if needs_joints else None)
+            from edge.touch.joint_stream import open_joints  # few arms send angles
+
+            names = None if arm is None else arm.names
+            now = opened.skin.clock.real
+            angles = open_joints(arguments.joints, dof, names, now)
+            joints = stack.enter_context(angles)
+        elif model is not None and needs_joints:
+            model.require_joints(opened.dof, opened.source)
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
-            live = stack.enter_context(_page(arguments.web, opened, page))
+            from edge.tools.page import open_page  # few runs have a page
+
+            layout = opened.skin.layout
+            shown = open_page(arguments.web, layout, title=opened.source, **page)
+            live = stack.enter_context(shown)
         yield Reading(opened, loop, stop, live, Output.of(arguments))
-
-
-def _own_joints(opened: Opened, model: Model | None) -> JointSource | None:
-    """The joint angles of a skin that no other program's are given for.
-
-    Raises:
-        InputError: the model needs others.
-    """
-    if model is not None:
-        model.require_joints(opened.dof, opened.source)
-    return opened.playback if opened.dof else None
-
-
-@contextmanager
-def _joints(
-    address: str, arm: Chain | None, dof: int | None, opened: Opened
-) -> Iterator[JointSource]:
-    """The joint angles that another program sends."""
-    from edge.touch.joint_stream import Joints, joint_source
-
-    if dof is None:
-        raise InputError("the model uses no joint angles; leave --joints out")
-    names = None if arm is None else arm.names
-    with joint_source(address) as source:
-        joints = Joints(source, dof=dof, names=names, now=opened.now)
-        try:
-            yield joints
-        finally:
-            joints.close()
-
-
-def _way_to(link: str) -> str:
-    """A sentence with the page's link; the journal, which others read, gets a file's
-    name instead."""
-    if "JOURNAL_STREAM" not in os.environ:
-        return f"open {link} in a browser"
-    folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
-    descriptor, name = tempfile.mkstemp(prefix="edge-classify-link-", dir=folder)
-    with os.fdopen(descriptor, "w") as file:  # which its owner alone can read
-        file.write(f"{link}\n")
-    return f"the page's link is in {name}"
-
-
-@contextmanager
-def _page(address: str, opened: Opened, options: dict[str, Any]) -> Iterator[Page]:
-    """The live page of a skin."""
-    from edge.tools.page import Page
-
-    page = Page(address, opened.skin.layout, title=opened.source, **options)
-    try:
-        LOG.info(_way_to(page.server.link))
-        yield page
-    finally:
-        page.server.close()

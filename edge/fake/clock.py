@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 import time
 
+TIME_ROUNDING_S = 5e-7
+"""Rounding may put the time of a sample below the sample's true time, by less than
+this."""
 LATE_S = 0.005
 """A paced clock that lags real time by more than this is put forward."""
 

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from edge.bus.protocol import Message, wire_bits
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
-from edge.clock import TIME_ROUNDING_S
 from edge.errors import InputError
 from edge.fake.bus import FakeBus
 from edge.fake.chip import FakeChip, Sense
-from edge.fake.clock import VirtualClock
+from edge.fake.clock import TIME_ROUNDING_S, PacedClock, VirtualClock
 from edge.fake.tca9548a import FakeTCA9548A
 from edge.interrupt import delayed
-from edge.recording import Recording
+from edge.recording import Recording, load
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, TaxelCalibration
 from edge.skin.skin import Skin
@@ -229,13 +228,12 @@ def fake_skin(
     clock: VirtualClock | None = None,
     timed: bool = False,
     noise_counts: float = 0.0,
-    touch_counts: int | None = None,
 ) -> Skin:
     """A started skin over fake buses; see `fake_buses`."""
     clock = clock or VirtualClock()
     file = calibrated(file, noise_counts)
     buses = fake_buses(file, scene, clock, timed=timed, noise_counts=noise_counts)
-    skin = Skin(file, buses, clock=clock, touch_counts=touch_counts)
+    skin = Skin(file, buses, clock=clock)
     skin.start()
     return skin
 
@@ -273,6 +271,38 @@ def play(
     skin = fake_skin(file, scene, **options)
     scene.start = skin.clock.now()
     return skin, scene
+
+
+def play_file(
+    path: str,
+    file: SkinFile | None,
+    *,
+    joint_names: Sequence[str] | None = None,
+    noise_counts: float = 0.0,
+    loop: bool = False,
+    real_time: bool = False,
+) -> tuple[Skin, Playback]:
+    """A fake skin that feels the recording in a file.
+
+    Args:
+        path: of the recording.
+        file: the skin's; None chooses chips that suit the recording, without noise.
+        joint_names: the joints whose angles are wanted, in their order.
+        noise_counts, loop: see `fake_buses` and `Playback`.
+        real_time: play it at its original speed.
+
+    Raises:
+        InputError: the recording cannot be used, or its shape is not the skin's.
+    """
+    recording = load(path)
+    if joint_names is not None:
+        recording = recording.for_joints(joint_names, path)
+    if file is None:
+        # Nobody calibrates, and the chips serve the recording as it is.
+        file = skin_file(recording.layout)
+        noise_counts = 0.0
+    clock = PacedClock() if real_time else VirtualClock()
+    return play(file, recording, loop=loop, clock=clock, noise_counts=noise_counts)
 
 
 def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:

@@ -61,7 +61,6 @@ class Skin:
         buses: Sequence[Adapter],
         *,
         clock: Clock | None = None,
-        touch_counts: int | None = None,
     ) -> None:
         """Take open buses; `start` then sets the chips up.
 
@@ -70,16 +69,13 @@ class Skin:
             buses: one for each of the file's buses, in their order; `close` closes
                 them.
             clock: of the loop and the buses; the kernel's where None.
-            touch_counts: a taxel above this is touched, and the baseline is frozen. The
-                file's threshold applies where this is None or higher.
         """
         self.file = file
         self.layout = file.layout
         self.clock: Clock = clock or SystemClock()
         self.period_s = 1.0 / file.reading.rate_hz
         self.touch_counts = file.layout.threshold_counts
-        if touch_counts is not None:
-            self.touch_counts = min(self.touch_counts, touch_counts)
+        """A taxel above this is touched, and the baseline is frozen."""
         self.oldest_s = self.period_s * OLDEST_FRAMES
         """Maximum age of a valid value, in seconds."""
         self._decoder = Decoder(file)
@@ -119,11 +115,7 @@ class Skin:
 
     @classmethod
     def open(
-        cls,
-        file: SkinFile | str | os.PathLike[str],
-        *,
-        calibrated: bool = True,
-        touch_counts: int | None = None,
+        cls, file: SkinFile | str | os.PathLike[str], *, calibrated: bool = True
     ) -> Self:
         """Open the buses of a skin file and set their chips up.
 
@@ -131,7 +123,6 @@ class Skin:
             file: the skin file or its path.
             calibrated: refuse a file without calibration: its counts would mean
                 nothing.
-            touch_counts: as for `Skin`.
 
         Raises:
             InputError: the file cannot be used, or has no calibration.
@@ -150,7 +141,7 @@ class Skin:
             for spec in file.buses:
                 bus = _open(spec, file.reading.timeout_s)
                 buses.append(opened.enter_context(closing(bus)))
-            skin = cls(file, buses, touch_counts=touch_counts)
+            skin = cls(file, buses)
             opened.callback(skin.close)
             skin.start()
             opened.pop_all()

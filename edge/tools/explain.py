@@ -11,7 +11,8 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from edge.commands.output import Output, counted, wrapped
+from edge.commands.output import Output, counted
+from edge.commands.texts import wrapped
 from edge.model.info import ModelInfo
 from edge.model.model import Model
 from edge.recording import Recording, load

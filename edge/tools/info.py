@@ -10,7 +10,8 @@ import argparse
 import json
 from typing import Any
 
-from edge.commands.output import Output, counted, wrapped
+from edge.commands.output import Output, counted
+from edge.commands.texts import wrapped
 from edge.model.info import ModelInfo
 from edge.model.metadata import to_json
 from edge.model.model import Model

@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from edge.commands.options import task_label
 from edge.commands.output import LOG, Output, counted
 from edge.config import parse_json
 from edge.errors import InputError
@@ -25,6 +24,7 @@ from edge.recording import Recording, load
 from edge.saving import find, save
 from edge.tools import review
 from edge.tools.slips import counts_text, slips
+from edge.tools.trial_options import task_label
 from edge.writing import remove_leftovers, write_whole
 
 JOURNAL = ".edge-classify-labels.json"

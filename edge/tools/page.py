@@ -1,9 +1,13 @@
 """The live page of a skin: its pictures, and the actions that a person can take
 there."""
 
+import logging
 import math
+import os
+import tempfile
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +26,7 @@ from edge.touch.track import ContactTracker
 
 Json = dict[str, Any]
 """A JSON object."""
+LOG = logging.getLogger(__name__)
 PICTURE_S = 0.1
 """Between two pictures."""
 LAST_TRIALS = 200
@@ -299,3 +304,26 @@ def _labels(action: Json) -> dict[str, str]:
                 f"{text!r} is no label; give 1 to {LONGEST_LABEL} printable characters"
             )
     return {task.strip(): label.strip() for task, label in labels.items()}
+
+
+@contextmanager
+def open_page(address: str, layout: SkinLayout, **options: Any) -> Iterator[Page]:
+    """A page with its link on stderr, closed at the end of the block; see `Page`."""
+    page = Page(address, layout, **options)
+    try:
+        LOG.info(_way_to(page.server.link))
+        yield page
+    finally:
+        page.server.close()
+
+
+def _way_to(link: str) -> str:
+    """A sentence with the page's link; the journal, which others read, gets a file's
+    name instead."""
+    if "JOURNAL_STREAM" not in os.environ:
+        return f"open {link} in a browser"
+    folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
+    descriptor, name = tempfile.mkstemp(prefix="edge-classify-link-", dir=folder)
+    with os.fdopen(descriptor, "w") as file:  # which its owner alone can read
+        file.write(f"{link}\n")
+    return f"the page's link is in {name}"

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.commands.options import add_arm, add_reading, open_arm, task_label, within
+from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
 from edge.errors import InputError
@@ -35,6 +35,7 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile, frame_rate
 from edge.skin.skin import Skin
 from edge.tools import terminal
+from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame

@@ -202,6 +202,24 @@ class Joints:
 
 
 @contextmanager
+def open_joints(
+    option: str, dof: int | None, names: Sequence[str] | None, now: Callable[[], float]
+) -> Iterator[Joints]:
+    """The joint angles that `--joints` names, closed at the end of the block.
+
+    Raises:
+        InputError: nothing needs them, or as `joint_source`.
+    """
+    if dof is None:
+        raise InputError("the model uses no joint angles; leave --joints out")
+    with (
+        joint_source(option) as source,
+        closing(Joints(source, dof=dof, names=names, now=now)) as joints,
+    ):
+        yield joints
+
+
+@contextmanager
 def joint_source(option: str) -> Iterator[Source]:
     """The source that `--joints` names, closed at the end of the block.
 

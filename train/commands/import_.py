@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edge.commands.options import add_arm, open_arm
 from edge.errors import InputError, printable
 from edge.recording import Recording
 from edge.saving import save
+from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
 from train.importers import names
 from train.progress import bar, say

@@ -6,7 +6,8 @@ import pytest
 
 from edge import demo
 from edge.cli import main
-from edge.commands.output import Output, event_text
+from edge.commands.output import Output
+from edge.commands.texts import event_text
 from edge.model.model import Model
 
 TOUCH = str(demo.FOLDER / "pillow-movable.npz")
