@@ -9,25 +9,31 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import OutOfRange
 from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
-from edge.policy import OUT_OF_RANGE, FullWindow, Policy, Question, flags_of
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import frame_doubts
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
+    from edge.early import Policy
     from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
 
-LATE = "late"
-"""Flag of a decision on a contact that began before it could be seen."""
+AS_TRAINED = "as_trained"
+"""Flag of a decision at distance 0 from a training trial: the two have the same
+coordinates, which are all that the model compares. Nearly always the touch is that
+trial, replayed. Features that were constant in training, or have no weight in the
+projection, may differ."""
+OUT_OF_RANGE = "out_of_range"
+"""Flag of a decision on features that lie far outside those of the training trials. The
+model cuts them off before it compares them; features that it cannot scale at all get no
+label."""
 ASKED_A_SECOND = 200.0
 """Questions to the model about several contacts. Each takes one to two milliseconds on
 a workstation; 16 contacts with a decision point every tenth of a second need 160."""
@@ -140,7 +146,12 @@ class Classifier:
         self.novelty_rate = novelty_rate
         self._max_contacts = max_contacts
         self._motion_on_skin = motion_on_skin
-        self._policies = self._policy_of_each_task()
+        self._policies: Mapping[str, Policy] = {}
+        """Of each task, with an error rate."""
+        if error is not None:
+            from edge.early import policies  # few programs decide early
+
+            self._policies = policies(model, error)
         self.tracker = model.info.tracker(
             layout or model.info.layout,
             max_contacts=max_contacts,
@@ -158,13 +169,6 @@ class Classifier:
         """When that mask was last the tracker's."""
         self._missing_taxels = False
         self._strongest = 0
-
-    def _policy_of_each_task(self) -> Mapping[str, Policy]:
-        if self.error is None:
-            return dict.fromkeys(self.model.info.tasks, FullWindow(self.model.info))
-        from edge.early import policies  # few programs decide early
-
-        return policies(self.model, self.error)
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -361,60 +365,46 @@ class Classifier:
         self, pending: Pending, began: float, *, short: bool = False
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
-        window_s = self.model.decision_points_s[pending.decision_point]
+        point = pending.decision_point
+        window_s = self.model.decision_points_s[point]
         series = pending.contact.series()
-        doubts = self._doubts(series, window_s)
-        blank = self._blank(pending, window_s, {"short": short, **doubts})
+        blank = self._blank(pending, series, window_s, short)
         try:
             vector = self.model.info.vector(series, window_s)
-            answers = self._answers_to(vector, pending, blank)
+            decisions = self.model.decide(vector, None if self.error is None else point)
         except OutOfRange:
             blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
             answers = [replace(blank, task=task) for task in pending.tasks]
+        else:
+            answers = self._answers(pending, blank, decisions)
+            last = point == len(self.model.decision_points_s) - 1
+            if last and any(UNKNOWN in answer.flags for answer in answers):
+                phrase = self.model.info.unusual(vector)
+                answers = [replace(answer, unusual=phrase) for answer in answers]
         pending.decision_point += 1
         for answer in answers:
             pending.tasks.remove(answer.task)
         latency_ms = _milliseconds_since(began)
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
-    def _answers_to(
-        self, vector: NDArray[np.float64], pending: Pending, blank: Decided
-    ) -> list[Decided]:
-        """The answers of the tasks that need not wait any longer.
-
-        Raises:
-            OutOfRange: the features cannot be scaled.
-        """
-        point = pending.decision_point
-        decisions = self.model.decide(vector, None if self.error is None else point)
-        answers = self._answers(pending, blank, decisions)
-        last = point == len(self.model.decision_points_s) - 1
-        if last and any(UNKNOWN in answer.flags for answer in answers):
-            phrase = self.model.info.unusual(vector)
-            answers = [replace(answer, unusual=phrase) for answer in answers]
-        return answers
-
-    def _doubts(self, series: FeatureSeries, window_s: float) -> dict[str, bool]:
-        """{flag: whether it holds} for the frames of a contact."""
+    def _blank(
+        self, pending: Pending, series: FeatureSeries, window_s: float, short: bool
+    ) -> Decided:
+        """An answer about a contact, with the doubts of its frames, without task and
+        label."""
+        contact = pending.contact
         info = self.model.info
         limits = () if info.chain is None else info.chain.limits
-        doubts = frame_doubts(series, window_s, info.several, limits)
-        if self._max_contacts > 1:
-            del doubts["several"]
-        return doubts
-
-    def _blank(
-        self, pending: Pending, window_s: float, doubts: Mapping[str, bool]
-    ) -> Decided:
-        """An answer about a contact without task and label."""
-        contact = pending.contact
         doubts = {
-            **doubts,
+            "short": short,
+            **frame_doubts(series, window_s, info.several, limits),
             "missing_taxels": contact.missing_taxels,
             "missing_pose": contact.missing_pose,
-            LATE: contact.late,
-            "skin_motion": contact.chain is None and self.model.info.chain is not None,
+            "late": contact.late,
+            "skin_motion": contact.chain is None and info.chain is not None,
         }
+        if self._max_contacts > 1:
+            del doubts["several"]
         return Decided(
             task="",
             label=None,
@@ -440,29 +430,49 @@ class Classifier:
         self, pending: Pending, blank: Decided, decisions: Mapping[str, Decision]
     ) -> list[Decided]:
         """The answers of the tasks that need not wait any longer."""
-        unknown = self._novelty(pending, decisions) <= self.novelty_rate
+        point = pending.decision_point
+        unknown = self._is_unknown(point, decisions)
         answers = []
         for task in pending.tasks:
-            question = Question(
-                replace(blank, task=task),
-                decisions[task],
-                unknown,
-                pending.decision_point,
-                pending.decided,
-            )
-            answer = self._policies[task].answer(question)
+            asked = replace(blank, task=task)
+            answer: Decided | None = self._answer(asked, decisions[task], unknown)
+            if answer is not None and self._policies:
+                answer = self._policies[task].answer(answer, point, pending.decided)
             if answer is not None:
                 pending.decided[task] = answer
                 answers.append(answer)
         return answers
 
-    def _novelty(self, pending: Pending, decisions: Mapping[str, Decision]) -> float:
-        """The smallest novelty rate at which the contact counts as unknown."""
+    def _answer(self, blank: Decided, decision: Decision, unknown: bool) -> Decided:
+        """The model's answer; its confidence is in millionths."""
+        confidence = decision.confidence
+        doubts = {
+            AS_TRAINED: decision.distances[0] == 0.0,
+            OUT_OF_RANGE: decision.out_of_range,
+            UNKNOWN: unknown,
+            "tie": decision.tie and self.error is None,
+        }
+        return replace(
+            blank,
+            label=decision.label,
+            confidence=None if confidence is None else round(confidence, 6),
+            flags=(*blank.flags, *flags_of(doubts)),
+            nearest=tuple(map(self.model.info.trial, decision.neighbours.tolist())),
+            decision=decision,
+        )
+
+    def _is_unknown(self, point: int, decisions: Mapping[str, Decision]) -> bool:
+        """Whether the contact is unlike everything in training."""
         novelty = self.model.info.novelty
         if novelty is None:
-            return 1.0
+            return False
         score = decisions[novelty.task].novelty
-        return novelty.rate(pending.decision_point, score)
+        return novelty.rate(point, score) <= self.novelty_rate
+
+
+def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
+    """The names of the doubts that hold."""
+    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def _milliseconds_since(began: float) -> float:

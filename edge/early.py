@@ -5,15 +5,15 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Protocol
 
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
 from edge.model.info import ModelInfo
-from edge.model.model import Model
+from edge.model.model import Decision, Model
 from edge.model.novelty import UNKNOWN, check_rate
 from edge.model.stopping import StoppingRule
-from edge.policy import Policy, Question, rounded
 
 LOG = logging.getLogger(__name__)
 
@@ -34,19 +34,35 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
     return policy_of
 
 
+class Policy(Protocol):
+    """When and how a task is decided."""
+
+    def answer(
+        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+    ) -> Decided | None:
+        """The answer at a decision point; None if the task goes on waiting.
+
+        Args:
+            asked: the model's answer.
+            point: index of the decision point.
+            decided: the answers to the contact's other tasks so far.
+        """
+
+
 class Uncertified:
     """Decide at the end of the window, as without an error rate, and say so."""
 
     def __init__(self, info: ModelInfo) -> None:
-        self._info = info
         self._full = len(info.decision_points_s) - 1
 
-    def answer(self, question: Question) -> Decided | None:
+    def answer(
+        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+    ) -> Decided | None:
         """The model's answer at the last decision point."""
-        if question.decision_point < self._full:
+        if point < self._full:
             return None
-        doubts = {"tie": question.decision.tie, "uncertified": True}
-        return question.answer(self._info, doubts)
+        tie = ("tie",) if _decision(asked).tie else ()
+        return replace(asked, flags=(*asked.flags, *tie, "uncertified"))
 
 
 class Early:
@@ -64,79 +80,78 @@ class Early:
             error: the error rate.
         """
         self._info = info
-        self._task = task
+        self._task = info.tasks[task]
         self._rule = rule
         self._error = error
         self._stopping = info.stopping[task]
-        self._full = len(info.decision_points_s) - 1
+        self._names_unknown = info.novelty is not None and info.novelty.task == task
 
-    def answer(self, question: Question) -> Decided | None:
+    def answer(
+        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+    ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
         An unknown contact waits for the full window.
         """
-        rule = self._rule
-        sure = self._sure(rule, question)
-        last = self._full if question.unknown else rule.last
-        if question.decision_point < last and (question.unknown or not sure):
+        unknown = UNKNOWN in asked.flags
+        sure = self._is_sure(asked, point)
+        last = len(self._info.decision_points_s) - 1 if unknown else self._rule.last
+        if point < last and (unknown or not sure):
             return None
-        return self._answered(question, question.decision.confidence, sure)
+        return self._answered(asked, point, sure)
 
-    def _sure(self, rule: StoppingRule, question: Question) -> bool:
-        decision = question.decision
-        if decision.label_distances is None or self._info.novelty is None:
-            raise InputError(f"the model gives no distances of {self._task}'s labels")
-        label = self._info.tasks[self._task].labels.index(decision.label)
-        excess = self._info.novelty.excess(question.decision_point, decision.novelty)
+    def _is_sure(self, asked: Decided, point: int) -> bool:
+        decision = _decision(asked)
+        novelty = self._info.novelty
+        if decision.label_distances is None or novelty is None:
+            raise InputError(f"the model gives no distances of {asked.task}'s labels")
+        label = self._task.labels.index(decision.label)
+        excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
-        return self._stopping.sure(rule, distances, label, excess)
+        return self._stopping.sure(self._rule, distances, label, excess)
 
-    def _answered(
-        self, question: Question, confidence: float | None, sure: bool
-    ) -> Decided:
+    def _answered(self, asked: Decided, point: int, sure: bool) -> Decided:
         """The answer of the rule."""
-        nameless = question.unknown and self._names_unknown()
-        forced = not self._rule.fixed and not sure
-        answer = question.answer(self._info, {"unsure": forced and not nameless})
-        if nameless:
-            answer = replace(answer, label=UNKNOWN)
-            confidence = 1.0 - self._novelty(question)
-        answer = replace(answer, confidence=rounded(confidence))
+        novelty = self._info.novelty
+        if UNKNOWN in asked.flags and self._names_unknown and novelty is not None:
+            rate = novelty.rate(point, _decision(asked).novelty)
+            asked = replace(asked, label=UNKNOWN, confidence=round(1.0 - rate, 6))
+        elif not sure and not self._rule.fixed:
+            asked = replace(asked, flags=(*asked.flags, "unsure"))
         stopped_by = "confidence" if sure else "window"
-        return replace(answer, error=self._error, stopped_by=stopped_by)
-
-    def _names_unknown(self) -> bool:
-        novelty = self._info.novelty
-        return novelty is not None and novelty.task == self._task
-
-    def _novelty(self, question: Question) -> float:
-        """The smallest novelty rate at which the contact counts as unknown."""
-        novelty = self._info.novelty
-        if novelty is None:
-            return 1.0
-        return novelty.rate(question.decision_point, question.decision.novelty)
+        return replace(asked, error=self._error, stopped_by=stopped_by)
 
 
 class Product(Early):
     """Decide when both factors are, by their labels."""
 
-    def answer(self, question: Question) -> Decided | None:
+    def answer(
+        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+    ) -> Decided | None:
         """The answer once both factors have theirs."""
-        task = self._info.tasks[self._task]
-        if not question.decided.keys() >= task.factors.keys():
+        factors = self._task.factors
+        if not decided.keys() >= factors.keys():
             return None
         indices = {}
         confidence = 1.0
         sure = True
-        for factor in task.factors:
-            decided = question.decided[factor]
+        for factor in factors:
+            answer = decided[factor]
             labels = self._info.tasks[factor].labels
-            indices[factor] = labels.index(str(decided.label))
-            confidence *= decided.confidence or 0.0
-            sure = sure and decided.stopped_by == "confidence"
-        label = task.labels[product_label(task.factors, indices)]
-        decision = question.decision._replace(label=label)
-        return self._answered(replace(question, decision=decision), confidence, sure)
+            indices[factor] = labels.index(str(answer.label))
+            confidence *= answer.confidence or 0.0
+            sure = sure and answer.stopped_by == "confidence"
+        label = self._task.labels[product_label(factors, indices)]
+        decision = _decision(asked)._replace(label=label)
+        confidence = round(confidence, 6)
+        asked = replace(asked, label=label, confidence=confidence, decision=decision)
+        return self._answered(asked, point, sure)
+
+
+def _decision(asked: Decided) -> Decision:
+    """The model's own answer, which is known of every task that is asked."""
+    assert asked.decision is not None
+    return asked.decision
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:

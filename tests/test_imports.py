@@ -75,7 +75,7 @@ def test_nothing_pickles(package):
 PACKAGES = ["edge", "train", "export"]
 FRAME = [
     f"edge.{s}"
-    for s in "bus chips skin touch model policy classifier output commands tools".split()
+    for s in "bus chips skin touch model classifier output commands tools".split()
 ]
 """The way of one frame through `edge/`."""
 TOUCH = [

@@ -30,7 +30,7 @@ def test_a_frame_passes_the_rooms_in_one_direction(ways):
         "edge/touch/contact.py:Contact.add",
         "edge/touch/features.py:feature_vector",
         "edge/model/engines.py:OnnxRuntime.run",
-        "edge/policy.py:FullWindow.answer",
+        "edge/classifier.py:Classifier._answer",
     ]
     places = [steps.index(step) for step in way]
     assert places == sorted(places)

@@ -13,14 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from edge.classifier import Classifier, suited
+from edge.classifier import AS_TRAINED, Classifier, suited
 from edge.commands.options import add_engine, add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
 from edge.model.info import Task
 from edge.model.model import Model
 from edge.model.verify import first_series
-from edge.policy import AS_TRAINED
 from edge.recording import Recording, load
 from edge.saving import find
 from edge.statistics import wilson
