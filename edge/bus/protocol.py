@@ -166,26 +166,19 @@ def read(address: int, into: NDArray[np.uint8] | int) -> Message:
     return Message(address, buffer, read=True)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Transfer:
-    """Messages of one call, prepared once and sent any number of times."""
+    """Messages of one call, prepared once and sent any number of times.
 
-    messages: tuple[Message, ...]
-    handle: Any = None
-
-    @property
-    def buffer(self) -> NDArray[np.uint8]:
-        """The last message's bytes: those read, where the last message is a read."""
-        return self.messages[-1].buffer
-
-
-def wire_bits(messages: Sequence[Message]) -> int:
-    """Bits on the wire: 9 a byte, 1 each for START, repeated START and STOP.
-
-    >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
-    255
+    Attributes:
+        messages: in their order.
+        handle: the bus's own form of them.
+        buffer: the last message's bytes: those read, where the last message is a read.
     """
-    return 1 + sum(1 + 9 * (1 + len(m.buffer)) for m in messages)
+
+    def __init__(self, messages: tuple[Message, ...], handle: Any = None) -> None:
+        self.messages = messages
+        self.handle = handle
+        self.buffer = messages[-1].buffer
 
 
 class Bus(Protocol):

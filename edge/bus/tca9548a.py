@@ -18,17 +18,12 @@ from edge.bus.protocol import (
     Transfer,
     bus_error,
     read,
-    wire_bits,
     write,
 )
 
 ADDRESSES = range(0x70, 0x78)
 CHANNELS = 8
 LEAVE_ATTEMPTS = 4
-SELECT_BITS = wire_bits([write(0x70, b"\0")])
-"""Bits on the wire of selecting a channel."""
-VERIFY_BITS = wire_bits([read(0x70, 1)])
-"""Bits on the wire of reading the control byte back."""
 
 
 class TCA9548A:
@@ -106,12 +101,9 @@ class TCA9548A:
         """
         if not self._connected():
             return False
-        closed = True
-        for mux in self._beside:
-            # Every one is looked at, so that every open one will be closed.
-            if mux is not self and not mux.closed():
-                closed = False
-        return closed
+        # Every one is looked at, so that every open one will be closed.
+        closed = [mux.closed() for mux in self._beside if mux is not self]
+        return all(closed)
 
     def _connected(self) -> bool:
         """Whether this mux has the channel selected last, and no other."""

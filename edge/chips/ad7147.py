@@ -6,7 +6,6 @@ Linux's driver ad714x.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +86,7 @@ class AD7147(Chip):
     name = "ad7147"
     addresses = range(0x2C, 0x30)
     stages = STAGES
-    pointer_bytes = 2
+    frame_pointer = words((RESULTS,))
 
     def __init__(
         self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * STAGES
@@ -103,7 +102,7 @@ class AD7147(Chip):
             WrongChip: the identity register does not read 0x147x.
             BusError: the chip does not answer.
         """
-        super().__init__(bus, address, words((RESULTS,)), into)
+        super().__init__(bus, address, into=into)
         self._checks = []
         for register, values in CHECK_ROWS:
             pointer = write(address, words((register,)))
@@ -115,11 +114,6 @@ class AD7147(Chip):
             raise self.wrong(
                 f"not an AD7147: its identity reads {identity:#06x}, not 0x147x"
             )
-
-    @classmethod
-    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
-        """The driver of a skin's chip, which reads frames into these bytes."""
-        return cls(bus, spec.address, into=into)
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:

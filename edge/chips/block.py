@@ -83,6 +83,7 @@ class Block(Chip):
     name = "block"
     options: ClassVar[Mapping[str, Option]] = {"bits": Option(16, BITS)}
     unchanged_frames = UNCHANGED_FRAMES
+    frame_pointer = FRAME
     serial = True
     rests_at_zero = True
 
@@ -109,7 +110,7 @@ class Block(Chip):
             BusError: it does not answer.
         """
         size = 4 + data_bytes(self.values(taxels), bits)
-        super().__init__(bus, address, FRAME, size if into is None else into)
+        super().__init__(bus, address, into=size if into is None else into)
         self._expected = self.register(taxels, bits)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
         served = fetch(bus, address, IDENTITY, 10)

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.protocol import Bus, BusError, read, wire_bits, write
+from edge.bus.protocol import Bus, BusError, read, write
 
 ADDRESSES = range(0x08, 0x78)
 """7-bit addresses that are not reserved (I2C specification, section 3.1.12)."""
@@ -88,7 +88,7 @@ class Chip(ABC):
         addresses: addresses that the chip can have.
         stages: number of its stages; None where the skin file decides, up to
             `MOST_TAXELS`.
-        pointer_bytes: bytes of the register pointer.
+        frame_pointer: pointer of the register where the taxels begin.
         options: keys of a skin file that only this kind has.
         unchanged_frames: readings with the same bytes after which the chip hangs for
             certain; None where bytes at rest may stay the same.
@@ -103,23 +103,24 @@ class Chip(ABC):
     name: ClassVar[str]
     addresses: ClassVar[range] = ADDRESSES
     stages: ClassVar[int | None] = None
-    pointer_bytes: ClassVar[int] = 1
+    frame_pointer: ClassVar[bytes]
     options: ClassVar[Mapping[str, Option]] = {}
     unchanged_frames: ClassVar[int | None] = None
     serial: ClassVar[bool] = False
     rests_at_zero: ClassVar[bool] = False
 
     def __init__(
-        self, bus: Bus, address: int, pointer: bytes, into: NDArray[np.uint8] | int
+        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int
     ) -> None:
         self.bus = bus
         self.address = address
-        self.frame = bus.prepare(write(address, pointer), read(address, into))
+        pointer = write(address, self.frame_pointer)
+        self.frame = bus.prepare(pointer, read(address, into))
 
     @classmethod
-    @abstractmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
         """The driver of a skin's chip, which reads frames into these bytes."""
+        return cls(bus, spec.address, into=into)
 
     @staticmethod
     @abstractmethod
@@ -212,9 +213,3 @@ class ChipSpec:
         """The traits of the chip."""
         options = {name: self.option(name) for name in self.kind.options}
         return self.kind.traits(len(self.taxels), options)
-
-    @cached_property
-    def frame_bits(self) -> int:
-        """Bits on the wire of one reading, `[write pointer][read frame]`."""
-        pointer = write(self.address, bytes(self.kind.pointer_bytes))
-        return wire_bits([pointer, read(self.address, self.traits.frame_bytes)])

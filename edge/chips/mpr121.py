@@ -6,7 +6,6 @@ filter).
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +51,7 @@ class MPR121(Chip):
     name = "mpr121"
     addresses = range(0x5A, 0x5E)
     stages = ELECTRODES
+    frame_pointer = bytes([RESULTS])
 
     def __init__(
         self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * ELECTRODES
@@ -70,18 +70,13 @@ class MPR121(Chip):
             WrongChip: CONFIG2 holds something else.
             BusError: the chip does not answer.
         """
-        super().__init__(bus, address, bytes([RESULTS]), into)
+        super().__init__(bus, address, into=into)
         self._state = bus.prepare(write(address, [CONFIG2]), read(address, 2))
         config = fetch(bus, address, bytes([CONFIG2]), 1)[0]
         if config not in (RESET_CONFIG2, SET_CONFIG2):
             raise self.wrong(
                 f"not an MPR121: register 0x5d reads {config:#04x}, not 0x24 or 0x20"
             )
-
-    @classmethod
-    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
-        """The driver of a skin's chip, which reads frames into these bytes."""
-        return cls(bus, spec.address, into=into)
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:

@@ -17,8 +17,7 @@ from edge.commands.options import add_skin, within
 from edge.commands.output import LOG, Output, counted
 from edge.commands.source import open_skin
 from edge.errors import InputError
-from edge.skin.baseline import deaf_taxels
-from edge.skin.calibration import save_calibration
+from edge.skin.calibration import deaf_taxels, save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin

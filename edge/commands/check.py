@@ -16,7 +16,7 @@ from typing import Self
 from edge.commands.options import within
 from edge.commands.output import Output, counted
 from edge.model.model import Model
-from edge.skin.baseline import deaf_taxels
+from edge.skin.calibration import deaf_taxels
 from edge.skin.decoder import NEVER_STUCK, stuck_limits, taxel_map
 from edge.skin.file import SkinFile, frame_rate, load
 from edge.touch.layout import differences

@@ -6,13 +6,23 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from edge.bus.protocol import Message, Transfer, bus_error, wire_bits
+from edge.bus.protocol import Message, Transfer, bus_error
 from edge.fake.chip import FakeChip
 from edge.fake.clock import Hand, VirtualClock
 from edge.fake.tca9548a import FakeTCA9548A
 
 NACK_BITS = 11
 """START, the address that nobody acknowledges, and STOP."""
+
+
+def wire_bits(messages: Sequence[Message]) -> int:
+    """Bits on the wire: 9 a byte, 1 each for START, repeated START and STOP.
+
+    >>> from edge.bus.protocol import read, write
+    >>> wire_bits([write(0x2C, [0x00, 0x0B]), read(0x2C, 24)])
+    255
+    """
+    return 1 + sum(1 + 9 * (1 + len(m.buffer)) for m in messages)
 
 
 class FakeBus:

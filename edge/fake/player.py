@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.bus.protocol import Message, wire_bits
+from edge.bus.protocol import Message
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
 from edge.errors import InputError
-from edge.fake.bus import FakeBus
+from edge.fake.bus import FakeBus, wire_bits
 from edge.fake.chip import FakeChip, Sense
 from edge.fake.clock import TIME_ROUNDING_S, PacedClock, VirtualClock
 from edge.fake.tca9548a import FakeTCA9548A

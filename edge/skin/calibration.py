@@ -5,9 +5,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from edge.errors import InputError
 from edge.files import read_text
-from edge.skin.file import TaxelCalibration, parse
+from edge.skin.decoder import dead_band
+from edge.skin.file import SkinFile, TaxelCalibration, parse
 from edge.writing import write_whole
 
 CALIBRATION = re.compile(
@@ -81,3 +84,13 @@ def save_calibration(
         with write_whole(name) as file:
             file.write(contents.encode())
     return backup
+
+
+def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
+    """Working taxels (row, col) whose dead band reaches the contact threshold."""
+    threshold = skin.layout.threshold_counts
+    if not threshold:
+        return []
+    band = dead_band(skin).reshape(skin.layout.shape)
+    deaf = np.argwhere((band >= threshold) & skin.layout.alive)
+    return [(row, col) for row, col in deaf.tolist()]

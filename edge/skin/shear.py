@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from edge.chips.chip import UNUSED
 from edge.chips.three_axes import ZERO, axes
-from edge.skin.baseline import Baseline, dead_band_of
+from edge.skin.decoder import Baseline, dead_band_of
 from edge.skin.file import SkinFile, TaxelCalibration
 
 LARGEST = 32767

@@ -15,9 +15,8 @@ from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
-from edge.skin.baseline import Baseline, dead_band
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
-from edge.skin.decoder import Decoder
+from edge.skin.decoder import Baseline, Decoder, dead_band
 from edge.skin.file import SkinFile, load
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame

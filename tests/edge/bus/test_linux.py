@@ -10,8 +10,9 @@ import pytest
 
 from edge.bus import linux, protocol
 from edge.bus.linux import LinuxBus
-from edge.bus.protocol import bus_error, read, wire_bits, write
+from edge.bus.protocol import bus_error, read, write
 from edge.errors import EdgeError
+from edge.fake.bus import wire_bits
 
 
 @pytest.mark.parametrize(

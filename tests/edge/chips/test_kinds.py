@@ -59,14 +59,12 @@ class Toy(Chip):
     stages = 4
     options: ClassVar = {"speed": Option(1, (1, 2))}
 
-    def __init__(self, bus, address, into):
-        super().__init__(bus, address, b"\x10", into)
+    frame_pointer = b"\x10"
+
+    def __init__(self, bus, address, *, into):
+        super().__init__(bus, address, into=into)
         if fetch(bus, address, b"\x00", 1) != b"\x70":
             raise self.wrong("not a toy")
-
-    @classmethod
-    def of(cls, bus, spec, into):
-        return cls(bus, spec.address, into)
 
     @staticmethod
     def traits(taxels, options):

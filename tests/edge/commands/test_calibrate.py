@@ -19,7 +19,7 @@ from edge.commands.calibrate import (
 )
 from edge.commands.options import NOISE_COUNTS
 from edge.skin import file as skinfile
-from edge.skin.baseline import dead_band
+from edge.skin.decoder import dead_band
 
 
 def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():

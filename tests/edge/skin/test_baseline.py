@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from edge.skin.baseline import Baseline
+from edge.skin.decoder import Baseline
 
 EVERY = np.ones(3, dtype=bool)
 

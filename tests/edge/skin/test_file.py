@@ -9,12 +9,12 @@ import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
-from edge.skin.baseline import dead_band
 from edge.skin.calibration import (
     calibration_text,
     save_calibration,
     with_calibration,
 )
+from edge.skin.decoder import dead_band
 from edge.skin.file import TaxelCalibration
 from tests.edge.skin.small import SMALL, mistake
 
