@@ -17,7 +17,7 @@ from edge.commands.options import within
 from edge.commands.output import Output, counted
 from edge.model.model import Model
 from edge.skin.calibration import deaf_taxels
-from edge.skin.decoder import NEVER_STUCK, stuck_limits, taxel_map
+from edge.skin.decoder import NEVER_STUCK, stuck_limits
 from edge.skin.file import SkinFile, frame_rate, load
 from edge.touch.layout import differences
 
@@ -96,7 +96,7 @@ def remarks(file: SkinFile) -> Iterator[str]:
     if file.calibration is None:
         yield f"not calibrated yet: run `edge-classify calibrate --skin {file.path}`"
         return
-    hidden = int((stuck_limits(file, taxel_map(file)) == NEVER_STUCK).sum())
+    hidden = int((stuck_limits(file) == NEVER_STUCK).sum())
     if hidden:
         yield (
             f"{counted(hidden, 'chip')} could freeze unseen: their noise is hidden by "

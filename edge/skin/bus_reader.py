@@ -153,7 +153,7 @@ class BusReader:
         self,
         bus: Adapter,
         spec: BusSpec,
-        rows: Sequence[NDArray[np.uint8]],
+        rows: Iterator[NDArray[np.uint8]],
         reading: Reading,
     ) -> None:
         """Take the bus over; nothing is sent yet.
@@ -161,7 +161,7 @@ class BusReader:
         Args:
             bus: an open bus.
             spec: its chips.
-            rows: for each chip the buffer for its bytes.
+            rows: gives each chip the buffer for its bytes.
             reading: `verify_mux` and `recheck_frames` apply.
         """
         self.bus = bus

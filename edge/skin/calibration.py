@@ -91,6 +91,7 @@ def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
     threshold = skin.layout.threshold_counts
     if not threshold:
         return []
-    band = dead_band(skin).reshape(skin.layout.shape)
+    noise = 0.0 if skin.calibration is None else skin.calibration.noise
+    band = dead_band(skin.signal, noise)
     deaf = np.argwhere((band >= threshold) & skin.layout.alive)
     return [(row, col) for row, col in deaf.tolist()]

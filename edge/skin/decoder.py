@@ -19,7 +19,6 @@ LOG_CHANCE = -27.6
 it counts as stuck."""
 COARSE = 0.4
 """Variance in squared counts below which a reading takes two or three whole numbers."""
-
 SCALE_BITS = 12
 """The baseline is kept in 1/4096 counts, so that a slow drift is not lost to
 rounding."""
@@ -37,64 +36,45 @@ class TaxelMap:
         stage: (taxels,) index of its stage among the stages of all chips.
         chip: (taxels,) index of its chip.
         sign: (taxels,) 1 where a touch raises the raw value, -1 where it lowers it.
-        highest: (taxels,) the largest raw value that is not saturated.
+        lowest: (taxels,) the smallest raw value that a touch can reach.
+        span: (taxels,) from there to the largest.
         served: (taxels,) which have a chip and are not dead.
     """
 
     stage: NDArray[np.intp]
     chip: NDArray[np.intp]
     sign: NDArray[np.int32]
-    highest: NDArray[np.int32]
+    lowest: NDArray[np.uint16]
+    span: NDArray[np.uint16]
     served: NDArray[np.bool_]
 
 
 def taxel_map(file: SkinFile) -> TaxelMap:
-    """The map of a skin's taxels."""
+    """The map of a skin's taxels; its calibration bounds their values."""
+    chips = file.chips
     taxels = file.layout.rows * file.layout.cols
-    stages = sum(len(chip.taxels) for chip in file.chips)
-    stage_of = np.full(taxels, stages, dtype=np.intp)
-    chip_of = np.full(taxels, len(file.chips), dtype=np.intp)
-    sign = np.ones(taxels, dtype=np.int32)
-    highest = np.full(taxels, 0xFFFF, dtype=np.int32)
-    stage = 0
-    for number, chip in enumerate(file.chips):
-        for taxel in chip.taxels:
-            if taxel != UNUSED:
-                stage_of[taxel] = stage
-                chip_of[taxel] = number
-                sign[taxel] = chip.sign
-                highest[taxel] = chip.traits.highest
-            stage += 1
-    served = chip_of < len(file.chips)
+    taxel_of = np.concatenate([chip.taxels for chip in chips])
+    owner_of = np.repeat(np.arange(len(chips)), [len(chip.taxels) for chip in chips])
+    wired = np.flatnonzero(taxel_of != UNUSED)
+    stage = np.full(taxels, len(taxel_of))
+    stage[taxel_of[wired]] = wired
+    chip_of = np.full(taxels, len(chips))
+    chip_of[taxel_of[wired]] = owner_of[wired]
+    sign = np.array([*(chip.sign for chip in chips), 1], dtype=np.int32)
+    highest = np.array([*(chip.traits.highest for chip in chips), 0xFFFF])[chip_of]
+    lowest = np.zeros_like(highest)
+    if file.calibration is not None:
+        rest = file.calibration.baseline.ravel().astype(np.int64)
+        reach = file.signal.saturation_counts + file.signal.drift_limit_counts
+        lowest = np.maximum(rest - reach, 0)
+        highest = np.minimum(highest, rest + reach)
+    span = (highest - lowest).astype(np.uint16)
+    served = chip_of < len(chips)
     for row, col in file.signal.dead:
         served[row * file.layout.cols + col] = False
-    return TaxelMap(stage_of, chip_of, sign, highest, served)
-
-
-@dataclass(frozen=True)
-class ValueRange:
-    """The raw values that a touch can reach, (taxels,) each."""
-
-    lowest: NDArray[np.uint16]
-    span: NDArray[np.uint16]
-
-    def holds(self, values: NDArray[np.uint16]) -> NDArray[np.bool_]:
-        """Which values (taxels,) lie in the range."""
-        # A value under the lowest wraps round to above every span.
-        return np.asarray(values - self.lowest <= self.span)
-
-
-def value_range(file: SkinFile, taxels: TaxelMap) -> ValueRange:
-    """The range of each taxel's values, from its chip and the skin's calibration."""
-    lowest = np.zeros_like(taxels.highest)
-    highest = taxels.highest
-    if file.calibration is not None:
-        baseline = file.calibration.baseline.ravel().astype(np.int32)
-        reach = file.signal.saturation_counts + file.signal.drift_limit_counts
-        lowest = np.maximum(baseline - reach, 0)
-        highest = np.minimum(highest, baseline + reach)
-    span = highest - lowest
-    return ValueRange(lowest.astype(np.uint16), span.astype(np.uint16))
+    return TaxelMap(
+        stage, chip_of, sign[chip_of], lowest.astype(np.uint16), span, served
+    )
 
 
 def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -111,33 +91,24 @@ def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.where(variance < COARSE, coarse, fine))
 
 
-def stuck_limits(file: SkinFile, taxels: TaxelMap) -> NDArray[np.int64]:
+def stuck_limits(file: SkinFile) -> NDArray[np.int64]:
     """(chips,) equal readings in a row after which a chip is stuck.
 
     Only of a chip whose calibrated noise shows in whole counts, and of one whose bytes
     hold a sequence number, must the bytes change.
     """
-    chips = file.chips
     stuck = file.reading.stuck_frames
-    chances = np.zeros(len(chips) + 1)
-    if file.calibration is not None:
-        repeats = np.log(repeat_chance(file.calibration.noise.ravel()))
-        np.add.at(chances, taxels.chip, repeats)
-    noisy = stuck * chances[:-1] <= LOG_CHANCE
-    limits = np.where(noisy, stuck, NEVER_STUCK)
-    for number, chip in enumerate(chips):
+    limits = []
+    for chip in file.chips:
+        log_chance = 0.0
+        if file.calibration is not None:
+            noise = file.calibration.noise.ravel()[chip.served]
+            log_chance = stuck * float(np.log(repeat_chance(noise)).sum())
+        limit = stuck if log_chance <= LOG_CHANCE else NEVER_STUCK
         if chip.kind.unchanged_frames is not None:
-            limits[number] = min(chip.kind.unchanged_frames, stuck)
-    return limits
-
-
-@dataclass(frozen=True)
-class ChipGroup:
-    """Neighbours of one kind, options and number of taxels, which one call parses."""
-
-    first: ChipSpec
-    data: NDArray[np.uint8]
-    """(n, frame_bytes) bytes."""
+            limit = min(chip.kind.unchanged_frames, stuck)
+        limits.append(limit)
+    return np.array(limits)
 
 
 class Decoder:
@@ -160,8 +131,7 @@ class Decoder:
         self.rows = np.split(self._bytes, ends[:-1])
         self._groups = self._grouped(file.chips)
         self.taxels = taxel_map(file)
-        self._range = value_range(file, self.taxels)
-        self._limits = stuck_limits(file, self.taxels)
+        self._limits = stuck_limits(file)
         self._unchanged = np.zeros(len(file.chips), dtype=np.int64)
         """Readings in a row that gave the same bytes."""
         stages = sum(len(chip.taxels) for chip in file.chips)
@@ -170,17 +140,19 @@ class Decoder:
         self.values = self._raw.take(self.taxels.stage)
         self.times = np.full(len(self.values), NEVER)
 
-    def _grouped(self, chips: Sequence[ChipSpec]) -> list[ChipGroup]:
+    def _grouped(
+        self, chips: Sequence[ChipSpec]
+    ) -> list[tuple[ChipSpec, NDArray[np.uint8]]]:
+        """Neighbours of one kind, options and number of taxels, which one call parses:
+        one of them, and the bytes (n, frame_bytes) of all."""
         groups = []
-        first = 0
+        start = 0
         for _, group in groupby(chips, key=_form):
-            spec, *neighbours = group
-            last = first + 1 + len(neighbours)
-            start = self._starts[first]
-            size = spec.traits.frame_bytes
-            data = self._bytes[start : start + (last - first) * size]
-            groups.append(ChipGroup(spec, data.reshape(-1, size)))
-            first = last
+            neighbours = list(group)
+            end = start + len(neighbours) * neighbours[0].traits.frame_bytes
+            data = self._bytes[start:end].reshape(len(neighbours), -1)
+            groups.append((neighbours[0], data))
+            start = end
         return groups
 
     def decode(
@@ -208,7 +180,9 @@ class Decoder:
         taxels = self.taxels
         self.values = self._raw.take(taxels.stage)
         self.times = read_at.take(taxels.chip)
-        intact = self._intact.take(taxels.stage) & self._range.holds(self.values)
+        # A value under the lowest wraps round to above every span.
+        reached = self.values - taxels.lowest <= taxels.span
+        intact = self._intact.take(taxels.stage) & reached
         damaged[taxels.chip[~intact & taxels.served]] = True
         for number in np.flatnonzero(fresh).tolist():
             slot = slots[number]
@@ -220,10 +194,10 @@ class Decoder:
         """Parse the bytes of all chips into the stages' values."""
         values = []
         intact = []
-        for group in self._groups:
-            parsed = group.first.kind.parse(group.data, group.first)
-            values.append(parsed[0])
-            intact.append(parsed[1])
+        for spec, data in self._groups:
+            chip_values, chip_intact = spec.kind.parse(data, spec)
+            values.append(chip_values)
+            intact.append(chip_intact)
         self._raw[:-1] = np.concatenate(values, axis=None)
         self._intact[:-1] = np.concatenate(intact, axis=None)
 
@@ -267,17 +241,14 @@ class Baseline:
             rest: (n,) raw counts with nothing touching.
             sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it
                 lowers it.
-            dead_band: (n,) or a scalar, counts under which a taxel reads 0; at least 1.
+            dead_band: (n,) or a scalar, counts under which a taxel reads 0.
             step_counts: length of a step; rounded up to 1/4096 count.
             limit: greatest distance from `rest`, in counts.
         """
         self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
-        n = self._rest.shape
         self._now = self._rest.copy()
-        self._sign = np.broadcast_to(np.asarray(sign, dtype=np.int32), n)
-        self._dead = np.broadcast_to(
-            np.maximum(np.asarray(dead_band, dtype=np.int32), 1), n
-        )
+        self._sign = np.asarray(sign, dtype=np.int32)
+        self._dead = np.asarray(dead_band, dtype=np.int32)
         self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
         self._low = self._rest - (limit << SCALE_BITS)
         self._high = self._rest + (limit << SCALE_BITS)
@@ -303,24 +274,13 @@ class Baseline:
         np.clip(self._now, self._low, self._high, out=self._now)
 
 
-def dead_band(skin: SkinFile) -> NDArray[np.int32]:
-    """(taxels,) counts under which a taxel reads 0."""
-    noise = None if skin.calibration is None else skin.calibration.noise.ravel()
-    return dead_band_of(skin.signal, noise, skin.layout.rows * skin.layout.cols)
-
-
-def dead_band_of(
-    signal: Signal, noise: NDArray[np.float64] | None, values: int
-) -> NDArray[np.int32]:
-    """(values,) counts under which a value reads 0; at least 1, as none is negative.
+def dead_band(signal: Signal, noise: ArrayLike) -> NDArray[np.int32]:
+    """Counts under which a value reads 0; at least 1, as none is negative.
 
     Args:
         signal: of the skin.
-        noise: (values,) standard deviations; None without a calibration.
-        values: number of them.
+        noise: standard deviations of the values; 0 where they are unknown.
     """
-    least = max(1, signal.dead_band_counts)
-    if noise is None:
-        return np.full(values, least, dtype=np.int32)
-    sigma = np.ceil(np.minimum(signal.dead_band_sigma * noise, 65535.0))
-    return np.maximum(least, sigma.astype(np.int32))
+    sigmas = np.multiply(signal.dead_band_sigma, noise)
+    band = np.ceil(np.minimum(sigmas, 65535.0)).astype(np.int32)
+    return np.asarray(np.maximum(band, max(1, signal.dead_band_counts)))

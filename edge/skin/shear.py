@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from edge.chips.chip import UNUSED
 from edge.chips.three_axes import ZERO, axes
-from edge.skin.decoder import Baseline, dead_band_of
-from edge.skin.file import SkinFile, TaxelCalibration
+from edge.skin.decoder import Baseline, dead_band
+from edge.skin.file import SkinFile
 
 LARGEST = 32767
 
@@ -39,13 +39,16 @@ class ShearReader:
             self._chips.append((data, len(taxels), stages, taxels[stages]))
         self._shape = file.layout.shape
         self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
-        noise = None
-        if file.calibration is not None and file.calibration.shear_noise is not None:
-            noise = file.calibration.shear_noise.ravel()
-        rest = rest_of(file.calibration, self.raw)
+        rest: NDArray[np.uint16] = self.raw  # the middle of the range
+        noise = np.zeros(rest.shape)
+        calibration = file.calibration
+        if calibration is not None and calibration.shear_baseline is not None:
+            rest = calibration.shear_baseline
+        if calibration is not None and calibration.shear_noise is not None:
+            noise = calibration.shear_noise
         self._baseline = SignedBaseline(
             rest.ravel(),
-            dead_band=dead_band_of(file.signal, noise, rest.size),
+            dead_band=dead_band(file.signal, noise.ravel()),
             step_counts=file.signal.drift_counts_per_s / file.reading.rate_hz,
             limit=file.signal.drift_limit_counts,
         )
@@ -65,12 +68,3 @@ class ShearReader:
         if settled:
             self._baseline.follow(flat, both)
         return np.asarray(counts.reshape(*self._shape, 2))
-
-
-def rest_of(
-    calibration: TaxelCalibration | None, zero: NDArray[np.uint16]
-) -> NDArray[np.uint16]:
-    """(taxels, 2) rest values; the middle of the range without a calibration."""
-    if calibration is None or calibration.shear_baseline is None:
-        return zero.copy()
-    return calibration.shear_baseline.reshape(zero.shape)

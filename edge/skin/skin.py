@@ -78,22 +78,22 @@ class Skin:
         self.oldest_s = self.period_s * OLDEST_FRAMES
         """Maximum age of a valid value, in seconds."""
         self._decoder = Decoder(file)
-        self.readers: list[BusReader] = []
-        first = 0
-        for bus, spec in zip(buses, file.buses, strict=True):
-            last = first + len(spec.chips)
-            rows = self._decoder.rows[first:last]
-            self.readers.append(BusReader(bus, spec, rows, file.reading))
-            first = last
+        rows = iter(self._decoder.rows)  # of which each bus takes those of its chips
+        self.readers = [
+            BusReader(bus, spec, rows, file.reading)
+            for bus, spec in zip(buses, file.buses, strict=True)
+        ]
         self._slots = [slot for reader in self.readers for slot in reader.slots]
         taxels = file.layout.rows * file.layout.cols
         rest = np.zeros(taxels, dtype=np.uint16)
+        noise = np.zeros(taxels)
         if file.calibration is not None:
             rest = file.calibration.baseline.ravel()
+            noise = file.calibration.noise.ravel()
         self.baseline = Baseline(
             rest,
             sign=self._decoder.taxels.sign,
-            dead_band=dead_band(file),
+            dead_band=dead_band(file.signal, noise),
             step_counts=file.signal.drift_counts_per_s * self.period_s,
             limit=file.signal.drift_limit_counts,
         )

@@ -62,7 +62,7 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
     assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
         deviation, rel=0.03
     )
-    assert dead_band(file).min() >= 4 * deviation
+    assert dead_band(file.signal, file.calibration.noise).min() >= 4 * deviation
     assert (
         edge("calibrate", *fake, "--frames", 180, "--noise", 0)[1][0]["noise_largest"]
         == 0.0

@@ -10,7 +10,7 @@ from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
 from edge.skin import file as skinfile
-from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits, taxel_map
+from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -132,7 +132,7 @@ def test_equal_readings_prove_a_frozen_chip_only_where_noise_shows_in_counts(
     file = calibrated(CODY)
     calibration = replace(file.calibration, noise=np.full((16, 24), noise))
     file = replace(file, calibration=calibration)
-    assert (stuck_limits(file, taxel_map(file)) == limit).all()
+    assert (stuck_limits(file) == limit).all()
 
 
 def test_the_chance_of_an_equal_reading_is_that_of_a_rounded_normal_value():

@@ -164,4 +164,4 @@ def test_the_dead_band_is_six_sigma_and_never_less_than_one_count():
     file = skinfile.parse(SMALL + calibration_text(calibration(4)))
     noise = file.calibration.noise.ravel()
     expected = np.maximum(1, np.ceil(6 * noise)).astype(int)
-    assert dead_band(file).tolist() == expected.tolist()
+    assert dead_band(file.signal, noise).tolist() == expected.tolist()
