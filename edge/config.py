@@ -7,12 +7,11 @@ import json
 import math
 import os
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 from edge.errors import InputError
-from edge.files import parsing, read_bytes, read_text
+from edge.files import parsing, read_text
 
 REQUIRED: Any = object()
 """Default of a key that must be given."""
@@ -53,7 +52,7 @@ _DECODER = json.JSONDecoder(
 )
 
 
-def _decoded(text: str | bytes) -> Any:
+def decode_json(text: str | bytes) -> Any:
     """The value of a JSON text; half of a surrogate pair raises UnicodeError, as UTF-8
     has none."""
     value = _DECODER.decode(text.decode() if isinstance(text, bytes) else text)
@@ -68,29 +67,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
         InputError: it is not JSON, or not UTF-8; the message begins with `where`.
     """
     with parsing(where, "JSON"):
-        return _decoded(text)
-
-
-def read_json(path: str | os.PathLike[str]) -> Any:
-    """The value of a JSON file; see `parse_json`.
-
-    Raises:
-        InputError: it cannot be read, or is not JSON.
-    """
-    return parse_json(read_bytes(path), os.fspath(path))
-
-
-@contextmanager
-def json_file(path: str | os.PathLike[str], kind: str, mend: str) -> Iterator[Any]:
-    """The value of a JSON file, for a block that takes it apart.
-
-    Raises:
-        InputError: the file cannot be read; or it is not JSON, or the block failed, as
-            it does at a missing key or a wrong type. The message then says that the
-            file is not `kind`, and ends with the remedy `mend`.
-    """
-    with parsing(os.fspath(path), kind, f"; {mend}"):
-        yield _decoded(read_bytes(path))
+        return decode_json(text)
 
 
 def _number(value: object) -> float:
@@ -182,10 +159,9 @@ class ConfigTable:
         if type(value) is not int or value not in allowed:
             if not isinstance(allowed, range):
                 raise self.fail(key, f"one of {', '.join(map(str, allowed))}")
+            kind = "a whole number from " if form == "d" else ""
             limits = f"{allowed[0]:{form}} to {allowed[-1]:{form}}"
-            raise self.fail(
-                key, limits if form != "d" else f"a whole number from {limits}"
-            )
+            raise self.fail(key, f"{kind}{limits}")
         return value
 
     def number(
@@ -223,12 +199,10 @@ class ConfigTable:
         """A list of numbers; with a count, of exactly that many."""
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or count not in (None, len(value)):
-            raise self.fail(
-                key, f"a list of {'' if count is None else f'{count} '}numbers"
-            )
-        return tuple(
-            self.number(key, 0, low, high, open_low=open_low, value=x) for x in value
-        )
+            numbers = "numbers" if count is None else f"{count} numbers"
+            raise self.fail(key, f"a list of {numbers}")
+        limits: dict[str, Any] = {"low": low, "high": high, "open_low": open_low}
+        return tuple(self.number(key, value=entry, **limits) for entry in value)
 
     def flag(self, key: str, default: Any = REQUIRED) -> bool:
         """The boolean value of a key."""
@@ -290,16 +264,16 @@ class ConfigTable:
 
     def done(self) -> None:
         """Refuse the keys that were never asked for."""
-        for key in self.raw:
-            if key not in self._taken:
-                allowed = ", ".join(dict.fromkeys(self._taken))
-                item, table = (
-                    ("", self.prefix) if self.prefix[-1:] == "." else (self.prefix, "")
-                )
-                raise InputError(
-                    f"{self.where}: {item}unknown key {table}{shown(key)[1:-1]}; "
-                    f"allowed: {allowed}"
-                )
+        unknown = [key for key in self.raw if key not in self._taken]
+        if not unknown:
+            return
+        key = shown(unknown[0])[1:-1]
+        if self.prefix.endswith("."):
+            sentence = f"unknown key {self.prefix}{key}"
+        else:
+            sentence = f"{self.prefix}unknown key {key}"
+        allowed = ", ".join(dict.fromkeys(self._taken))
+        raise InputError(f"{self.where}: {sentence}; allowed: {allowed}")
 
 
 def parse_toml(text: str, where: str) -> ConfigTable:

@@ -7,7 +7,7 @@ read in every fourth frame, and the time saved goes to it, one transaction at a 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import StrEnum
 from itertools import groupby
@@ -153,7 +153,7 @@ class BusReader:
         self,
         bus: Adapter,
         spec: BusSpec,
-        rows: Iterator[NDArray[np.uint8]],
+        rows: Iterable[NDArray[np.uint8]],
         reading: Reading,
     ) -> None:
         """Take the bus over; nothing is sent yet.

@@ -1,16 +1,12 @@
 """One way to say what is wrong with a value: the sentence names file, key, wish and
 value."""
 
-import json
-
 import pytest
 
 from edge.config import (
     ConfigTable,
-    json_file,
     parse_json,
     parse_toml,
-    read_json,
     read_toml,
     shown,
 )
@@ -115,19 +111,6 @@ def test_what_is_not_json_is_one_sentence(text, reason):
         parse_json(text, "the file")
     assert str(caught.value).startswith("the file: not JSON: ")
     assert reason in str(caught.value)
-
-
-def test_json_is_read_with_its_own_name_and_mend(tmp_path):
-    path = tmp_path / "board.json"
-    path.write_text(json.dumps({"a": 1}))
-    assert read_json(path) == {"a": 1}
-    with (
-        pytest.raises(
-            InputError, match=r"not a board file: 'stages' is missing; bench again"
-        ),
-        json_file(path, "a board file", "bench again") as found,
-    ):
-        found["stages"]
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.options import within
-from edge.config import ConfigTable, read_json, shown
+from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
@@ -53,6 +53,7 @@ from train.importers.reading import (
     read_text,
     suffix_of,
 )
+from train.json_files import read_json
 from train.progress import say
 
 LABELS = "labels.csv"

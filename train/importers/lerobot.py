@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, read_json, shown
+from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.files import parsing, read_text
 from edge.recording import Recording
@@ -26,6 +26,7 @@ from train.importers import clock, counts
 from train.importers.axes import Axes
 from train.importers.counts import Values, asked_shape, rest_of
 from train.importers.reading import read_parquet
+from train.json_files import read_json
 from train.progress import say
 
 

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, parse_json, read_json, shown
+from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
@@ -41,6 +41,7 @@ from edge.touch.layout import RELEASE_S
 from train.importers import clock, counts
 from train.importers.axes import Axes
 from train.importers.counts import Values, asked_shape, rest_of
+from train.json_files import read_json
 from train.progress import say
 
 LOG = logging.getLogger(__name__)

@@ -3,8 +3,8 @@
 import os
 from dataclasses import dataclass
 
-from edge.config import json_file
 from edge.errors import InputError
+from train.json_files import json_file
 from train.report.section import Section, Table
 
 STAGES = ("track", "features", "decision")

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from edge.config import json_file
 from edge.errors import InputError
+from train.json_files import json_file
 from train.tradeoff.choices import Points
 
 NAMES = ("fast", "balanced", "accurate")
