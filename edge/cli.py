@@ -190,19 +190,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     if first in workstation.COMMANDS:
         return workstation.run(words)
-    return refuse_command(top.prog, first, [*COMMANDS, *workstation.COMMANDS])
-
-
-def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:
-    """Say that there is no such command, and which may have been meant; returns 2."""
-    from difflib import get_close_matches  # rarely needed, and slow to load
-
-    similar = get_close_matches(word, commands, 1, 0.5)
-    hint = f"the commands are {', '.join(commands)}"
-    if similar:
-        hint = f"did you mean {similar[0]!r}?"
-    print(f"{program}: there is no command {word!r}; {hint}", file=sys.stderr)
-    return 2
+    known = [*COMMANDS, *workstation.COMMANDS]
+    return workstation.refuse_command(top.prog, first, known)
 
 
 # The interpreter's last garbage collection would visit every imported object, which

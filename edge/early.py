@@ -165,8 +165,7 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
     if not model.info.decision_points_s:
         raise InputError(
             f"{model.path}: the model has no calibration, so no error rate can be "
-            "held; "
-            "export it with --decision-points"
+            "held; export it with --decision-points"
         )
     if model.info.taught:
         raise InputError(

@@ -21,7 +21,6 @@ from edge.touch.layout import SkinLayout
 LARGEST_BYTES = 1 << 27
 """Largest size of a file's arrays together. An hour of 384 taxels at 40 Hz takes 111
 MB, two minutes of 64 x 62 taxels at 100 Hz take 95."""
-MAX_COUNTS = 65535
 SLOWEST_HZ = 2.0
 FASTEST_HZ = 5000.0
 """Frame rates outside these limits are probably times in another unit."""
@@ -181,7 +180,9 @@ def _frames(
     """The counts (n, rows, cols) of at least one frame."""
     frames: NDArray[Any] = np.asarray(values)
     if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
-        frames = _counts(frames, scale)
+        from edge.counts import as_counts  # few files hold other numbers
+
+        frames = as_counts(frames, scale)
     if frames.ndim == 2:
         rows: Any = skin.get("rows")
         cols: Any = skin.get("cols")
@@ -267,41 +268,6 @@ def _check_joint_names(names: Any, joints: NDArray[np.float64] | None) -> None:
         raise InputError(
             f"the number of meta.joint_names is {len(names)}, of joint angles {dof}"
         )
-
-
-def _counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
-    """Frames of another type as uint16, multiplied by `scale` and rounded."""
-    if scale is not None:
-        if not 0.0 < scale < np.inf:
-            raise InputError(f"the scale must be a number above 0, not {scale:g}")
-        frames = np.rint(frames.astype(np.float64) * scale)
-    if not np.isfinite(frames).all():
-        raise InputError(
-            "frames hold values that are not finite; set them to 0 and mark "
-            "the taxels "
-            "in `valid`"
-        )
-    low = frames.min(initial=0)
-    high = frames.max(initial=0)
-    if low < 0:
-        raise InputError(
-            f"frames go down to {low:g}, but counts are above baseline: "
-            "subtract the "
-            "frame before touch, then use np.clip(frames, 0, None)"
-        )
-    fractions = (frames != np.rint(frames)).any()
-    if fractions or high > MAX_COUNTS:
-        # With a power of ten, all recordings of a set can share the factor.
-        factor = (scale or 1.0) * 10.0 ** np.floor(np.log10(MAX_COUNTS / high))
-        raise InputError(
-            f"frames are {frames.dtype} up to {high:g}"
-            f"{', with fractions' if fractions else ''}; counts are whole numbers up "
-            "to "
-            f"{MAX_COUNTS}: use edge.save(path, recording, scale={factor:g}), with the "
-            "same scale "
-            "for all recordings"
-        )
-    return frames.astype(np.uint16)
 
 
 def load_arrays(

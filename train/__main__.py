@@ -4,7 +4,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from edge.cli import add_commands, dispatch, refuse_command
+from edge.cli import add_commands, dispatch
+from edge.tools.workstation import refuse_command
 
 COMMANDS = {
     "import": "train.commands.import_",

@@ -49,8 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="flag",
         help="if joint angles are missing at a contact's onset: `flag` (the default) decides "
         "without them, flagged missing_pose; `skin` measures the contact's motion on "
-        "the skin, "
-        "flagged skin_motion",
+        "the skin, flagged skin_motion",
     )
     parser.add_argument(
         "--udp",

@@ -232,8 +232,7 @@ def taxel_at(
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
         raise InputError(
             f"{table.called(key)} names taxel [{shown(row)}, {shown(col)}], which lies "
-            "outside of "
-            f"{layout.rows} x {layout.cols}"
+            f"outside of {layout.rows} x {layout.cols}"
         )
     return row, col
 

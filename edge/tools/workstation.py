@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 import edge
@@ -44,3 +45,13 @@ def run(words: Sequence[str]) -> int:
         return subprocess.call(program, env=environment)
     except KeyboardInterrupt:
         return 130
+
+
+def refuse_command(program: str, word: str, commands: Sequence[str]) -> int:
+    """Say that there is no such command, and which may have been meant; returns 2."""
+    similar = get_close_matches(word, commands, 1, 0.5)
+    hint = f"the commands are {', '.join(commands)}"
+    if similar:
+        hint = f"did you mean {similar[0]!r}?"
+    print(f"{program}: there is no command {word!r}; {hint}", file=sys.stderr)
+    return 2

@@ -115,8 +115,7 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
                 "complete": False,
             },
             "a/box-001.npz: 1.5 s, 150 frames, object=box; incomplete: reading stopped "
-            "before the "
-            "contact's end",
+            "before the contact's end",
         ),
     ],
 )
