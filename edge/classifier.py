@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from edge.errors import OutOfRange
-from edge.events import Aside, Decided, Event, Onset, Release
+from edge.events import Aside, Decided, Event, Onset, Release, flags_of
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.touch.contact import Contact, FeatureSeries
@@ -21,6 +21,7 @@ from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
     from edge.early import Policy
+    from edge.no_contact import Untouched
     from edge.recording import Recording
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
@@ -142,6 +143,9 @@ class Classifier:
         """
         check_rate(novelty_rate, "the novelty rate")
         self.model = model
+        self._points_s = model.decision_points_s
+        self._last = len(self._points_s) - 1
+        """Index of the last decision point."""
         self.error = error
         self.novelty_rate = novelty_rate
         self._max_contacts = max_contacts
@@ -167,8 +171,11 @@ class Classifier:
         """The mask of the taxels that the last event named as set aside."""
         self._aside_s = -math.inf
         """When that mask was last the tracker's."""
-        self._missing_taxels = False
-        self._strongest = 0
+        self._untouched: Untouched | None = None
+        if any(task.no_contact is not None for task in model.info.tasks.values()):
+            from edge.no_contact import Untouched  # few models know no contact
+
+            self._untouched = Untouched(model, self.layout)
 
     def push(self, frame: Frame) -> list[Event]:
         """Take in a frame.
@@ -180,8 +187,8 @@ class Classifier:
         events: list[Event] = []
         most = self._most_asked(frame.t)
         self._end_s = frame.t
-        if self._begun == 0:
-            self._note_untouched(frame)
+        if self._untouched is not None and self._begun == 0:
+            self._untouched.push(frame)
         contacts = self.tracker.push(frame)
         aside = self._set_aside(frame)
         if aside is not None:
@@ -220,12 +227,11 @@ class Classifier:
 
     def _due_s(self, pending: Pending) -> float:
         """When the contact's next decision point comes."""
-        points_s = self.model.decision_points_s
-        return pending.contact.onset_s + points_s[pending.decision_point]
+        return pending.contact.onset_s + self._points_s[pending.decision_point]
 
     def _is_due(self, pending: Pending, t: float) -> bool:
         age_s = t - pending.contact.onset_s
-        return age_s >= self.model.decision_points_s[pending.decision_point]
+        return age_s >= self._points_s[pending.decision_point]
 
     def _set_aside(self, frame: Frame) -> Aside | None:
         """The event of taxels that have been set aside or taken back for a while."""
@@ -241,20 +247,12 @@ class Classifier:
         taxels = np.argwhere(np.zeros((0, 2)) if aside is None else aside)
         return Aside(frame.t, tuple((row, col) for row, col in taxels.tolist()))
 
-    def _note_untouched(self, frame: Frame) -> None:
-        """Note how near a frame came to a contact, while there has been none."""
-        readable = np.True_ if frame.valid is None else frame.valid
-        strongest = int(frame.counts.max(initial=0, where=readable))
-        self._strongest = max(self._strongest, strongest)
-        self._missing_taxels |= bool((self.layout.alive & ~readable).any())
-
     def _begin(self, contact: Contact) -> Onset:
         """Number a contact, and let its tasks wait."""
         self._begun += 1
         self._numbers[contact] = self._begun
         info = self.model.info
-        last = len(self.model.decision_points_s) - 1
-        first = last if self.error is None else 0
+        first = self._last if self.error is None else 0
         tasks = sorted(info.tasks, key=info.products.__contains__)
         self._pending.append(Pending(contact, self._begun, first, tasks))
         return Onset(contact.onset_s, self._named(self._begun))
@@ -269,37 +267,16 @@ class Classifier:
         events: list[Event] = []
         if self._begun == 0 and self._end_s is not None:
             contacts = self.tracker.finish()
-            if not contacts:
-                return list(self._untouched(self._end_s, began))
-            events = self._follow(contacts, self._end_s)
+            if self._untouched is not None and not contacts:
+                events += self._untouched.decisions(self._end_s, began)
+            events += self._follow(contacts, self._end_s)
         if self._end_s is not None:
             events += self._decide_due(self._end_s, began, math.inf)
         for pending in self._pending:
-            pending.decision_point = len(self.model.decision_points_s) - 1
+            pending.decision_point = self._last
             events += self._decide(pending, began, short=True)
         self._pending = []
         return events
-
-    def _untouched(self, end_s: float, began: float) -> Iterator[Decided]:
-        """Decisions on a stream without contact, of tasks that have a label for it."""
-        doubts = {
-            "no_contact": True,
-            "missing_taxels": self._missing_taxels,
-            "near_contact": self._strongest > self.layout.threshold_counts,
-        }
-        for name, task in self.model.info.tasks.items():
-            if task.no_contact is not None:
-                yield Decided(
-                    name,
-                    task.no_contact,
-                    confidence=1.0,
-                    window_s=0.0,
-                    onset_s=end_s,
-                    latency_ms=_milliseconds_since(began),
-                    flags=flags_of(doubts),
-                    strongest=round(self._strongest / max(self.layout.onset, 1), 3),
-                    model=self.model.named,
-                )
 
     def classify(self, recording: Recording) -> Iterator[Event]:
         """Decide on a recording as the board would have; this classifier's own state
@@ -366,7 +343,7 @@ class Classifier:
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
         point = pending.decision_point
-        window_s = self.model.decision_points_s[point]
+        window_s = self._points_s[point]
         series = pending.contact.series()
         blank = self._blank(pending, series, window_s, short)
         try:
@@ -377,8 +354,9 @@ class Classifier:
             answers = [replace(blank, task=task) for task in pending.tasks]
         else:
             answers = self._answers(pending, blank, decisions)
-            last = point == len(self.model.decision_points_s) - 1
-            if last and any(UNKNOWN in answer.flags for answer in answers):
+            if point == self._last and any(
+                UNKNOWN in answer.flags for answer in answers
+            ):
                 phrase = self.model.info.unusual(vector)
                 answers = [replace(answer, unusual=phrase) for answer in answers]
         pending.decision_point += 1
@@ -468,11 +446,6 @@ class Classifier:
             return False
         score = decisions[novelty.task].novelty
         return novelty.rate(point, score) <= self.novelty_rate
-
-
-def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
-    """The names of the doubts that hold."""
-    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def _milliseconds_since(began: float) -> float:

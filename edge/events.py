@@ -151,6 +151,11 @@ class Aside:
 Event = Aside | Onset | Decided | Release
 
 
+def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
+    """The names of the doubts that hold."""
+    return tuple(flag for flag, holds in doubts.items() if holds)
+
+
 def _line(name: str, event: Onset | Decided | Release) -> dict[str, Any]:
     """The keys that the lines of all events have."""
     contact = {} if event.contact is None else {"contact": event.contact}

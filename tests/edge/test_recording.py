@@ -79,23 +79,6 @@ WRONG = {
         lambda a: {k: v for k, v in a.items() if k != "frames"},
         "frames is missing",
     ),
-    "fractions": (
-        change(frames=np.full((180, 16, 24), 1.5)),
-        r"frames are float64 up to 1.5, with fractions.*scale=10000\), with the same scale for all",
-    ),
-    "large frames": (
-        change(frames=np.full((180, 16, 24), 70000)),
-        r"up to 70000;.*scale=0.1\)",
-    ),
-    "negative frames": (
-        change(frames=np.full((180, 16, 24), -3)),
-        "go down to -3, but counts are above baseline: subtract the frame before "
-        "touch, then use",
-    ),
-    "frames not finite": (
-        change(frames=np.full((180, 16, 24), np.nan)),
-        "mark the taxels in `valid`",
-    ),
     "complex frames": (
         change(frames=np.ones((180, 16, 24), complex)),
         "frames must be uint16",
@@ -215,18 +198,6 @@ def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path
     )
     assert (load(tmp_path / "b.npz").frames == back.frames).all()
     assert load(tmp_path / "b.npz").labels == back.labels
-
-
-def test_other_units_are_scaled_by_the_factor_that_is_given_and_kept(tmp_path):
-    newtons = np.array([0.0, 0.25, 1.0, 6.5]).reshape(4, 1, 1)
-    recording = Recording(np.arange(4.0), newtons)
-    save(tmp_path / "a.npz", recording, scale=1000.0)
-    back = load(tmp_path / "a.npz")
-    assert back.frames.ravel().tolist() == [0, 250, 1000, 6500]
-    assert back.meta["scale"] == 1000.0
-    for scale in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(InputError, match="scale must be a number above 0"):
-            save(tmp_path / "b.npz", recording, scale=scale)
 
 
 @pytest.mark.parametrize(
