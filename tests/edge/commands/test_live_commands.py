@@ -147,17 +147,20 @@ def test_run_takes_joints_from_stdin(exported, recordings):
             ["--fake", "BARE"],
             "has no joint angles, but the model needs 5 of each frame",
         ),
-        (["--fake", "REC", "--skin", "PAD"], "this skin has 8 x 12 taxels, flat, with"),
+        (["--fake", "REC", "--skin", "PAD"], "the recording has 16 x 24 taxels, the"),
+        (["--fake", "FLAT"], "this skin has 8 x 12 taxels, flat, with"),
     ],
 )
 def test_a_bad_option_is_one_sentence(
-    edge, exported, recordings, bare, arguments, said
+    edge, exported, recordings, bare, tmp_path, arguments, said
 ):
     files = {
         "REC": recordings / "hard_0.npz",
         "BARE": bare,
         "PAD": skinfile.shipped("mpr121"),
+        "FLAT": tmp_path / "flat.npz",
     }
+    saving.save(files["FLAT"], still(skinfile.load(files["PAD"]), 0.5))
     given = [files.get(a, a) for a in arguments]
     status, events, err = edge("run", "--model", exported / "model.onnx", *given)
     assert status == 2
