@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from edge.errors import OutOfRange
-from edge.events import Aside, Decided, Event, Onset, Release, flags_of
+from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.touch.contact import Contact, FeatureSeries
@@ -446,6 +446,11 @@ class Classifier:
             return False
         score = decisions[novelty.task].novelty
         return novelty.rate(point, score) <= self.novelty_rate
+
+
+def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
+    """The names of the doubts that hold."""
+    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def _milliseconds_since(began: float) -> float:

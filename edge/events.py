@@ -8,6 +8,9 @@ from typing import Any
 
 from edge.model.model import Decision
 
+MOST_PLACES = 6
+"""Taxels that a line for a person names."""
+
 
 @dataclass(frozen=True)
 class Onset:
@@ -149,11 +152,6 @@ class Aside:
 
 
 Event = Aside | Onset | Decided | Release
-
-
-def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
-    """The names of the doubts that hold."""
-    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def _line(name: str, event: Onset | Decided | Release) -> dict[str, Any]:

@@ -11,8 +11,6 @@ from edge.events import json_line
 
 LOG = logging.getLogger("edge.commands")
 """For messages, which are printed to stderr (see `edge.cli.dispatch`)."""
-MOST_PLACES = 6
-"""Taxels that a line names."""
 
 
 class Output:

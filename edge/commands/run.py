@@ -20,9 +20,9 @@ from edge.commands.options import (
     check_error,
     within,
 )
-from edge.commands.output import LOG, MOST_PLACES, counted
+from edge.commands.output import LOG, counted
 from edge.commands.source import Opened, reading
-from edge.events import Aside, Decided, Event
+from edge.events import MOST_PLACES, Aside, Decided, Event
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter

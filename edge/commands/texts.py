@@ -5,8 +5,7 @@ import textwrap
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from edge.commands.output import MOST_PLACES
-from edge.events import json_line
+from edge.events import MOST_PLACES, json_line
 
 BAR = 10
 """Width in characters of a bar that shows a share."""

@@ -3,7 +3,7 @@
 import json
 import math
 
-from edge.events import Decided, Release, flags_of, json_line
+from edge.events import Decided, Release, json_line
 
 
 def test_an_event_is_what_a_line_of_json_says():
@@ -45,8 +45,3 @@ def test_a_line_is_ascii_and_json_whatever_a_label_holds():
     assert line.isascii()
     assert line.isprintable()
     assert json.loads(line) == {"label": label, "confidence": None, "list": [None, 1.0]}
-
-
-def test_only_doubts_that_hold_become_flags_in_their_order():
-    doubts = {"short": True, "gap": False, "missing_taxels": True}
-    assert flags_of(doubts) == ("short", "missing_taxels")
