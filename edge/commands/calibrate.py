@@ -17,7 +17,7 @@ from edge.commands.options import add_skin, within
 from edge.commands.output import LOG, Output, counted
 from edge.commands.source import open_skin
 from edge.errors import InputError
-from edge.skin.calibration import deaf_taxels, save_calibration
+from edge.skin.calibration import deaf_taxels, places, save_calibration
 from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
@@ -114,24 +114,19 @@ class Sums:
         self._squares += values * values
 
     def mean_and_deviation(self) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
-        """Rounded means and sample standard deviations."""
-        return mean_and_deviation(self.n, self._total, self._squares)
+        """Rounded means and sample standard deviations; 0 where nothing was read.
 
-
-def mean_and_deviation(
-    n: NDArray[np.int64], total: NDArray[np.int64], squares: NDArray[np.int64]
-) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
-    """Rounded mean and sample standard deviation; 0 for a taxel that was never read.
-
-    Squared deviations are summed about the rounded mean in whole numbers, so that a
-    large mean loses no digits.
-    """
-    divisor = np.maximum(n, 1)
-    mean = (2 * total + divisor) // (2 * divisor)
-    deviations = squares - 2 * mean * total + n * mean * mean
-    remainder = total - n * mean
-    variance = (deviations - remainder * remainder / divisor) / np.maximum(n - 1, 1)
-    return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
+        Squared deviations are summed about the rounded mean in whole numbers, so that a
+        large mean loses no digits.
+        """
+        n = self.n
+        divisor = np.maximum(n, 1)
+        mean = (2 * self._total + divisor) // (2 * divisor)
+        deviations = self._squares - 2 * mean * self._total + n * mean * mean
+        remainder = self._total - n * mean
+        deviations = deviations - remainder * remainder / divisor
+        variance = deviations / np.maximum(n - 1, 1)
+        return mean.astype(np.uint16), np.sqrt(np.maximum(variance, 0.0))
 
 
 def unusable(
@@ -162,8 +157,7 @@ def unusable(
 def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Taxels (row, col) that vary far more than the others, the worst first."""
     limit = NOISY * float(np.median(noise)) + NOISY_COUNTS
-    taxels = [(row, col) for row, col in np.argwhere(noise > limit).tolist()]
-    return sorted(taxels, key=lambda taxel: -noise[taxel])
+    return sorted(places(noise > limit), key=lambda taxel: -noise[taxel])
 
 
 def moved_together(
@@ -184,11 +178,10 @@ def moved_together(
                 change.ravel()[chip.served] = baseline.ravel()[chip.served]
     if file.layout.onset == 0:  # any noise would be above it
         return []
-    regions = find_regions(change, file.layout.onset, wraps=file.layout.wraps)
     taxels: list[tuple[int, int]] = []
-    for region in regions:
+    for region in find_regions(change, file.layout.onset, wraps=file.layout.wraps):
         if region.area >= FEWEST_TOGETHER:
-            taxels += [(row, col) for row, col in np.argwhere(region.mask).tolist()]
+            taxels += places(region.mask)
     return taxels
 
 

@@ -18,7 +18,7 @@ from edge.commands.output import Output, counted
 from edge.model.model import Model
 from edge.skin.calibration import deaf_taxels
 from edge.skin.decoder import NEVER_STUCK, stuck_limits
-from edge.skin.file import SkinFile, frame_rate, load
+from edge.skin.file import SkinFile, load
 from edge.touch.layout import differences
 
 FRAMES = 100
@@ -194,7 +194,10 @@ class Wires:
     @classmethod
     def of(cls, file: SkinFile, overhead_us: float) -> Self:
         """Count the bits while the drivers read fake chips."""
-        from edge.fake.player import frame_bits  # a check of the board needs no chips
+        from edge.fake.player import (  # a check of the board needs no chips
+            frame_bits,
+            frame_rate,
+        )
 
         bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
         spent = frame_bits(file, FRAMES, overhead_us * 1e-6)

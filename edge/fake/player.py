@@ -325,6 +325,17 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
         ]
 
 
+def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
+    """Frames a second that buses carry side by side.
+
+    Args:
+        bits: of a frame on each bus.
+        clocks: of each bus, in Hz.
+    """
+    slowest_s = max(count / hz for count, hz in zip(bits, clocks, strict=True))
+    return 1.0 / slowest_s
+
+
 def skin_file(layout: SkinLayout) -> SkinFile:
     """Fake wiring for a skin that has only a layout: Cody's chips where its shape is
     Cody's.

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import read_text
@@ -93,5 +94,9 @@ def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
         return []
     noise = 0.0 if skin.calibration is None else skin.calibration.noise
     band = dead_band(skin.signal, noise)
-    deaf = np.argwhere((band >= threshold) & skin.layout.alive)
-    return [(row, col) for row, col in deaf.tolist()]
+    return places((band >= threshold) & skin.layout.alive)
+
+
+def places(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(row, col) of the taxels of a mask (rows, cols)."""
+    return [(row, col) for row, col in np.argwhere(mask).tolist()]

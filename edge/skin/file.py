@@ -246,14 +246,3 @@ def _no_array(
         f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
         "from 0 to 65535; delete [calibration], and calibrate again"
     )
-
-
-def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
-    """Frames a second that buses carry side by side.
-
-    Args:
-        bits: of a frame on each bus.
-        clocks: of each bus, in Hz.
-    """
-    slowest_s = max(count / hz for count, hz in zip(bits, clocks, strict=True))
-    return 1.0 / slowest_s

@@ -140,9 +140,10 @@ def _chip(
         channel = table.whole("channel", allowed=range(tca9548a.CHANNELS))
     elif table.has("channel"):
         raise InputError(f"{table.called('channel')} needs mux, the address of the mux")
-    options = {}
-    for name, option in kind.options.items():
-        options[name] = table.whole(name, option.default, option.allowed)
+    options = {
+        name: table.whole(name, option.default, option.allowed)
+        for name, option in kind.options.items()
+    }
     taxels = _taxels(table, layout)
     _check_taxels(table, kind, taxels)
     if sign is None:
@@ -187,20 +188,15 @@ def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
     """Flat indices from `taxels`, or from `first` and `block`, row by row."""
     # Each key is asked for, so that none of them counts as unknown.
     listed = table.has("taxels")
-    first = table.has("first")
-    block = table.has("block")
-    if listed:
-        key = "taxels"
-        taxels = table.get("taxels")
-        if not isinstance(taxels, list):
-            raise table.fail("taxels", "a list of [row, col]")
-    elif first and block:
-        key = "first"
-        taxels = _rectangle(table, layout)
-    else:
+    is_rectangle = all([table.has("first"), table.has("block")])
+    if not (listed or is_rectangle):
         raise InputError(
             f"{table.called('taxels')} is missing; give it, or first and block"
         )
+    key = "taxels" if listed else "first"
+    taxels = table.get("taxels") if listed else _rectangle(table, layout)
+    if not isinstance(taxels, list):
+        raise table.fail("taxels", "a list of [row, col]")
     indices = []
     for taxel in taxels:
         if taxel == []:
@@ -240,33 +236,30 @@ def taxel_at(
 def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> None:
     """Raise InputError where two chips claim one address or one taxel."""
     owners: dict[int, str] = {}
-    devices: list[str] = []
+    devices = [bus.device for bus in buses]
     for number, bus in enumerate(buses):
         place = f"{where}: bus {number}"
-        if bus.device in devices:
-            former = devices.index(bus.device)
+        former = devices.index(bus.device)
+        if former < number:
             raise InputError(f"{place} has the same device as bus {former}")
-        devices.append(bus.device)
         _check_addresses(bus, place)
         for index, chip in enumerate(bus.chips):
             _claim_taxels(chip, f"bus {number} chip {index}", owners, layout, where)
 
 
 def _check_addresses(bus: BusSpec, place: str) -> None:
-    claimed: dict[tuple[int | None, ...], str] = {}
-    for chip in bus.chips:
-        if chip.mux is not None:
-            claimed[None, None, chip.mux] = "a mux"
-    if claimed and bus.clock_hz > FASTEST_MUX_HZ:
+    muxes = {chip.mux for chip in bus.chips} - {None}
+    if muxes and bus.clock_hz > FASTEST_MUX_HZ:
         raise InputError(
             f"{place}: clock_hz is {bus.clock_hz}; a TCA9548A carries at most "
             f"{FASTEST_MUX_HZ}"
         )
     # While its channel is connected, a chip behind a mux also hears messages to the
     # chips on the bus itself, so these claim their addresses first.
-    order = sorted(range(len(bus.chips)), key=lambda i: bus.chips[i].mux is not None)
-    for index in order:
-        chip = bus.chips[index]
+    order = sorted(enumerate(bus.chips), key=lambda item: item[1].mux is not None)
+    claimed: dict[tuple[int | None, ...], str] = {}
+    claimed.update({(None, None, mux): "a mux" for mux in muxes})
+    for index, chip in order:
         route = (chip.mux, chip.channel, chip.address)
         other = claimed.get(route) or claimed.get((None, None, chip.address))
         if other is not None:

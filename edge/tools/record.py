@@ -32,7 +32,7 @@ from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import save
 from edge.skin import file as skinfile
-from edge.skin.file import SkinFile, frame_rate
+from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.tools import terminal
 from edge.tools.trial_options import add_arm, open_arm, task_label
@@ -321,7 +321,7 @@ def _joint_names(
 def wire_s(file: SkinFile) -> float:
     """Seconds that a frame takes on the skin's wires, from the drivers' own
     transactions."""
-    from edge.fake.player import frame_bits  # counts the bits on a fake bus
+    from edge.fake.player import frame_bits, frame_rate  # counts the bits on a fake bus
 
     bits = [total / WIRE_FRAMES for total in frame_bits(file, WIRE_FRAMES)]
     return round(1.0 / frame_rate(bits, [bus.clock_hz for bus in file.buses]), 6)

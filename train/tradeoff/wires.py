@@ -9,10 +9,10 @@ from edge.chips.ad7147 import AD7147
 from edge.chips.block import Block
 from edge.chips.chip import UNUSED, ChipSpec
 from edge.chips.three_axes import ThreeAxisBlock
-from edge.fake.player import frame_bits
+from edge.fake.player import frame_bits, frame_rate
 from edge.recording import Recording
 from edge.skin import file as skinfile
-from edge.skin.file import SkinFile, frame_rate
+from edge.skin.file import SkinFile
 from edge.skin.wiring import BusSpec
 from edge.touch.layout import SkinLayout
 

@@ -12,7 +12,7 @@ from edge.commands import calibrate
 from edge.commands.calibrate import (
     NOISY,
     NOISY_COUNTS,
-    mean_and_deviation,
+    Sums,
     measure,
     noisiest_taxels,
     unusable,
@@ -143,9 +143,10 @@ def test_mean_and_deviation_are_exact_at_a_large_offset():
     draw = np.random.default_rng(0)
     values = (60000 + draw.integers(-2, 3, (5000, 4, 6))).astype(np.int64)
     values[:, 0, 0] = 65535
-    mean, deviation = mean_and_deviation(
-        np.full((4, 6), 5000), values.sum(axis=0), (values * values).sum(axis=0)
-    )
+    sums = Sums((4, 6))
+    for frame in values:
+        sums.add(frame.astype(np.uint16), np.ones((4, 6), bool))
+    mean, deviation = sums.mean_and_deviation()
     np.testing.assert_array_equal(mean, np.rint(values.mean(axis=0)))
     exact = (values - 60000).astype(np.float64).std(axis=0, ddof=1)
     exact[0, 0] = 0.0

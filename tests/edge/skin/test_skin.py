@@ -11,7 +11,7 @@ from edge.chips import ad7147, mpr121
 from edge.chips.block import UNCHANGED_FRAMES
 from edge.errors import EdgeError, InputError
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_skin, frame_bits, frame_rate, still
 from edge.skin import file as skinfile
 from edge.skin.file import Reading
 from edge.skin.loop import Loop
@@ -46,7 +46,7 @@ def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
     """From the bytes of the data sheets: 8320 bits for 32 AD7147, 8032 for 32
     MPR121."""
     bits = frame_bits(on_buses(buses, kind=kind))
-    assert abs(skinfile.frame_rate(bits, [400_000] * buses) - hz) <= 0.0501
+    assert abs(frame_rate(bits, [400_000] * buses) - hz) <= 0.0501
 
 
 def test_all_checks_together_cost_at_most_3_percent_of_the_wire():
