@@ -90,18 +90,11 @@ class Decided:
         line = {**_line("decision", self), "window_s": self.window_s}
         if self.contact is not None:
             line["place"] = None if self.position is None else list(self.position)
-        line |= {
-            key: getattr(self, key)
-            for key in ("task", "label", "confidence", "latency_ms")
-        }
-        if self.strongest is not None:
-            line["strongest"] = self.strongest
-        if self.stopped_by is not None:
-            line |= {"error": self.error, "stopped_by": self.stopped_by}
-        if self.unusual is not None:
-            line["unusual"] = self.unusual
-        if self.model is not None:
-            line["model"] = self.model
+        for key in ("task", "label", "confidence", "latency_ms"):
+            line[key] = getattr(self, key)
+        for key in ("strongest", "error", "stopped_by", "unusual", "model"):
+            if getattr(self, key) is not None:
+                line[key] = getattr(self, key)
         return {**line, "flags": list(self.flags)}
 
 
@@ -178,6 +171,6 @@ def _finite(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
-    return (
-        [_finite(item) for item in value] if isinstance(value, list | tuple) else value
-    )
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value

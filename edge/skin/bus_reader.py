@@ -9,6 +9,7 @@ read in every fourth frame, and the time saved goes to it, one transaction at a 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import groupby
 
@@ -63,6 +64,7 @@ class State(StrEnum):
     DOWN = "down"
 
 
+@dataclass(eq=False)
 class Slot:
     """One chip on its bus: its state, and the bytes last read from it.
 
@@ -83,20 +85,18 @@ class Slot:
         back_at: when it last came back.
     """
 
-    chip: Chip
-
-    def __init__(self, spec: ChipSpec, row: NDArray[np.uint8]) -> None:
-        self.spec = spec
-        self.row = row
-        self.state = State.STARTING
-        self.error: BusError | None = None
-        self.steps: Iterator[None] | None = None
-        self.at = NEVER
-        self.good = False
-        self.damaged = 0
-        self.has_settings = False
-        self.retry_at = -math.inf
-        self.back_at = -math.inf
+    spec: ChipSpec
+    row: NDArray[np.uint8]
+    chip: Chip = field(init=False)
+    state: State = State.STARTING
+    error: BusError | None = None
+    at: float = NEVER
+    good: bool = False
+    damaged: int = 0
+    has_settings: bool = False
+    steps: Iterator[None] | None = None
+    retry_at: float = -math.inf
+    back_at: float = -math.inf
 
     @property
     def running(self) -> bool:

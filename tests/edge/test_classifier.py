@@ -21,6 +21,10 @@ def watch(model, recording):
     return events + [(None, event) for event in classifier.finish()]
 
 
+def decisions(events):
+    return [event for event in events if isinstance(event, Decided)]
+
+
 def test_the_latency_is_what_the_frame_took(model, make_touch):
     recording = make_touch()
     classifier = Classifier(model, recording.layout)
@@ -54,7 +58,7 @@ def test_classify_and_watch_give_what_pushing_the_frames_gives(model, make_touch
 def test_a_recordings_joints_may_stand_in_another_order(model, make_touch):
     def distances(recording):
         events = Classifier(model).classify(recording)
-        return [e.decision.distances.tolist() for e in events if isinstance(e, Decided)]
+        return [e.decision.distances.tolist() for e in decisions(events)]
 
     recording = make_touch(seed=99)
     named = {**recording.meta, "joint_names": list(model.info.chain.names[::-1])}
@@ -122,7 +126,7 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     recording = make_touch(kind="soft", seed=99)
     skin = {**recording.meta["skin"], "counts_per_newton": scale}
     strong = replace(recording, meta={**recording.meta, "skin": skin})
-    decided = [e for e in Classifier(model).classify(strong) if isinstance(e, Decided)]
+    decided = decisions(Classifier(model).classify(strong))
     assert [e.flags for e in decided] == [("out_of_range",)] * 2
     assert [(bool(e.label), bool(e.decision)) for e in decided] == [
         (labelled, labelled)
@@ -179,8 +183,9 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
 )
 def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):
     recording = make_touch()
-    events = Classifier(model).classify(replace(recording, t=damage(recording.t)))
-    decided = [event for event in events if isinstance(event, Decided)]
+    decided = decisions(
+        Classifier(model).classify(replace(recording, t=damage(recording.t)))
+    )
     assert ["gap" in event.flags for event in decided] == [flagged] * 2
 
 
@@ -205,7 +210,7 @@ def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):
     assert aside.taxels == ((0, 23),)
     (onset,) = (event for event in events if isinstance(event, Onset))
     assert onset.onset_s == 0.2
-    decided = [event for event in events if isinstance(event, Decided)]
+    decided = decisions(events)
     assert len(decided) == 2
     assert not any("late" in event.flags for event in decided)
 
@@ -219,8 +224,7 @@ def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_tou
         frames=recording.frames[first:],
         joints=recording.joints[first:],
     )
-    events = Classifier(model).classify(cut)
-    decided = [event for event in events if isinstance(event, Decided)]
+    decided = decisions(Classifier(model).classify(cut))
     assert len(decided) == 2
     for event in decided:
         assert event.onset_s == cut.t[0]
