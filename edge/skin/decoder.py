@@ -4,6 +4,7 @@ these to counts above a baseline that follows slow drift, in integers: results r
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -252,6 +253,20 @@ class Baseline:
         self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
         self._low = self._rest - (limit << SCALE_BITS)
         self._high = self._rest + (limit << SCALE_BITS)
+
+    @classmethod
+    def of(
+        cls, file: SkinFile, rest: ArrayLike, noise: ArrayLike, sign: ArrayLike = 1
+    ) -> Self:
+        """The baseline of a skin's values, from their rest values and noise."""
+        signal = file.signal
+        return cls(
+            rest,
+            sign=sign,
+            dead_band=dead_band(signal, noise),
+            step_counts=signal.drift_counts_per_s / file.reading.rate_hz,
+            limit=signal.drift_limit_counts,
+        )
 
     @property
     def counts(self) -> NDArray[np.int32]:

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from edge.chips.chip import UNUSED
 from edge.chips.three_axes import ZERO, axes
-from edge.skin.decoder import Baseline, dead_band
+from edge.skin.decoder import Baseline
 from edge.skin.file import SkinFile
 
 LARGEST = 32767
@@ -40,18 +40,13 @@ class ShearReader:
         self._shape = file.layout.shape
         self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
         rest: NDArray[np.uint16] = self.raw  # the middle of the range
-        noise = np.zeros(rest.shape)
+        noise: ArrayLike = 0.0
         calibration = file.calibration
         if calibration is not None and calibration.shear_baseline is not None:
             rest = calibration.shear_baseline
         if calibration is not None and calibration.shear_noise is not None:
-            noise = calibration.shear_noise
-        self._baseline = SignedBaseline(
-            rest.ravel(),
-            dead_band=dead_band(file.signal, noise.ravel()),
-            step_counts=file.signal.drift_counts_per_s / file.reading.rate_hz,
-            limit=file.signal.drift_limit_counts,
-        )
+            noise = calibration.shear_noise.ravel()
+        self._baseline = SignedBaseline.of(file, rest.ravel(), noise)
 
     def read(self, valid: NDArray[np.bool_], *, settled: bool) -> NDArray[np.int16]:
         """The frame's shear (rows, cols, 2); 0 of taxels that are not valid.

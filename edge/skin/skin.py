@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
 from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
-from edge.skin.decoder import Baseline, Decoder, dead_band
+from edge.skin.decoder import Baseline, Decoder
 from edge.skin.file import SkinFile, load
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
@@ -85,18 +85,12 @@ class Skin:
         ]
         self._slots = [slot for reader in self.readers for slot in reader.slots]
         taxels = file.layout.rows * file.layout.cols
-        rest = np.zeros(taxels, dtype=np.uint16)
-        noise = np.zeros(taxels)
+        rest: ArrayLike = np.zeros(taxels)
+        noise: ArrayLike = 0.0
         if file.calibration is not None:
             rest = file.calibration.baseline.ravel()
             noise = file.calibration.noise.ravel()
-        self.baseline = Baseline(
-            rest,
-            sign=self._decoder.taxels.sign,
-            dead_band=dead_band(file.signal, noise),
-            step_counts=file.signal.drift_counts_per_s * self.period_s,
-            limit=file.signal.drift_limit_counts,
-        )
+        self.baseline = Baseline.of(file, rest, noise, self._decoder.taxels.sign)
         self._shear = None
         if file.layout.axes:
             from edge.skin.shear import ShearReader  # few skins have three axes
@@ -109,7 +103,7 @@ class Skin:
         self._since_silent = 0
         self._touched_at = -math.inf
         self._states: list[State] = []
-        self._lost = [False for _ in self.readers]
+        self._lost = [False] * len(self.readers)
         self._threads = ThreadPoolExecutor(len(self.readers))
 
     @classmethod
