@@ -186,7 +186,8 @@ def _frames(
     if frames.ndim == 2:
         rows: Any = skin.get("rows")
         cols: Any = skin.get("cols")
-        if not _are_sides(rows, cols, frames.shape[1]):
+        whole = type(rows) is int and type(cols) is int
+        if not (whole and rows > 0 and rows * cols == frames.shape[1]):
             raise InputError(
                 'frames are flat; give their "rows" and "cols" in meta.skin'
             )
@@ -199,13 +200,6 @@ def _frames(
     if 0 in frames.shape:
         raise InputError(f"frames are empty {frames.shape}; record at least one frame")
     return frames
-
-
-def _are_sides(rows: Any, cols: Any, taxels: int) -> bool:
-    """Whether two values are the rows and columns of so many taxels."""
-    if type(rows) is not int or type(cols) is not int:
-        return False
-    return rows > 0 and rows * cols == taxels
 
 
 def _times(values: Any, frames: int) -> NDArray[np.float64]:
@@ -297,22 +291,20 @@ def load_arrays(
             parsing(name, "a readable .npz file", "; copy or record it again")
         )
         archive = stack.enter_context(zipfile.ZipFile(file))
-        members = {
-            info.filename.removesuffix(".npy"): info
-            for info in archive.infolist()
-            if info.filename.endswith(".npy")
-        }
-        members_read = [key for key in members if keys is None or key in keys]
-        if sum(members[key].file_size for key in members_read) > LARGEST_BYTES:
+        members = {}
+        for info in archive.infolist():
+            key = info.filename.removesuffix(".npy")
+            if key != info.filename and (keys is None or key in keys):
+                members[key] = info
+        if sum(info.file_size for info in members.values()) > LARGEST_BYTES:
             raise InputError(
                 f"{name}: claims arrays of more than {LARGEST_BYTES} bytes; split it"
             )
         arrays = {}
-        for key in members_read:
-            with archive.open(members[key]) as stream:
-                arrays[key] = np.asarray(
-                    np.lib.format.read_array(stream, allow_pickle=False)
-                )
+        for key, info in members.items():
+            with archive.open(info) as stream:
+                array = np.lib.format.read_array(stream, allow_pickle=False)
+                arrays[key] = np.asarray(array)
         return arrays
 
 

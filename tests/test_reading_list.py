@@ -12,14 +12,19 @@ OPTIONAL = (
     "edge/bus/serial_bus.py",
     "edge/chips/block.py",
     "edge/chips/mpr121.py",
+    "edge/commands/texts.py",
+    "edge/counts.py",
     "edge/early.py",
     "edge/model/agreement.py",
     "edge/model/graph.py",
+    "edge/no_contact.py",
+    "edge/output/systemd.py",
     "edge/output/touch_map.py",
     "edge/recording.py",
     "edge/touch/joint_stream.py",
     "edge/touch/kernels.py",
     "edge/touch/urdf.py",
+    "edge/writing.py",
 )
 """Modules that neither this skin, nor the demo's model, nor an option calls for."""
 

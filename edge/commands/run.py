@@ -6,9 +6,10 @@ tells systemd when it is ready and that it is alive.
 """
 
 import argparse
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,6 @@ from edge.events import MOST_PLACES, Aside, Decided, Event
 from edge.model.model import Model
 from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter
-from edge.output.systemd import Notifier
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
 from edge.touch.layout import differences
@@ -151,7 +151,6 @@ def run(arguments: argparse.Namespace) -> int:
     model = Model(arguments.model, arguments.engine)
     check_error(model, arguments.error)
     on_skin = arguments.without_joints == "skin"
-    notifier = Notifier(now=time.monotonic)
     with reading(
         arguments,
         model=model,
@@ -175,17 +174,16 @@ def run(arguments: argparse.Namespace) -> int:
         writers = _map_writers(arguments.map, model)
         with (
             closing(live.lines(arguments.udp, writers)) as lines,
-            _keeper(arguments, model, live.opened) as keep,
+            _listeners(arguments, model, live.opened) as listeners,
         ):
-            notifier.ready(f"reading {live.opened.source}")
             unknown_touches = UnknownTouches(arguments.model)
             frames = 0
             for frame, faults in live.frames():
                 frames += 1
-                notifier.alive()
                 decided = classifier.push(frame)
                 warn_of_still_taxels(decided)
-                keep(frame, decided)
+                for listen in listeners:
+                    listen(frame, decided)
                 notice = unknown_touches.push(decided)
                 if notice is not None:
                     faults.append(notice)
@@ -193,34 +191,33 @@ def run(arguments: argparse.Namespace) -> int:
                 live.show(frame, faults, decided)
                 if lines.unheard:
                     break
-            notifier.stopping()
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])
     return 0
 
 
 @contextmanager
-def _keeper(
+def _listeners(
     arguments: argparse.Namespace, model: Model, opened: Opened
-) -> Iterator[Callable[[Frame, Sequence[Event]], None]]:
-    """A function that takes in every frame with its events; it keeps touches where
-    asked."""
-    if arguments.keep is None:
-        yield lambda frame, events: None
-        return
-    from edge.tools.keep import Keeper, reasons  # few runs keep touches
+) -> Iterator[list[Callable[[Frame, Sequence[Event]], None]]]:
+    """Functions that take in every frame with its events, where they are called for:
+    one keeps touches, another tells systemd that the program is alive."""
+    listeners: list[Callable[[Frame, Sequence[Event]], None]] = []
+    with ExitStack() as stack:
+        if arguments.keep is not None:
+            from edge.tools.keep import Keeper, reasons  # few runs keep touches
 
-    keeper = Keeper(
-        arguments.keep,
-        reasons(arguments.keep_if),
-        arguments.keep_mb,
-        opened,
-        model.info,
-    )
-    try:
-        yield keeper.push
-    finally:
-        keeper.close()
+            why = reasons(arguments.keep_if)
+            keeper = Keeper(arguments.keep, why, arguments.keep_mb, opened, model.info)
+            listeners.append(stack.enter_context(closing(keeper)).push)
+        if "NOTIFY_SOCKET" in os.environ:
+            from edge.output.systemd import Notifier  # only a service has a manager
+
+            notifier = Notifier(now=time.monotonic)
+            notifier.ready(f"reading {opened.source}")
+            stack.callback(notifier.stopping)
+            listeners.append(lambda frame, events: notifier.alive())
+        yield listeners
 
 
 def _map_writers(path: str | None, model: Model) -> list[LineWriter]:
