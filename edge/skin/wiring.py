@@ -55,33 +55,17 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     device, clock_hz = _port(table) if serial else _adapter(table)
     if table.has("kind"):
         _kind(table)
-    tables = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
-    kinds = _kinds(tables, table, layout)
-    options = {name for kind in kinds for name in kind.options}
-    for key in ("kind", "mux", "block", *options):
+    chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
+    if serial and len(chips) > 1:
+        raise InputError(
+            f"{table.called('chips')} has {len(chips)}; a serial port has one"
+        )
+    specs = tuple(_chip(chip, table, layout, sign, serial) for chip in chips)
+    options = {name for spec in specs for name in spec.kind.options}
+    for key in ("mux", "block", *options):
         table.has(key)
     table.done()
-    if serial and len(tables) > 1:
-        raise InputError(
-            f"{table.called('chips')} has {len(tables)}; a serial port has one"
-        )
-    specs = []
-    for kind, chip in zip(kinds, tables, strict=True):
-        whole = _shared(chip, table, ("kind", "mux", "block", *kind.options))
-        specs.append(_chip(whole, kind, layout, sign, serial))
-    return BusSpec(device, tuple(specs), clock_hz, serial)
-
-
-def _kinds(
-    tables: Sequence[ConfigTable], bus: ConfigTable, layout: SkinLayout
-) -> list[type[Chip]]:
-    """The kind of each of a bus's chips."""
-    kinds = [_kind(_shared(chip, bus, ("kind",))) for chip in tables]
-    if layout.axes:
-        from edge.chips.three_axes import three_axes  # few skins have them
-
-        kinds = [three_axes(kind, bus) for kind in kinds]
-    return kinds
+    return BusSpec(device, specs, clock_hz, serial)
 
 
 def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigTable:
@@ -126,12 +110,18 @@ def _kind(table: ConfigTable) -> type[Chip]:
 
 
 def _chip(
-    table: ConfigTable,
-    kind: type[Chip],
+    chip: ConfigTable,
+    bus: ConfigTable,
     layout: SkinLayout,
     sign: int | None,
     serial: bool,
 ) -> ChipSpec:
+    kind = _kind(_shared(chip, bus, ("kind",)))
+    if layout.axes:
+        from edge.chips.three_axes import three_axes  # few skins have them
+
+        kind = three_axes(kind, bus)
+    table = _shared(chip, bus, ("kind", "mux", "block", *kind.options))
     table.has("kind")
     address = _address(table, kind, serial)
     mux = channel = None
