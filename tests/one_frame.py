@@ -3,10 +3,10 @@
 `python -m tests.one_frame > docs/one-frame.md` renews the page from a trace.
 """
 
-import ast
 import sys
 from dataclasses import dataclass
-from functools import cache
+from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 
 from edge import demo
@@ -75,7 +75,7 @@ def ways():
     recording = load(demo.FOLDER / "cardboard-box-movable.npz")
     skin, playback = play(skin_file(recording.layout), recording)
     # The buses are read in this thread, one after another, so that a trace sees it.
-    skin._threads.map = map  # type: ignore[method-assign, assignment]
+    skin._threads.map = map
     classifier = Classifier(Model(demo.MODEL), skin.layout)
     traces = {}
     with skin:
@@ -98,20 +98,10 @@ def ways():
     return traces
 
 
-@cache
-def _docstrings(path):
-    """{function with its class: the first line of its docstring}."""
-    lines = {}
-
-    def visit(node, prefix):
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.ClassDef | ast.FunctionDef):
-                name = f"{prefix}{child.name}"
-                lines[name] = (ast.get_docstring(child) or "").partition("\n")[0]
-                visit(child, f"{name}.")
-
-    visit(ast.parse((ROOT / path).read_text()), "")
-    return lines
+def _summary(step):
+    """The first line of a function's docstring; "" without one."""
+    module = import_module(step.path.removesuffix(".py").replace("/", "."))
+    return (attrgetter(step.name)(module).__doc__ or "").partition("\n")[0]
 
 
 def files(steps):
@@ -129,9 +119,8 @@ def page():
     for path in visited:
         lines.append(f"**`{path}`**\n")
         for step in decision:
-            text = _docstrings(path).get(step.name, "") if step.path == path else ""
             # What has no docstring is a detail of what stands before it.
-            if text:
+            if step.path == path and (text := _summary(step)):
                 lines.append(f"- `{step.name}`: {text}")
         lines.append("")
     return "\n".join(lines).rstrip() + "\n"

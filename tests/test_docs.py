@@ -30,6 +30,12 @@ def commands():
     return [line for lines in blocks[1:] for line in lines.splitlines()]
 
 
+def objects(text):
+    """The objects that a program decided on, of the lines of JSON that it printed."""
+    events = [json.loads(x) for x in text.splitlines() if x.startswith("{")]
+    return [event["label"] for event in events if event.get("task") == "object"]
+
+
 def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     ran = []
@@ -38,45 +44,27 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
         if words[0] == "cp":
             shutil.copy(ROOT / words[1], words[2])
             continue
-        run = cli.main if words[0] == "edge-classify" else export
-        given = (
-            words[1:] if words[0] == "edge-classify" else [*words[3:], "--jobs", "1"]
-        )
-        assert run(given) == 0, (line, capsys.readouterr().err)
+        if words[0] == "edge-classify":
+            status = cli.main(words[1:])
+        else:
+            status = export([*words[3:], "--jobs", "1"])
+        assert status == 0, (line, capsys.readouterr().err)
         ran.append(words[1])
     first = ["check", "fake", "calibrate", "record", "-m", "info"]
     assert ran == [*first, "fake", "verify", "run", "replay"]
-    events = [
-        json.loads(x) for x in capsys.readouterr().out.splitlines() if x.startswith("{")
-    ]
-    assert {e["label"] for e in events if e.get("task") == "object"} >= {
-        "pillow",
-        "foam block",
-    }
+    assert {*objects(capsys.readouterr().out)} >= {"pillow", "foam block"}
 
 
 def test_the_two_evenings_mend_a_mistake(tmp_path):
     text = (DOCS / "evenings.md").read_text()
     script = "".join(re.findall(r"```sh\n(.*?)```", text, re.S))
-    programs = Path(sys.executable).parent
-    environment = {
-        **os.environ,
-        "PATH": f"{programs}:{os.environ['PATH']}",
-        "PROJECT": str(ROOT),
-    }
-    ran = subprocess.run(
-        ["bash", "-e", "-c", script],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PROJECT": str(ROOT)}
+    options = {"capture_output": True, "text": True, "check": False}
+    bash = ["bash", "-e", "-c", script]
+    ran = subprocess.run(bash, cwd=tmp_path, env=environment, **options)
     assert ran.returncode == 0, ran.stderr
-    events = [json.loads(x) for x in ran.stdout.splitlines() if x.startswith("{")]
-    objects = [e["label"] for e in events if e.get("task") == "object"]
-    before = objects[0]
-    after = objects[-1]
+    before, *_, after = objects(ran.stdout)
     assert before != "pillow"
     assert after == "pillow"
 
@@ -86,15 +74,10 @@ def test_the_notebook_runs(tmp_path):
     nbformat = pytest.importorskip("nbformat")
     notebook = nbformat.read(DOCS / "first-touch.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
-    nbclient.NotebookClient(
-        notebook, timeout=120, resources={"metadata": {"path": ROOT}}
-    ).execute()
-    (printed,) = (
-        o.text
-        for cell in notebook.cells
-        for o in cell.get("outputs", ())
-        if o.output_type == "stream"
-    )
+    resources = {"metadata": {"path": ROOT}}
+    nbclient.NotebookClient(notebook, timeout=120, resources=resources).execute()
+    outputs = [o for cell in notebook.cells for o in cell.get("outputs", ())]
+    (printed,) = (o.text for o in outputs if o.output_type == "stream")
     assert "label='soft-fixed'" in printed
 
 

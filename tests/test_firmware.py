@@ -22,6 +22,7 @@ from tests.conftest import ROOT
 
 MATRIX = ROOT / "docs" / "examples" / "firmware" / "matrix"
 TAXELS = 100
+GPP = ["g++", "-std=c++11", "-Wall", "-Werror", f"-I{MATRIX}"]
 
 pytestmark = pytest.mark.skipif(
     shutil.which("g++") is None, reason="there is no C++ compiler"
@@ -42,23 +43,18 @@ def host(tmp_path_factory):
     def build(bits, axes=1):
         program = folder / f"host{bits}-{axes}"
         if not program.exists():
-            command = [
-                "g++",
-                "-std=c++11",
-                "-O1",
-                "-Wall",
-                "-Wextra",
-                "-Werror",
-                f"-DWIDTH={bits}",
-                f"-DAXIS_COUNT={axes}",
-            ]
-            source = str(ROOT / "tests" / "firmware_host.cpp")
-            subprocess.run(
-                [*command, f"-I{MATRIX}", "-o", str(program), source], check=True
-            )
+            command = [*GPP, "-O1", "-Wextra", f"-DWIDTH={bits}", "-o", program]
+            source = ROOT / "tests" / "firmware_host.cpp"
+            subprocess.run([*command, f"-DAXIS_COUNT={axes}", source], check=True)
         return program
 
     return build
+
+
+def dumped(program):
+    """The bytes of each line that a host program prints."""
+    text = subprocess.check_output([program, "dump"], text=True)
+    return [bytes.fromhex(line) for line in text.split("\n")[:-1]]
 
 
 def values(bits, n):
@@ -85,10 +81,7 @@ class Registers:
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_the_driver_reads_its_registers_over_i2c(host, bits):
-    dump = subprocess.run(
-        [host(bits), "dump"], capture_output=True, text=True, check=True
-    )
-    lines = [bytes.fromhex(line) for line in dump.stdout.split("\n")[:-1]]
+    lines = dumped(host(bits))
     for n in range(3):
         identity, frame, unknown = lines[3 * n : 3 * n + 3]
         bus = FakeBus(chips={0x28: Registers({0x00: identity, 0x10: frame})})
@@ -98,17 +91,13 @@ def test_the_driver_reads_its_registers_over_i2c(host, bits):
         assert chip.frame.buffer[:2].tobytes() == n.to_bytes(2, "big")
         taxels, intact = Block.parse(chip.frame.buffer[None], spec(bits))
         assert intact.all()
-        assert taxels[0].tolist() == (
-            [0] * TAXELS if n == 0 else values(bits, n - 1).tolist()
-        )
+        expected = values(bits, n - 1) if n else np.zeros(TAXELS)
+        assert taxels[0].tolist() == expected.tolist()
         assert unknown == b""
 
 
 def test_the_three_axis_driver_reads_signed_numbers(host):
-    dump = subprocess.run(
-        [host(16, 3), "dump"], capture_output=True, text=True, check=True
-    )
-    identity, _, _, _, frame, *_ = map(bytes.fromhex, dump.stdout.split("\n")[:-1])
+    identity, _, _, _, frame, *_ = dumped(host(16, 3))
     assert identity[5] == 0x90
     bus = FakeBus(chips={0x28: Registers({0x00: identity, 0x10: frame})})
     chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
@@ -131,7 +120,7 @@ def plugged(host):
     master, slave = pty.openpty()
     tty.setraw(slave)
     program = subprocess.Popen([host(12)], stdin=master, stdout=master)
-    yield os.ttyname(slave), program
+    yield os.ttyname(slave)
     program.kill()
     program.wait()
     os.close(master)
@@ -140,15 +129,10 @@ def plugged(host):
 
 def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     """Bytes between two requests end with the next zero."""
-    bus = SerialBus(plugged[0], timeout_s=5.0)
+    bus = SerialBus(plugged, timeout_s=5.0)
     chip = Block(bus, 0, taxels=TAXELS, bits=12)
-    for noise in (
-        b"\x05",
-        b"\0\0",
-        b"\xff" * 300,
-        b"\x04\x10\x01\x01\0",
-        b"\x03\x10\0",
-    ):
+    requests = (b"\x04\x10\x01\x01\0", b"\x03\x10\0")
+    for noise in (b"\x05", b"\0\0", b"\xff" * 300, *requests):
         bus._port.write(noise + b"\0")
         bus.transfer(chip.frame)
         assert Block.parse(chip.frame.buffer[None], spec(12))[1].all()
@@ -156,7 +140,7 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
 
 
 def test_another_shape_than_the_skin_file_says_is_named(plugged):
-    bus = SerialBus(plugged[0], timeout_s=5.0)
+    bus = SerialBus(plugged, timeout_s=5.0)
     with pytest.raises(
         WrongChip, match="serves 100 taxels of 12 bits, not 100 taxels of 16"
     ):
@@ -167,10 +151,8 @@ def test_another_shape_than_the_skin_file_says_is_named(plugged):
 def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
     text = skinfile.shipped("matrix").read_text()
     path = tmp_path / "skin.toml"
-    slow = text.replace("/dev/ttyACM0", plugged[0]).replace(
-        "timeout_s = 0.02", "timeout_s = 5.0"
-    )
-    path.write_text(slow)
+    slow = text.replace("timeout_s = 0.02", "timeout_s = 5.0")
+    path.write_text(slow.replace("/dev/ttyACM0", plugged))
     with Skin.open(path, calibrated=False) as skin:
         frames = [skin.read() for _ in range(3)]
         raw, valid = skin.raw()
@@ -194,21 +176,7 @@ def test_the_sketch_agrees_with_the_example_skin():
 def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
     """Checked against the declarations of Arduino's core, without a board's compiler."""
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
-    compiled = subprocess.run(
-        [
-            "g++",
-            "-std=c++11",
-            "-fsyntax-only",
-            "-Wall",
-            "-Werror",
-            board,
-            f"-I{tmp_path}",
-            f"-I{MATRIX}",
-            "-xc++",
-            str(MATRIX / "matrix.ino"),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [*GPP, "-fsyntax-only", board, f"-I{tmp_path}", "-xc++"]
+    options = {"capture_output": True, "text": True, "check": False}
+    compiled = subprocess.run([*command, MATRIX / "matrix.ino"], **options)
     assert compiled.returncode == 0, compiled.stderr

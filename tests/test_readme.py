@@ -23,12 +23,11 @@ from train.importers import sdh2
 
 GRASPS = ROOT.parent / "shared" / "real" / "sdh2_grasps"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+MAKEFILE = (ROOT / "Makefile").read_text()
 TEXT = "\n".join(page.read_text() for page in PAGES)
 FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
-FENCE = re.compile(r"(?ms)^ *```\w*\n(.*?)^ *```")
-CODE = [
-    " ".join(code.split()) for code in re.findall(r"`([^`]+)`", FENCE.sub("", TEXT))
-]
+INLINE = re.findall(r"`([^`]+)`", FENCE.sub("", TEXT))
+CODE = [" ".join(code.split()) for code in INLINE]
 BLOCKS = "\n".join(FENCE.findall(TEXT)).replace("\\\n", "")
 COMMAND = re.compile(r"(?m)(?:^|[ /])(edge-classify|-m train|-m export) ([^\n|>#&;]*)")
 COMMANDS = sorted(set(COMMAND.findall("\n".join([*CODE, BLOCKS]))))
@@ -39,7 +38,14 @@ WORKSTATION = [c for c in FIRST if c.startswith("python -m train ") and "--" in 
 MAKE = [c for c in FIRST if c.startswith("make ")]
 # In code, or at the beginning of a line of it: "make" is a word of prose too.
 TARGETS = sorted(set(re.findall(r"(?:^ *|`)make ([a-z-]+)", TEXT, re.M)))
-FAKED = ("scan", "calibrate", "view", "record", "run")
+FAKED = {
+    "scan": "--fake still.npz",
+    "calibrate": "--fake still.npz --frames 20",
+    "view": "--fake REC.npz --seconds 0.3",
+    "record": "--fake REC.npz",
+    "run": "--fake REC.npz",
+}
+"""What is added to a command that reads the skin."""
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +54,8 @@ def bench(exported, recordings, tmp_path_factory):
     folder = tmp_path_factory.mktemp("owner")
     touch = load(recordings / "hard_0.npz")
     text = skinfile.shipped().read_text()
-    text = re.sub(r"(?m)^threshold_counts = \d+", "threshold_counts = 50", text)
-    text = re.sub(
-        r"(?m)^onset_counts = \d+", f"onset_counts = {touch.layout.onset}", text
-    )
+    for name, value in (("threshold", 50), ("onset", touch.layout.onset)):
+        text = re.sub(rf"(?m)^{name}_counts = \d+", f"{name}_counts = {value}", text)
     (folder / "skin.toml").write_text(text)
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(exported / name, folder)
@@ -66,21 +70,13 @@ def test_a_command_of_the_board_does_as_it_is_written(
 ):
     """In the order of the page; commands that read the skin use fake chips."""
     monkeypatch.chdir(bench)
-    written = command.replace("REC…", "REC.npz").replace(
-        "--model M ", "--model model.onnx "
-    )
+    written = command.replace("REC…", "REC.npz").replace(" M ", " model.onnx ")
     words = shlex.split(written)[1:]
     if words == ["view"]:
         words += ["--skin", "skin.toml"]
-    if words[0] in FAKED:
-        words += [
-            "--fake",
-            "still.npz" if words[0] in ("scan", "calibrate") else "REC.npz",
-        ]
-    words += {"calibrate": ["--frames", "20"], "view": ["--seconds", "0.3"]}.get(
-        words[0], []
+    assert cli.main([*words, *FAKED.get(words[0], "").split()]) == 0, (
+        capsys.readouterr().err
     )
-    assert cli.main(words) == 0, capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("program", "arguments"), COMMANDS)
@@ -119,36 +115,31 @@ def test_a_command_of_the_workstation_does_as_it_is_written(
             (bench / "FOLDER" / file.parent.name).mkdir(parents=True, exist_ok=True)
             shutil.copy(file, bench / "FOLDER" / file.parent.name)
     names = {"DIR": "made", "SCENE": str(scene)}
-    words = [
-        names.get(word.strip("[]"), word.strip("[]")) for word in command.split()[3:]
-    ]
-    assert train([*words, *(["--trials", "1"] if words[0] == "simulate" else [])]) == 0
+    written = command.replace("[", "").replace("]", "").split()[3:]
+    words = [names.get(word, word) for word in written]
+    more = ["--trials", "1"] if words[0] == "simulate" else []
+    assert train([*words, *more]) == 0
 
 
 @pytest.mark.parametrize("command", MAKE)
 def test_a_make_command_says_what_it_would_do(command):
-    words = [
-        w for w in shlex.split(command.replace("[", "").replace("]", "")) if w != "…"
-    ]
-    made = subprocess.run(
-        [*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True
-    )
+    written = re.sub("[][…]", "", command)
+    options = {"cwd": ROOT, "capture_output": True, "text": True}
+    made = subprocess.run([*shlex.split(written), "--dry-run"], **options)
     assert made.returncode == 0, made.stderr
     assert "python" in made.stdout
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_make_target_exists(target):
-    rules = re.findall(
-        r"^([\w./-]+(?: [\w./-]+)*):", (ROOT / "Makefile").read_text(), re.M
-    )
+    rules = re.findall(r"^([\w./-]+(?: [\w./-]+)*):", MAKEFILE, re.M)
     assert target in " ".join(rules).split()
 
 
 @pytest.mark.parametrize("picture", re.findall(r"\]\((docs/[^)]+\.png)\)", TEXT))
 def test_each_picture_is_there_and_made_by_a_target(picture):
     assert (ROOT / picture).exists()
-    assert re.search(rf"^{re.escape(picture)}:", (ROOT / "Makefile").read_text(), re.M)
+    assert re.search(rf"^{re.escape(picture)}:", MAKEFILE, re.M)
 
 
 def test_the_table_of_errnos_has_all_that_the_driver_answers():
@@ -158,10 +149,7 @@ def test_the_table_of_errnos_has_all_that_the_driver_answers():
 
 
 def test_each_command_of_python_is_there():
-    assert {command.split()[3] for command in WORKSTATION} == {
-        "import",
-        "simulate",
-        "show",
-    }
+    commands = {command.split()[3] for command in WORKSTATION}
+    assert commands == {"import", "simulate", "show"}
     options = export_parser().format_help()
     assert all(option in options for option in ("--scaling", "--k", "--front", "--arm"))
