@@ -19,11 +19,10 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
     assert export.save(path, fitted) == path.stat().st_size
     model = Model(path)
     assert all(check.passed for check in verify(model, tmp_path / "golden.npz"))
-    assert model.info.tasks["object"].projection == "pca"
-    assert model.info.tasks["object"].left_out == "trial"
-    assert (
-        model.info.tasks["object"].accuracy == fitted.chosen["object"].accuracy.accuracy
-    )
+    task = model.info.tasks["object"]
+    assert task.projection == "pca"
+    assert task.left_out == "trial"
+    assert task.accuracy == fitted.chosen["object"].accuracy.accuracy
 
 
 def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(
@@ -66,24 +65,19 @@ def test_each_candidate_has_a_price(fitted):
 
 def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     fitted = train.fit(str(recordings), features=["paper", "contact"], jobs=1, k=1)
-    own = {
-        "category": replace(
-            fitted.chosen["category"].choice, features=("log_max_force@5",)
-        ),
-        "object": fitted.chosen["object"].choice,
-    }
+    own = {task: chosen.choice for task, chosen in fitted.chosen.items()}
+    own["category"] = replace(own["category"], features=("log_max_force@5",))
     names = fitted.dataset.names
     widths = fitted.dataset.widths(fitted.samples)
     classifier = train.fitting.ContactClassifier(own, names, widths)
     y = {task: fitted.dataset.labels(task) for task in own}
-    export.save(
-        tmp_path / "model.onnx",
-        replace(fitted, classifier=classifier.fit(fitted.X, y), sequential=None),
-    )
-    model = Model(tmp_path / "model.onnx")
-    seen = model.run(1.01 * fitted.X)
+    classifier.fit(fitted.X, y)
+    path = tmp_path / "model.onnx"
+    export.save(path, replace(fitted, classifier=classifier, sequential=None))
+    queries = 1.01 * fitted.X
+    seen = Model(path).run(queries)
     for task in own:
-        _, rows = classifier.neighbours(task, 1.01 * fitted.X)
+        _, rows = classifier.neighbours(task, queries)
         assert (seen[f"{task}_neighbours"] == rows).all()
 
 

@@ -27,12 +27,8 @@ def rows(monkeypatch, request):
 
 
 def test_each_format_has_its_price_and_the_shipped_one_no_other_label(rows):
-    assert [row["format"].split()[0] for row in rows] == [
-        "whole",
-        "float64,",
-        "float32",
-        "int8",
-    ]
+    first = [row["format"].split()[0] for row in rows]
+    assert first == ["whole", "float64,", "float32", "int8"]
     assert all(tuple(row) == FORMAT and row["decision us"] > 0.0 for row in rows)
     assert rows[0]["other labels %"] == rows[0]["other distances alone %"] == 0.0
 
@@ -63,17 +59,15 @@ def test_the_copy_that_rounds_nothing_has_all_other_operators():
     copy = arithmetic.unrounded(shipped)
 
     onnx.checker.check_model(copy, full_check=True)
-    assert {node.op_type for node in shipped.graph.node} - {"Round"} == {
-        node.op_type for node in copy.graph.node
-    }
+    before, after = ({n.op_type for n in m.graph.node} for m in (shipped, copy))
+    assert before - {"Round"} == after
 
 
 def test_the_copy_in_float32_has_no_float64_left():
     copy = arithmetic.in_float32(onnx.load(GOLDEN / "model.onnx"))
 
-    assert all(
-        tensor.data_type != onnx.TensorProto.DOUBLE for tensor in copy.graph.initializer
-    )
+    kinds = {tensor.data_type for tensor in copy.graph.initializer}
+    assert onnx.TensorProto.DOUBLE not in kinds
     onnx.checker.check_model(copy, full_check=True)
 
 

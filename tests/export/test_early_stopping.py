@@ -176,9 +176,8 @@ def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, fo
 def test_the_board_stops_where_the_rule_does(early, make_touch, error):
     rule = stopping_rules(early, error)["category"]
     for seed in (50, 51, 52):
-        decision = decided(early, make_touch(kind="soft", seed=seed), error)[
-            "category"
-        ].to_dict()
+        touch = make_touch(kind="soft", seed=seed)
+        decision = decided(early, touch, error)["category"].to_dict()
         assert decision["window_s"] in early.decision_points_s[: rule.last + 1]
         assert decision["stopped_by"] == ("window" if rule.fixed else "confidence")
         assert decision["error"] == error
@@ -204,57 +203,54 @@ def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule
     assert category.stopped_by == "window"
 
 
-def test_a_task_without_a_certified_rule_says_so(early, make_touch, monkeypatch, error):
+@pytest.fixture
+def uncertified(early, monkeypatch):
+    """The model, with no certified rule for object."""
     stopping = early.info.stopping["object"]
     never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
     monkeypatch.setitem(early.info.stopping, "object", never)
-    events = decided(early, make_touch(seed=50), error)
+    return early
+
+
+def test_a_task_without_a_certified_rule_says_so(uncertified, make_touch, error):
+    events = decided(uncertified, make_touch(seed=50), error)
     flags = {task: "uncertified" in event.flags for task, event in events.items()}
     assert flags == {"category": False, "object": True}
 
 
 @pytest.mark.parametrize("seed", range(50, 56))
 def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
-    early, make_touch, monkeypatch, error, seed
+    uncertified, make_touch, error, seed
 ):
-    stopping = early.info.stopping["object"]
-    never = replace(stopping, rules=(replace(stopping.rules[0], error=1.0),))
-    monkeypatch.setitem(early.info.stopping, "object", never)
     touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
-    uncertified = decided(early, touch, error)["object"]
-    plain = decided(early, touch, None)["object"]
-    assert uncertified.label == plain.label
-    assert uncertified.confidence == plain.confidence
-    assert uncertified.window_s == plain.window_s
-    assert {*uncertified.flags} == {*plain.flags, "uncertified"}
+    asked = decided(uncertified, touch, error)["object"]
+    plain = decided(uncertified, touch, None)["object"]
+    assert asked.label == plain.label
+    assert asked.confidence == plain.confidence
+    assert asked.window_s == plain.window_s
+    assert {*asked.flags} == {*plain.flags, "uncertified"}
 
 
 def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is_like(
     early, make_touch, monkeypatch
 ):
+    error = 0.0
     for task, stopping in early.info.stopping.items():
         hasty = replace(stopping.rules[0], confidence=0.0)
-        monkeypatch.setitem(
-            early.info.stopping, task, replace(stopping, rules=(hasty,))
-        )
+        hurried = replace(stopping, rules=(hasty,))
+        monkeypatch.setitem(early.info.stopping, task, hurried)
+        error = max(error, hurried.smallest_error)
     known = make_touch(kind="hard", seed=50)
-    strange = replace(
-        known, frames=np.minimum(known.frames.astype(np.int64) * 40, 65535)
-    )
-    error = max(stopping.smallest_error for stopping in early.info.stopping.values())
-    met, unmet, waited = (
-        decided(early, touch, asked)
-        for touch, asked in ((known, error), (strange, error), (strange, None))
-    )
-    at = [
-        {event.window_s for event in events.values()} for events in (met, unmet, waited)
-    ]
-    assert at == [{0.3}, {1.2}, {1.2}]
+    strange = replace(known, frames=np.minimum(known.frames.astype(int) * 40, 65535))
+    met = decided(early, known, error)
+    unmet = decided(early, strange, error)
+    waited = decided(early, strange, None)
     assert early.info.novelty.task == "object"
-    assert all(
-        "unknown" in event.flags for event in (*unmet.values(), *waited.values())
-    )
-    assert not any("unknown" in event.flags for event in met.values())
+    for events, seconds, flagged in ((met, 0.3, False), (unmet, 1.2, True)):
+        assert {event.window_s for event in events.values()} == {seconds}
+        assert {"unknown" in event.flags for event in events.values()} == {flagged}
+    assert {event.window_s for event in waited.values()} == {1.2}
+    assert all("unknown" in event.flags for event in waited.values())
     assert unmet["object"].label == "unknown" != waited["object"].label
     assert unmet["category"].label == "rigid-fixed"
 
@@ -288,15 +284,11 @@ def pressed(make_touch, seeds):
     """Touches of an object; their category is of its softness and of how hard they are
     pressed."""
     for kind, press, seed in itertools.product(("hard", "soft"), (4, 5), seeds):
-        given = make_touch(kind=kind, seed=seed)
-        labels = {
-            "softness": kind,
-            "mobility": f"by {press}",
-            "category": f"{kind}-by {press}",
-        }
-        meta = {**given.meta, "labels": {**labels, "object": f"{kind} {seed % 2}"}}
-        frames = (given.frames * (press / 4)).astype(np.uint16)
-        yield replace(given, frames=frames, meta=meta)
+        labels = {"softness": kind, "mobility": f"by {press}"}
+        labels |= {"category": f"{kind}-by {press}", "object": f"{kind} {seed % 2}"}
+        touch = make_touch(kind=kind, seed=seed, labels=labels)
+        frames = (touch.frames * (press / 4)).astype(np.uint16)
+        yield replace(touch, frames=frames)
 
 
 @pytest.fixture(scope="module")
@@ -304,13 +296,8 @@ def agreeing(make_touch, tmp_path_factory):
     folder = tmp_path_factory.mktemp("agreement")
     for i, recording in enumerate(pressed(make_touch, range(8))):
         save(folder / f"{i:02d}.npz", recording)
-    fitted = train.fit(
-        folder,
-        features=["paper"],
-        decision_points_s=(0.3, 0.6, 1.2),
-        quick=True,
-        jobs=1,
-    )
+    points = {"features": ["paper"], "decision_points_s": (0.3, 0.6, 1.2)}
+    fitted = train.fit(folder, **points, quick=True, jobs=1)
     save_model(folder / "model.onnx", fitted)
     return fitted, Model(folder / "model.onnx")
 

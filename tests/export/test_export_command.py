@@ -13,44 +13,31 @@ from tests.conftest import PAPER, export
 
 def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, capsys):
     (tmp_path / "file").touch()
-    assert (
-        main(["--data", str(tmp_path / "missing"), "--out", str(tmp_path / "file")])
-        == 2
-    )
-    assert (
-        capsys.readouterr().err
-        == f"export: {tmp_path}/file: cannot be written: File exists\n"
-    )
+    out = tmp_path / "file"
+    assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
+    said = f"export: {out}: cannot be written: File exists\n"
+    assert capsys.readouterr().err == said
 
 
 def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     export(tmp_path, "--data", recordings, "--quick")
     out = capsys.readouterr()
     lines = out.err.splitlines()
-    rows = [
-        line
-        for line in lines
-        if line.startswith(("paper ", "contact joints ", "moments "))
-    ]
-    assert [row[:21].split() for row in rows] == [
-        ["paper", "pca"],
-        ["contact", "joints", "lda"],
-        ["moments", "joints", "lda"],
-    ]
+    rows = lines[1 : lines.index("") - 1]
+    names = ["paper pca", "contact joints lda", "moments joints lda"]
+    assert [" ".join(row[:21].split()) for row in rows] == names
     assert sum(row.count("*") for row in rows) == 2  # one a task
-    answers = [line for line in lines if line.startswith(("category:", "object:"))]
-    assert all(
-        "of 16 trials are classified correctly (95 % interval " in line
-        for line in answers
+    category, object_ = (
+        line for line in lines if line.startswith(("category:", "object:"))
     )
+    assert "of 16 trials are classified correctly (95 % interval " in object_
     low, high = wilson(6.4, 6.4)
-    shown = f"(95 % interval {100 * low:.0f} to {100 * high:.0f})"
-    assert shown in answers[0]
+    interval = f"(95 % interval {100 * low:.0f} to {100 * high:.0f})"
+    assert f"of 16 trials are classified correctly {interval}" in category
     info = Model(tmp_path / "model.onnx").info
-    assert f"{info.tasks['category'].accuracy:.1%}" in answers[0]
-    assert set(info.features) == {
-        f for task in info.tasks.values() for f in task.features
-    }
+    assert f"{info.tasks['category'].accuracy:.1%}" in category
+    taken = [feature for task in info.tasks.values() for feature in task.features]
+    assert set(info.features) == set(taken)
     assert out.out.splitlines()[1].endswith("golden.npz")
 
 
@@ -61,29 +48,10 @@ def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
 
 
 def test_fixed_values_and_some_tasks(recordings, tmp_path):
-    fixed = (
-        "--scaling",
-        "II",
-        "--components",
-        3,
-        "--k",
-        2,
-        "--window",
-        0.8,
-        "--threshold",
-        120,
-    )
-    export(
-        tmp_path,
-        "--data",
-        recordings,
-        "--tasks",
-        "object",
-        "--name",
-        "pads",
-        *fixed,
-        *PAPER,
-    )
+    fixed = "--scaling II --components 3 --k 2 --window 0.8 --threshold 120"
+    of_model = "--tasks object --name pads"
+    words = f"{fixed} {of_model}".split()
+    export(tmp_path, "--data", recordings, *words, *PAPER)
     info = Model(tmp_path / "model.onnx").info
     assert info.name == "pads"
     assert list(info.tasks) == ["object"]
@@ -187,16 +155,10 @@ def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, cap
 def test_recordings_that_are_held_out_are_scored_by_both_models(
     exported, recordings, tmp_path, capsys
 ):
-    status = main(
-        [
-            *("--data", str(recordings), "--out", str(tmp_path), "--quick"),
-            *("--features", "paper", "--jobs", "1", "--decision-points", "none"),
-            *("--test", str(recordings)),
-            *("--compare", str(exported / "model.onnx")),
-        ]
-    )
+    words = "--quick --features paper --decision-points none".split()
+    words += ["--test", recordings, "--compare", exported / "model.onnx"]
+    export(tmp_path, "--data", recordings, *words)
     err = capsys.readouterr().err
-    assert status == 0
     assert "on recordings that it was not fitted on:" in err
     assert "category: 16 of 16 right" in err
     assert "category: 0 gained, 0 lost of 16: +0.0 points" in err

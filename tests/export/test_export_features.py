@@ -16,17 +16,8 @@ SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate
 
 @pytest.fixture(scope="module")
 def six(recordings, tmp_path_factory):
-    given = (
-        "--samples",
-        20,
-        "--scaling",
-        "IV",
-        "--projection",
-        "pca",
-        "--features",
-        *SIX,
-    )
-    return export(tmp_path_factory.mktemp("six"), "--data", recordings, *given)
+    given = "--samples 20 --scaling IV --projection pca --features".split()
+    return export(tmp_path_factory.mktemp("six"), "--data", recordings, *given, *SIX)
 
 
 def test_the_model_says_what_it_measures_and_in_which_units(six):
@@ -44,9 +35,8 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
 def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six, value):
     vector = np.zeros(110)
     vector[105] = value
-    with pytest.raises(
-        InputError, match="value 105 .*, of contact_area_rate@10, is not finite"
-    ):
+    said = "value 105 .*, of contact_area_rate@10, is not finite"
+    with pytest.raises(InputError, match=said):
         Model(six / "model.onnx").decide(vector)
 
 
@@ -65,10 +55,8 @@ def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
     given = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
     export(tmp_path, "--data", recordings, *given)
     model = Model(tmp_path / "model.onnx")
-    assert (
-        sum(len(table.biases) for table in model.info.kernels.values())
-        == model.info.width
-    )
+    biases = [len(table.biases) for table in model.info.kernels.values()]
+    assert sum(biases) == model.info.width
     assert len(json.dumps(to_json(model.info))) < 20_000
     files = ("--model", model.path, "--golden", tmp_path / "golden.npz")
     assert edge("verify", *files, text=True)[0] == 0

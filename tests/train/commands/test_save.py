@@ -20,12 +20,13 @@ def folder(make_touch, tmp_path):
         valid = np.ones(touch.frames.shape, dtype=bool)
         valid[3, 4, 5] = number == 0
         labels = {"object": f"thing {number}", "softness": "soft"}
-        meta = {**touch.meta, "labels": labels}
-        edge.save(
-            tmp_path / "in" / f"touch_{number}.npz",
-            replace(touch, valid=valid, meta=meta),
-        )
+        touch = replace(touch, valid=valid, meta={**touch.meta, "labels": labels})
+        edge.save(tmp_path / "in" / f"touch_{number}.npz", touch)
     return tmp_path / "in"
+
+
+def loaded(folder):
+    return [edge.load(path) for path in sorted(folder.glob("*.npz"))]
 
 
 def saved(folder, form, *options):
@@ -37,7 +38,7 @@ def saved(folder, form, *options):
 
 def test_a_table_has_a_row_for_each_frame(folder, capsys):
     table = pd.read_parquet(saved(folder, "parquet"))
-    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    recordings = loaded(folder)
     assert len(table) == sum(len(r.t) for r in recordings)
     second = table[table["trial"] == "touch_1"]
     assert set(second["object"]) == {"thing 1"}
@@ -49,16 +50,13 @@ def test_a_table_has_a_row_for_each_frame(folder, capsys):
 
 
 def test_import_reads_the_table_back(folder, tmp_path):
-    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    recordings = loaded(folder)
     names = [f"joint_{name}" for name in recordings[0].joint_names or range(1, 6)]
     out = str(tmp_path / "back")
     table = str(saved(folder, "parquet"))
     joints = ("--joints", ",".join(names))
     assert main(["import", "csv", table, "--out", out, *joints]) == 0
-    for recording, path in zip(
-        recordings, sorted((tmp_path / "back").glob("*.npz")), strict=True
-    ):
-        back = edge.load(path)
+    for recording, back in zip(recordings, loaded(tmp_path / "back"), strict=True):
         valid = recording.valid
         assert (back.frames * valid == recording.frames * valid).all()
         assert back.t == pytest.approx(recording.t - recording.t[0])
@@ -68,7 +66,7 @@ def test_import_reads_the_table_back(folder, tmp_path):
 
 def test_hdf5_holds_an_array_for_each_quantity(folder):
     h5py = pytest.importorskip("h5py")
-    recordings = [edge.load(path) for path in sorted(folder.glob("*.npz"))]
+    recordings = loaded(folder)
     with h5py.File(saved(folder, "hdf5")) as file:
         frames = np.concatenate([r.frames for r in recordings])
         assert file["frames"][()].tobytes() == frames.tobytes()
@@ -93,32 +91,35 @@ def test_shear_has_columns_of_its_own(folder):
     assert (around == -along).all()
 
 
-def test_recordings_that_do_not_fit_together_are_named(folder, make_touch, capsys):
-    touch = make_touch(arm=False)
-    edge.save(folder / "z.npz", replace(touch, joints=None))
-    out = folder.parent / "all.parquet"
-    words = ["save", str(folder), "--as", "parquet", "--out", str(out)]
-    assert main(words) == 2
-    assert "z.npz: its skin or joints are not those of" in capsys.readouterr().err
-    assert not out.exists()
-
-
-def test_joints_of_other_names_are_not_saved_under_the_firsts(folder, capsys):
+def changed(folder, **meta):
+    """Change metadata of the second recording."""
     path = folder / "touch_1.npz"
     touch = edge.load(path)
-    names = [f"other {i}" for i in range(touch.dof)]
-    edge.save(path, replace(touch, meta={**touch.meta, "joint_names": names}))
+    edge.save(path, replace(touch, meta={**touch.meta, **meta}))
+
+
+def refused(refusal, folder):
+    """The sentence by which recordings are not saved."""
     out = folder.parent / "all.parquet"
-    words = ["save", str(folder), "--as", "parquet", "--out", str(out)]
-    assert main(words) == 2
-    assert "touch_1.npz: its skin or joints are not" in capsys.readouterr().err
+    said = refusal("save", folder, "--as", "parquet", "--out", out)
+    assert not out.exists()
+    return said
+
+
+def test_recordings_that_do_not_fit_together_are_named(folder, make_touch, refusal):
+    edge.save(folder / "z.npz", make_touch(arm=False))
+    said = refused(refusal, folder)
+    assert "z.npz: its skin or joints are not those of" in said
+
+
+def test_joints_of_other_names_are_not_saved_under_the_firsts(folder, refusal):
+    changed(folder, joint_names=[f"other {i}" for i in range(5)])
+    said = refused(refusal, folder)
+    assert "touch_1.npz: its skin or joints are not" in said
 
 
 @pytest.mark.parametrize("task", ["trial", "t_s", "taxel_0_0", "joint_1"])
-def test_a_task_with_the_name_of_a_column_is_refused(folder, task, capsys):
-    path = folder / "touch_1.npz"
-    touch = edge.load(path)
-    edge.save(path, replace(touch, meta={**touch.meta, "labels": {task: "a"}}))
-    words = ["save", str(folder), "--as", "parquet", "--out", str(folder / "all")]
-    assert main(words) == 2
-    assert "has the name of another column; save as hdf5" in capsys.readouterr().err
+def test_a_task_with_the_name_of_a_column_is_refused(folder, task, refusal):
+    changed(folder, labels={task: "a"})
+    said = refused(refusal, folder)
+    assert "has the name of another column; save as hdf5" in said

@@ -3,6 +3,7 @@ PNG."""
 
 import csv
 import io
+import re
 
 from matplotlib.figure import Figure as MatplotlibFigure
 
@@ -60,17 +61,11 @@ def test_timings_are_in_a_file_of_their_own():
 
 def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
     tables = [table(), Table("empty", "Nothing", [])]
-    sections = [
-        Section(
-            "One", figures=[Figure("plot", "A plot", b"\x89PNG", b"")], tables=tables
-        )
-    ]
-    report = write(tmp_path, "Title", [], sections)
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "plot.png",
-        "report.html",
-        "speed.csv",
-    ]
+    figures = [Figure("plot", "A plot", b"\x89PNG", b"")]
+    section = Section("One", figures=figures, tables=tables)
+    report = write(tmp_path, "Title", [], [section])
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"plot.png", "report.html", "speed.csv"}
     text = report.read_text()
     assert 'src="data:image/png;base64,iVBORw=="' in text
     assert "http" not in text
@@ -86,12 +81,8 @@ def test_a_long_table_is_folded_and_a_phone_shows_its_first_columns():
 
 def test_the_first_section_is_open_and_the_others_are_folded():
     text = page("Title", [], [Section("One"), Section("Two", ["below"])])
-    assert (
-        text.index("One")
-        < text.index("<details")
-        < text.index("Two")
-        < text.index("below")
-    )
+    assert re.search("One.*<details.*Two.*below", text, re.S)
+    assert text.count("<details") == 1
 
 
 def test_words_are_explained_and_code_is_set_as_code():

@@ -44,8 +44,9 @@ def test_a_changed_trial_is_never_recognised_by_its_own_twin():
     rng = np.random.default_rng(4)
     X = rng.normal(size=(40, 9))
     y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}
-    changed = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X + 1e-6)["t"]
-    same = transfer(X, y, {"t": Result(0, 40, 8, 1)}, X)["t"]
+    best = {"t": Result(0, 40, 8, 1)}
+    changed = transfer(X, y, best, X + 1e-6)["t"]
+    same = transfer(X, y, best, X)["t"]
     assert changed.accuracy < 0.75
     assert same.accuracy == accuracies(neighbours(X, features=ONE), y["t"])[7, 0]
 
@@ -60,9 +61,8 @@ def test_a_change_that_moves_trials_among_others_costs():
 
 def test_nested_accuracy_of_clear_classes_is_one():
     X, y = clear()
-    result = nested(
-        X, {"t": y}, stratified_folds(y), grid=SearchGrid("IV"), features=ONE
-    )["t"]
+    options = {"grid": SearchGrid("IV"), "features": ONE}
+    result = nested(X, {"t": y}, stratified_folds(y), **options)["t"]
     assert result.right == 60
     assert result.total == 60
     assert result.components == 1
@@ -72,11 +72,8 @@ def test_nested_accuracy_of_clear_classes_is_one():
 def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
     searched = score(Result(10, 20, components=3, k=2))
     plain = score(Result(10, 20))
-    assert (
-        list(searched)
-        == list(plain)
-        == ["accuracy %", "from %", "to %", "k", "components"]
-    )
+    columns = ["accuracy %", "from %", "to %", "k", "components"]
+    assert list(searched) == list(plain) == columns
     assert searched["from %"] < 50.0 < searched["to %"]
     assert searched["k"] == 2
     assert plain["k"] == ""

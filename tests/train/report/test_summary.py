@@ -20,6 +20,11 @@ from train.report.summary import (
 )
 
 
+def said(fitted, words):
+    """The warnings with some words."""
+    return [line for line in warnings(fitted) if words in line]
+
+
 def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
     lines = summary(fitted, [(162.04, 31.46)] * len(fitted.candidates)).splitlines()
     heads = ["features", "projection", *fitted.chosen, "us per decision", "kB"]
@@ -38,17 +43,13 @@ def test_flattering_data_and_left_out_recordings_get_a_warning(
     save(tmp_path / "still.npz", make_touch(seconds=0.0))
     save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))
     paths = [str(recordings), str(tmp_path)]
-    fitted = train.fit(
-        paths, features=["paper"], projection="pca", window_s=9.0, jobs=1
-    )
-    text = "\n".join(warnings(fitted))
+    options = {"features": ["paper"], "projection": "pca", "window_s": 9.0}
+    text = "\n".join(warnings(train.fit(paths, **options, jobs=1)))
     assert "warning: no contact above 150 counts, so counted as wrong: " in text
     assert "python -m train thresholds" in text
     assert "recordings are left out for lack of a label for object: " in text
-    assert (
-        "the window of 9 s is too long: every recording ends within 1.59 s of the onset"
-        in text
-    )
+    ends = "every recording ends within 1.59 s of the onset"
+    assert f"the window of 9 s is too long: {ends}" in text
 
 
 def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
@@ -56,14 +57,13 @@ def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
     objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
     for path in recordings.glob("*.npz"):
         recording = load(path)
-        place = np.full_like(
-            recording.joints, 0.3 * objects.index(recording.labels["object"])
-        )
-        save(tmp_path / path.name, replace(recording, joints=place))
+        place = 0.3 * objects.index(recording.labels["object"])
+        joints = np.full_like(recording.joints, place)
+        save(tmp_path / path.name, replace(recording, joints=joints))
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert posture_accuracy(fitted.dataset, "object") == 1.0
-    (said,) = [line for line in warnings(fitted) if line.startswith("warning: object")]
-    assert "at onset alone give 100.0% of the labels" in said
+    (sentence,) = said(fitted, "warning: object")
+    assert "at onset alone give 100.0% of the labels" in sentence
 
 
 def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
@@ -77,9 +77,7 @@ def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
         )
     fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
     assert posture_accuracy(fitted.dataset, "object") == 0.0 < LEAK
-    assert not any(
-        "warning: object: the joint angles" in line for line in warnings(fitted)
-    )
+    assert said(fitted, "warning: object: the joint angles") == []
 
 
 def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
@@ -91,8 +89,8 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     other = {**touch.labels, "object": "another"}
     save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
-    said = [line for line in warnings(fitted) if "have the same coordinates" in line]
-    assert [line.split(" have")[0] for line in said] == ["warning: object: 3 trials"]
+    (sentence,) = said(fitted, "have the same coordinates")
+    assert sentence.startswith("warning: object: 3 trials have")
 
 
 @pytest.mark.parametrize("factor", [3e6, 1e12])
@@ -101,31 +99,18 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(
 ):
     """A skin that was stored with a scale of its own: one trial of newtons a million
     times too many leaves a few steps for all others."""
-    fixed = {
-        "features": ["paper"],
-        "projection": "pca",
-        "scaling": "none",
-        "jobs": 1,
-        "k": 1,
-    }
-    fitted = train.fit(str(recordings), components=5, **fixed)
-    assert not any("steps" in line for line in warnings(fitted))
+    fixed = {"projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
+    fitted = train.fit(str(recordings), features=["paper"], components=5, **fixed)
+    assert said(fitted, "steps") == []
     outlier = fitted.X.copy()
     outlier[7] *= factor
-    classifier = ContactClassifier(fitted.classifier.choices, fitted.dataset.names)
-    classifier.fit(
-        outlier, {task: fitted.dataset.labels(task) for task in fitted.chosen}
-    )
-    said = [
-        line
-        for line in warnings(replace(fitted, classifier=classifier, X=outlier))
-        if "steps" in line
-    ]
-    assert len(said) == len(fitted.chosen)
-    assert (
-        f"because {fitted.dataset.trials[7].path} lies far outside all others"
-        in said[0]
-    )
+    dataset = fitted.dataset
+    classifier = ContactClassifier(fitted.classifier.choices, dataset.names)
+    classifier.fit(outlier, {task: dataset.labels(task) for task in fitted.chosen})
+    sentences = said(replace(fitted, classifier=classifier, X=outlier), "steps")
+    assert len(sentences) == len(fitted.chosen)
+    path = dataset.trials[7].path
+    assert f"because {path} lies far outside all others" in sentences[0]
 
 
 @pytest.mark.parametrize(

@@ -22,11 +22,8 @@ THINGS = ("plastic bin", "bed pillow")
 @pytest.fixture(scope="module")
 def scene():
     cody = scenes.load(SCENE, count=2)
-    return replace(
-        cody,
-        objects=tuple(o for o in cody.objects if o.name in THINGS),
-        trials={**cody.trials, "after_s": 1.7},
-    )
+    things = tuple(o for o in cody.objects if o.name in THINGS)
+    return replace(cody, objects=things, trials={**cody.trials, "after_s": 1.7})
 
 
 @pytest.fixture(scope="module")
@@ -39,27 +36,17 @@ def context(scene, tmp_path_factory):
 
 def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
     changed = variants(scene)
-    assert list(changed)[:4] == [
-        f"{what} x {factor}"
-        for factor in ("0.5", "2")
-        for what in ("speed", "arm stiffness")
-    ]
+    of_arm = ["speed x 0.5", "arm stiffness x 0.5", "speed x 2", "arm stiffness x 2"]
+    assert list(changed)[:4] == of_arm
     effects = {name.split(" ")[1] for name in list(changed)[4:]}
-    assert {
-        "crosstalk",
-        "hysteresis",
-        "drift",
-        "noise",
-        "saturation",
-        "dead_band",
-    } < effects
-    assert {"quantisation", "dead_taxels", "jitter", "dropped_frames"} < effects
+    analogue = "crosstalk hysteresis drift noise saturation dead_band"
+    digital = "quantisation dead_taxels jitter dropped_frames"
+    assert {*analogue.split(), *digital.split()} <= effects
     assert "noise" not in changed["without noise"].add
     assert "drift" in changed["with drift"].add
     fast = changed["speed x 2"]
-    assert np.array(fast.rate) * fast.travel_s == pytest.approx(
-        np.array(scene.rate) * scene.travel_s
-    )
+    travelled = np.array(scene.rate) * scene.travel_s
+    assert np.array(fast.rate) * fast.travel_s == pytest.approx(travelled)
 
 
 def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene):
@@ -87,7 +74,7 @@ def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
     fewer = replace(scene, trials={**scene.trials, "count": 1})
     for other in (fewer, replace(scene, seed=scene.seed + 1)):
         with pytest.raises(
-            InputError, match="cody18 gives other trials than these recordings"
+            InputError, match="gives other trials than these recordings"
         ):
             robust.section(replace(context, scene=other))
 
@@ -96,10 +83,9 @@ def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_
     scene, tmp_path
 ):
     """What a heavy thing does under half the force is no contradiction of its label."""
-    heavy = tuple(
-        o for o in scenes.load(SCENE, count=2).objects if o.name == "wooden crate"
-    )
-    alone = replace(scene, objects=heavy)
+    objects = scenes.load(SCENE, count=2).objects
+    heavy = [thing for thing in objects if thing.name == "wooden crate"]
+    alone = replace(scene, objects=tuple(heavy))
     weak = variants(alone)["arm stiffness x 0.5"]
     with pytest.raises(InputError, match="contradicted"):
         list(simulate(weak))
@@ -124,7 +110,6 @@ def test_a_damaged_count_of_draws_is_one_sentence(context, scene, simulation, se
     meta = {**first.recording.meta, "simulation": simulation}
     damaged = replace(first, recording=replace(first.recording, meta=meta))
     data = replace(context.dataset, trials=(damaged, *others))
-    with pytest.raises(
-        InputError, match=rf"{first.path.name}: meta\.simulation.*{sentence}"
-    ):
+    said = rf"{first.path.name}: meta\.simulation.*{sentence}"
+    with pytest.raises(InputError, match=said):
         simulated_again(scene, data)

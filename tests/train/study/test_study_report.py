@@ -30,20 +30,16 @@ def test_the_papers_numbers_are_46_and_whole_trials_of_140():
     for entry in numbers:
         right = entry.percent * 1.4
         assert abs(right - round(right)) < 0.008, entry
-    headline = {
-        e.task: e.percent for e in numbers if (e.table, e.setting) == ("II", "none")
-    }
+    plain = [e for e in numbers if (e.table, e.setting) == ("II", "none")]
+    headline = {e.task: e.percent for e in plain}
     assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
 
 
 def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to():
     """The headlines of section IV-A stand in the tables eight times."""
     headlines = [e for e in entries() if e.headline]
-    assert Counter(e.task for e in headlines) == {
-        "category": 3,
-        "mobility": 2,
-        "object": 3,
-    }
+    counts = Counter(e.task for e in headlines)
+    assert counts == {"category": 3, "mobility": 2, "object": 3}
     assert {e.percent for e in headlines} == {80.0, 91.43, 72.14}
     ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
     ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
@@ -57,19 +53,15 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
     """Of pairs of samples of one accuracy one in twenty lies outside."""
     rng = np.random.default_rng(0)
     paper, ours = rng.binomial(140, 0.8, (2, 2000)) / 1.4
-    out = np.mean(
-        [
-            not low <= 0.0 <= high
-            for low, high in map(difference, paper, ours, [140] * 2000)
-        ]
-    )
+    pairs = np.transpose([paper, ours])
+    low, high = np.transpose([difference(*pair, 140) for pair in pairs])
+    out = np.mean((low > 0.0) | (high < 0.0))
     assert 0.03 < out < 0.07
     one = difference(80.0, 85.0, 140)
     eight = difference(80.0, 85.0, 8 * 140)
     assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
-    assert mean_of([{("I", "1", "t"): 80.0}, {("I", "1", "t"): 90.0}]) == {
-        ("I", "1", "t"): 85.0
-    }
+    key = ("I", "1", "t")
+    assert mean_of([{key: 80.0}, {key: 90.0}]) == {key: 85.0}
 
 
 def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
@@ -105,16 +97,13 @@ def test_the_category_is_judged_on_the_trials_with_a_wrong_object():
 
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):
-    folder = save_touches(
-        tmp_path_factory.mktemp("touches"), 12, seconds=1.3, rate=25.0
-    )
+    folder = tmp_path_factory.mktemp("touches")
+    save_touches(folder, 12, seconds=1.3, rate=25.0)
     out = tmp_path_factory.mktemp("study")
+    words = ["study", "--data", str(folder), "--out", str(out), "--jobs", "1"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(methods, "TREES", 10)
-        assert (
-            main(["study", "--data", str(folder), "--out", str(out), "--jobs", "1"])
-            == 0
-        )
+        assert main(words) == 0
     return out
 
 
@@ -122,22 +111,15 @@ def test_every_number_of_the_report_is_in_a_csv(studied):
     text = (studied / "report.html").read_text()
     named = set(re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text))
     assert named == {path.name for path in studied.glob("*.csv")}
-    assert {
-        "methods.csv",
-        "window.csv",
-        "scaling.csv",
-        "features.csv",
-        "resolution.csv",
-    } < named
+    tables = "methods window scaling features resolution"
+    assert {f"{name}.csv" for name in tables.split()} < named
     assert 2 * len(list(studied.glob("*.png"))) == text.count("data:image/png")
 
 
 def test_equal_scalings_are_equal(studied):
     """Methods I and II, and none and III, differ by what centring takes away."""
-    scaled = {
-        (r["scaling"], r["task"]): r["accuracy %"]
-        for r in rows_of(studied / "scaling.csv")
-    }
+    rows = rows_of(studied / "scaling.csv")
+    scaled = {(row["scaling"], row["task"]): row["accuracy %"] for row in rows}
     for task in ("category", "object"):
         assert scaled["I", task] == scaled["II", task]
         assert scaled["none", task] == scaled["III", task]
@@ -149,29 +131,26 @@ def test_easy_touches_are_recognised_and_the_findings_come_first(studied):
     compared = rows_of(studied / "methods.csv")
     assert {r["task"] for r in compared} == {"category", "object"}
     assert len({r["method"] for r in compared}) == len(methods.OURS) + 4
-    assert (
-        max(float(r["accuracy %"]) for r in compared if r["task"] == "category")
-        == 100.0
-    )
+    category = [r["accuracy %"] for r in compared if r["task"] == "category"]
+    assert max(map(float, category)) == 100.0
 
 
 def test_the_findings_name_no_best_method_below_the_papers():
     """Whatever is better on trials, accuracy on objects never met stands beside it."""
-    known = {
-        methods.PAPER: {"softness": Result(49, 50)},
-        "b": {"softness": Result(47, 50)},
-    }
-    unseen = {
-        methods.PAPER: {"softness": Result(41, 50)},
-        "b": {"softness": Result(42, 50)},
-    }
-    text = methods.sentence("softness", known, unseen)
-    assert (
-        "98 % of the contacts right (90 to 100; 82 % with objects never met). No method"
-        in text
-    )
-    known["b"]["softness"] = Result(50, 50)
-    text = methods.sentence("softness", known, unseen)
+
+    def sentence(papers, other):
+        known = {methods.PAPER: papers, "b": other}
+        unseen = {methods.PAPER: 41, "b": 42}
+        results = (
+            {name: {"softness": Result(right, 50)} for name, right in rights.items()}
+            for rights in (known, unseen)
+        )
+        return methods.sentence("softness", *results)
+
+    text = sentence(49, 47)
+    assert "98 % of the contacts right (90 to 100; 82 % with objects never met)" in text
+    assert "never met). No method" in text
+    text = sentence(49, 50)
     assert "The best is b: 100 % of the contacts right (93 to 100; 84 %" in text
 
 
