@@ -10,7 +10,7 @@ from train.tradeoff.choices import unseen
 from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
-from train.tradeoff.uses import EARLY, cheapest, distinct
+from train.tradeoff.uses import EARLY, cheapest, distinct, uses
 
 TABLE_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows in the tables."""
@@ -22,36 +22,20 @@ ACROSS = 3
 
 def answers(measured: Measured, task: str) -> list[Row]:
     """The rows of a task's table: fixed windows, early decisions, and guessing."""
-    after_s = measured.after_s
-    export = measured.commands.export(*EARLY)
     rows: list[Row] = []
-    for window, tasks in measured.points.items():
-        if window in TABLE_S or window > TABLE_S[-1]:
-            unmet = unseen(tasks[task])
-            rows.append(
-                {
-                    "decision": f"after {window:g} s",
-                    "time s": round(window + after_s, 3),
-                }
-                | shares(tasks[task].by_trial)
-                | {
-                    "objects never met %": ""
-                    if unmet is None
-                    else percent(unmet.accuracy)
-                }
-                | {"command": f"`{measured.commands.export(f'--window {window:g}')}`"}
+    for use in uses(measured, task):
+        row: Row = {"decision": use.name, "time s": round(use.seconds, 3)}
+        row |= shares(use.result)
+        window = use.window_s
+        if window is not None:
+            if window not in TABLE_S and window <= TABLE_S[-1]:
+                continue
+            unmet = unseen(measured.points[window][task])
+            row["objects never met %"] = (
+                "" if unmet is None else percent(unmet.accuracy)
             )
-    for rule in distinct(measured.comparisons[task]):
-        rows.append(
-            {
-                "decision": f"early, at most {rule.asked:.0%} wrong",
-                "time s": round(rule.mean_s + after_s, 3),
-            }
-            | shares(rule.result)
-            | {
-                "command": f"`{export}`, then `edge-classify run --error {rule.asked:g}`"
-            }
-        )
+        row["command"] = ", then ".join(f"`{command}`" for command in use.commands)
+        rows.append(row)
     guess = {"decision": "always the most frequent label", "time s": 0.0}
     return [*rows, guess | shares(majority(measured.y[task]))]
 
@@ -132,7 +116,7 @@ def prices(measured: Measured) -> Section:
         )
         row: Row = {"task": task, "best use": best.name, "mean price": mean}
         row["95 % interval"] = f"{least:g} to {most:g}"
-        row["command"] = f"`{best.command}`"
+        row["command"] = f"`{', then '.join(best.commands)}`"
         rows.append(row)
     command = measured.commands.tradeoff("--cost wrong=10,second=1")
     return Section(
@@ -258,13 +242,8 @@ def _panel(
     axes.axhline(
         chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label"
     )
-    curve(
-        axes,
-        0,
-        "after a fixed time",
-        [w + after_s for w in results],
-        list(results.values()),
-    )
+    times = [window + after_s for window in results]
+    curve(axes, 0, "after a fixed time", times, list(results.values()))
     colour, marker, dashes = STROKES[1]
     rules = distinct(compared)
     if rules:

@@ -68,14 +68,7 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         rate_hz: frames a second.
     """
     # The longest first: it runs beside the others.
-    cases = [
-        Change(
-            ALL,
-            "longer training",
-            raw,
-            given={"quick": False},
-        )
-    ]
+    cases = [Change(ALL, "longer training", raw, given={"quick": False})]
     for n in EVERY:
         carried = [w.name for w in wires(dataset.layout) if w.every(rate_hz) == n]
         price = (
@@ -90,14 +83,9 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         price = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
         name = counted(skin.rows * skin.cols, "taxel")
         cases.append(Change(name, price, replace(raw, recordings=tuple(recordings))))
-    cases.append(
-        Change(
-            "the paper's features",
-            "only 3 features",
-            dataset,
-            given={"features": ["paper"]},
-        )
-    )
+    paper = {"features": ["paper"]}
+    name = "the paper's features"
+    cases.append(Change(name, "only 3 features", dataset, given=paper))
     if dataset.layout.axes:
         cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
     y = {task: dataset.labels(task) for task in dataset.tasks}
@@ -126,12 +114,11 @@ def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
     for trial in dataset.trials:
         contacts.append((trial.path, numbers[trial.path]))
         numbers[trial.path] += 1
-    return {
-        task: dict(
-            zip(contacts, np.asarray(choice.by_trial.hits).tolist(), strict=True)
-        )
-        for task, choice in choices.items()
-    }
+    of_tasks: dict[str, Hits] = {}
+    for task, choice in choices.items():
+        right = np.asarray(choice.by_trial.hits).tolist()
+        of_tasks[task] = dict(zip(contacts, right, strict=True))
+    return of_tasks
 
 
 def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
@@ -176,18 +163,14 @@ def measure(
         rate_hz: frames a second.
         workers: the processes.
     """
-    waits = [
-        Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
-        for w in WAITS_S
-    ]
-    at_windows = hits(dataset, windows[WINDOW_S])
-    rows = [
-        row_of(wait, at_windows, hits(dataset, windows[w]), 0.0)
-        for wait, w in zip(waits, WAITS_S, strict=True)
-    ]
+    full = hits(dataset, windows[WINDOW_S])
+    rows = []
+    for w in WAITS_S:
+        wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
+        rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
     cases = changes(raw, dataset, rate_hz)
-    jobs = [(Change("the quick choice", "", dataset), dataset.layout)]
-    jobs += [(case, dataset.layout) for case in cases]
+    quick = Change("the quick choice", "", dataset)
+    jobs = [(case, dataset.layout) for case in (quick, *cases)]
     (base, _), *afters = workers.map("costs", answered, jobs)
     for case, (after, seconds) in zip(cases, afters, strict=True):
         rows.append(row_of(case, base, after, seconds))
@@ -210,20 +193,16 @@ def row_of(
 
 def section(measured: Measured) -> Section:
     """A row for each change, number format and board."""
-    rows = [
-        *measured.costs,
-        *(
-            {
-                "change": row["format"],
-                "saves or costs": f"{row['size kB']:.0f} kB; {row['other labels %']:.1f} % of the "
-                f"labels differ; {row['other distances alone %']:.0f} % of the "
-                "distances depend on "
-                "the batch",
-                TIME: f"{row['decision us']:.0f} us to decide",
-            }
-            for row in measured.formats
-        ),
-    ]
+    rows = list(measured.costs)
+    for form in measured.formats:
+        price = (
+            f"{form['size kB']:.0f} kB; {form['other labels %']:.1f} % of the labels "
+            f"differ; {form['other distances alone %']:.0f} % of the distances depend "
+            "on the batch"
+        )
+        row: Row = {"change": form["format"], "saves or costs": price}
+        row[TIME] = f"{form['decision us']:.0f} us to decide"
+        rows.append(row)
     return Section(
         "Savings, and the accuracy that they cost",
         [

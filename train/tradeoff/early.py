@@ -91,6 +91,13 @@ class StoppingComparison:
         return float(np.abs(gaps).sum() / len(right))
 
 
+def soonest_s(compared: StoppingComparison, level: float) -> float | None:
+    """The shortest mean time of early decisions of an accuracy; None where none has
+    it."""
+    rules = [rule for rule in compared.certified if 1.0 - rule.wrong >= level]
+    return min((rule.mean_s for rule in rules), default=None)
+
+
 def compare_stopping(
     dataset: DataSet,
     decision_points_s: Sequence[float],

@@ -16,7 +16,7 @@ from train.report.score import paired, percent, points
 from train.report.section import Figure, Row, Section, Table
 from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S, Points, chosen, unseen
-from train.tradeoff.early import StoppingComparison, compare_stopping
+from train.tradeoff.early import StoppingComparison, compare_stopping, soonest_s
 from train.tradeoff.wires import microcontroller
 
 LEVELS = (0.8, 0.9, 0.95)
@@ -48,12 +48,9 @@ class Answers:
         return {w: None if h is None else float(h.mean()) for w, h in hits.items()}
 
     def early_s(self, task: str, kind: str, level: float) -> float | None:
-        """The shortest mean time of early decisions of an accuracy."""
-        if task not in self.early[kind]:
-            return None
-        rules = self.early[kind][task].certified
-        times = [rule.mean_s for rule in rules if 1.0 - rule.wrong >= level]
-        return min(times, default=None)
+        """See `train.tradeoff.early`."""
+        compared = self.early[kind].get(task)
+        return None if compared is None else soonest_s(compared, level)
 
 
 @dataclass(frozen=True)
@@ -117,33 +114,34 @@ def reached_s(shares: Mapping[float, float | None], level: float) -> float | Non
 
 
 def times(compared: Compared) -> list[Row]:
-    """The time at which each task reaches each level, with shear and without; a dash
-    where it never does."""
+    """The time at which each task reaches each level, with shear and without."""
     sides = {"without s": compared.plain, "with s": compared.sheared}
-    rows: list[Row] = []
+    rows = []
     for task in compared.sheared.tasks:
-        shares = {
-            kind: {name: side.shares(task, kind) for name, side in sides.items()}
-            for kind in (KNOWN, UNMET)
-        }
         for level in LEVELS:
-            reached = {
-                f"fixed, {kind}": {
-                    name: reached_s(of_side, level) for name, of_side in of_kind.items()
-                }
-                for kind, of_kind in shares.items()
-            }
             for kind in (KNOWN, UNMET):
-                reached[f"early, {kind}"] = {
+                seconds = {
+                    name: reached_s(side.shares(task, kind), level)
+                    for name, side in sides.items()
+                }
+                rows.append(_time_row(task, level, f"fixed, {kind}", seconds))
+            for kind in (KNOWN, UNMET):
+                seconds = {
                     name: side.early_s(task, kind, level)
                     for name, side in sides.items()
                 }
-            for decision, seconds in reached.items():
-                row: Row = {"task": task, "right": f"{level:.0%}", "decision": decision}
-                for name, value in seconds.items():
-                    row[name] = "-" if value is None else f"{value:.2f}"
-                rows.append(row)
+                rows.append(_time_row(task, level, f"early, {kind}", seconds))
     return rows
+
+
+def _time_row(
+    task: str, level: float, decision: str, seconds: Mapping[str, float | None]
+) -> Row:
+    """The row of {column: seconds}; a dash where the level is never reached."""
+    row: Row = {"task": task, "right": f"{level:.0%}", "decision": decision}
+    for name, value in seconds.items():
+        row[name] = "-" if value is None else f"{value:.2f}"
+    return row
 
 
 def gains(compared: Compared) -> list[Row]:

@@ -11,6 +11,7 @@ from train.choose import Chosen
 from train.evaluate import Result
 from train.report.score import interval
 from train.tradeoff.choices import unseen
+from train.tradeoff.early import soonest_s
 from train.tradeoff.front import NAMES, ParetoFront
 from train.tradeoff.measured import Measured
 from train.tradeoff.uses import cheapest
@@ -85,18 +86,11 @@ def reached(measured: Measured, level: float) -> str:
     parts = []
     for task in measured.y:
         times = []
-        early = [
-            rule.mean_s
-            for rule in measured.comparisons[task].certified
-            if 1.0 - rule.wrong >= level
-        ]
-        if early:
-            times.append(f"{min(early):.2f} s on average (early)")
-        fixed = [
-            window
-            for window, result in measured.results(task).items()
-            if result.accuracy >= level
-        ]
+        early = soonest_s(measured.comparisons[task], level)
+        if early is not None:
+            times.append(f"{early:.2f} s on average (early)")
+        results = measured.results(task)
+        fixed = [window for window in results if results[window].accuracy >= level]
         if fixed:
             times.append(f"{min(fixed):g} s (fixed)")
         parts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")

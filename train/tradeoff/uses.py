@@ -17,12 +17,9 @@ EARLY = (
 def distinct(compared: StoppingComparison) -> list[Certified]:
     """The rules that most folds certify; one that serves two error rates stands at the
     smaller."""
-    able = [
-        certified for certified in compared.certified if certified.folds > FOLDS // 2
-    ]
-    return list({(rule.mean_s, rule.wrong): rule for rule in reversed(able)}.values())[
-        ::-1
-    ]
+    able = [rule for rule in compared.certified if rule.folds > FOLDS // 2]
+    rules = {(rule.mean_s, rule.wrong): rule for rule in reversed(able)}
+    return list(rules.values())[::-1]
 
 
 @dataclass(frozen=True)
@@ -33,13 +30,15 @@ class Use:
         name: of the way.
         seconds: mean time to the decision.
         result: its accuracy.
-        command: that makes it.
+        commands: that make it.
+        window_s: of a decision after a fixed time.
     """
 
     name: str
     seconds: float
     result: Result
-    command: str
+    commands: tuple[str, ...]
+    window_s: float | None = None
 
     def price(self, accuracy: float, measured: Measured) -> float:
         """The mean price of a decision at an accuracy."""
@@ -52,13 +51,13 @@ def uses(measured: Measured, task: str) -> list[Use]:
     for window, result in measured.results(task).items():
         command = measured.commands.export(f"--window {window:g}")
         seconds = window + measured.after_s
-        options.append(Use(f"after {window:g} s", seconds, result, command))
+        options.append(Use(f"after {window:g} s", seconds, result, (command,), window))
     export = measured.commands.export(*EARLY)
     for rule in distinct(measured.comparisons[task]):
         name = f"early, at most {rule.asked:.0%} wrong"
         seconds = rule.mean_s + measured.after_s
-        command = f"{export}, then edge-classify run --error {rule.asked:g}"
-        options.append(Use(name, seconds, rule.result, command))
+        run = f"edge-classify run --error {rule.asked:g}"
+        options.append(Use(name, seconds, rule.result, (export, run)))
     return options
 
 

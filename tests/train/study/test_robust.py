@@ -74,7 +74,7 @@ def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
     fewer = replace(scene, trials={**scene.trials, "count": 1})
     for other in (fewer, replace(scene, seed=scene.seed + 1)):
         with pytest.raises(
-            InputError, match="gives other trials than these recordings"
+            InputError, match="cody18 gives other trials than these recordings"
         ):
             robust.section(replace(context, scene=other))
 
