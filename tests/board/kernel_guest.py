@@ -107,12 +107,7 @@ class Rig:
         """Save frames as a recording; returns its path."""
         path = self.path.with_name("touch.npz")
         t = np.arange(len(frames)) * PERIOD_S
-        meta = {
-            "labels": {},
-            "skin": self.layout.to_dict(),
-            "source": "",
-            "trial": "touch",
-        }
+        meta = {"labels": {}, "skin": self.layout.to_dict(), "trial": "touch"}
         save(path, Recording(t, frames, meta=meta))
         return path
 
@@ -161,18 +156,15 @@ def outcome(rig, text):
     return printed, trials, calibration.baseline.tolist(), calibration.noise.tolist()
 
 
+RECORD = "--label object=box --trials 1 --length 60"
+
+
 @pytest.mark.parametrize(
     ("skin", "command", "options", "expected", "times"),
     [
         ("pad", "scan", "", '"state": "running"', 2),
         ("pad", "calibrate", "--frames 20 --force", '"noise_median": 1.', 1),
-        (
-            "pad",
-            "record",
-            "--label object=box --trials 1 --length 60",
-            '"complete": true',
-            1,
-        ),
+        ("pad", "record", RECORD, '"complete": true', 1),
         ("pad", "run", "--without-joints skin", '"event": "decision"', 3),
         ("pad", "view", "", "9 taxels", 1),
         ("cody", "scan", "", '"state": "running"', 8),
@@ -238,17 +230,13 @@ def test_a_second_program_is_refused_and_other_programs_see_the_chips_and_do_no_
     if child == 0:
         with SMBus(device) as smbus:
             smbus.write_quick(CHIP)  # as i2cdetect asks
-            values = {
-                smbus.read_byte_data(OTHER_CHIP, CONFIGURATION[0]) for _ in range(10)
-            }
+            register = CONFIGURATION[0]
+            values = {smbus.read_byte_data(OTHER_CHIP, register) for _ in range(10)}
         try:
             LinuxBus(device)
         except BusBusy as error:
-            os._exit(
-                0
-                if values == {EXPECTED[0]} and f"({os.getppid()})" in str(error)
-                else 1
-            )
+            named = f"({os.getppid()})" in str(error)
+            os._exit(0 if named and values == {EXPECTED[0]} else 1)
         os._exit(2)
     values = {fetch(bus, CHIP, b"\x5c", 2) for _ in range(10)}
     assert os.waitpid(child, 0)[1] == 0

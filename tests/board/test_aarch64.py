@@ -55,54 +55,25 @@ def emulated_python(wheel, counts):
     constraints = CHECKOUT / "constraints.txt"
 
     def install(site):
-        pip = [
-            sys.executable,
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-        ]
-        kind = [
-            "--only-binary=:all:",
-            "--implementation=cp",
-            "--python-version",
-            version,
-        ]
-        kind += [f"--platform={platform}_aarch64" for platform in PLATFORMS]
-        command = [
-            *pip,
-            *kind,
-            "-c",
-            str(constraints),
-            "--target",
-            str(site),
-            *PACKAGES,
-        ]
-        run(command, "pip cannot fetch the aarch64 wheels")
+        options = "-m pip install --quiet --disable-pip-version-check"
+        kind = f"--only-binary=:all: --implementation=cp --python-version={version}"
+        platforms = [f"--platform={platform}_aarch64" for platform in PLATFORMS]
+        where = ["-c", str(constraints), "--target", str(site)]
+        pip = [sys.executable, *options.split(), *kind.split(), *platforms, *where]
+        run([*pip, *PACKAGES], "pip cannot fetch the aarch64 wheels")
 
-    site = once(
-        AARCH64 / "site", "\n".join([version, constraints.read_text()]), install
-    )
+    recipe = f"{version}\n{constraints.read_text()}"
+    site = once(AARCH64 / "site", recipe, install)
     shutil.rmtree(AARCH64 / "wheel", ignore_errors=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(AARCH64 / "wheel")
     plugin = AARCH64 / "count.so"
     source = CHECKOUT / "tests" / "board" / "count.c"
     run(["cc", "-O2", "-Wall", "-shared", "-fPIC", "-o", str(plugin), str(source)])
-    variables = (
-        f"PYTHONPATH={AARCH64}/wheel:{site}",
-        "PYTHONNOUSERSITE=1",
-        "PYTHONHASHSEED=0",
-    )
+    path = f"PYTHONPATH={AARCH64}/wheel:{site}"
     command = [*program(qemu, "qemu-aarch64"), "-plugin", f"{plugin},out={counts}"]
-    command += [
-        "-cpu",
-        CPU,
-        "-L",
-        str(root),
-        *(word for v in variables for word in ("-E", v)),
-    ]
+    command += ["-cpu", CPU, "-L", str(root), "-E", path]
+    command += "-E PYTHONNOUSERSITE=1 -E PYTHONHASHSEED=0".split()
     run([*command, str(executable), "-c", ""], "qemu does not run here")
     return [*command, str(executable)]
 
@@ -131,9 +102,8 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
     shutil.copy(golden, tmp_path / "demo" / "golden.npz")
     machine, shares = elsewhere.ask(tmp_path, python)
     assert machine["machine"] == "aarch64"
-    assert {name for name, _ in shares} == {
-        folder.name for folder in elsewhere.sets(tmp_path)
-    }
+    names = {folder.name for folder in elsewhere.sets(tmp_path)}
+    assert {name for name, _ in shares} == names
     assert {("demo", "series counts"), ("demo", "object_label")} <= set(shares)
     print(
         f"{len(shares)} quantities, at most {max(shares.values()):.2g} of their bounds"
@@ -142,44 +112,34 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
 
 
 def test_the_demo_prints_the_same_lines(python, tmp_path):
-    emulated, native = (
-        subprocess.check_output([*command, "-m", "edge", "demo"], cwd=folder, text=True)
-        for command, folder in ((python, tmp_path), ([sys.executable], CHECKOUT))
-    )
-    assert timeless(emulated) == timeless(native)
+    emulated, native = demo(python, tmp_path), demo([sys.executable], CHECKOUT)
+    assert emulated
+    assert emulated == native
 
 
-def timeless(text):
-    """Events without the durations that a clock measured."""
-    lines = [json.loads(line) for line in text.splitlines()]
-    assert lines
-    return [{k: v for k, v in line.items() if k != "latency_ms"} for line in lines]
+def demo(command, folder):
+    """The events of the demo, without the durations that a clock measured."""
+    words = [*command, "-m", "edge", "demo"]
+    text = subprocess.check_output(words, cwd=folder, text=True)
+    return [json.loads(line) | {"latency_ms": 0} for line in text.splitlines()]
 
 
 def test_the_instructions_of_each_kind_of_frame_are_counted(python, counts, tmp_path):
     """Instruction counts do not depend on the speed of the machine."""
-    program = [
-        CHECKOUT / "tests" / "board" / "count_guest.py",
-        MODEL,
-        FOLDER / "cardboard-box-movable.npz",
-    ]
-    printed = subprocess.check_output([*python, *program], cwd=tmp_path, text=True)
-    marks = [int(line) for line in counts.read_text().split()][
-        :-1
-    ]  # the last marks the end
+    guest = CHECKOUT / "tests" / "board" / "count_guest.py"
+    words = [*python, guest, MODEL, FOLDER / "cardboard-box-movable.npz"]
+    kinds = subprocess.check_output(words, cwd=tmp_path, text=True).splitlines()
+    *marks, _ = map(int, counts.read_text().split())  # the last marks the end
     instructions = {}
-    for kind, before, after in zip(
-        printed.splitlines(), marks[::2], marks[1::2], strict=True
-    ):
+    for kind, before, after in zip(kinds, marks[::2], marks[1::2], strict=True):
         instructions.setdefault(kind, []).append(after - before)
     medians = {kind: statistics.median(each) for kind, each in instructions.items()}
+    rows = [("frame", "n", "lowest", "median", "highest")]
+    for kind, numbers in instructions.items():
+        ends = min(numbers), medians[kind], max(numbers)
+        rows.append((kind, len(numbers), *ends))
     with TABLE.open("w", newline="") as file:
-        rows = [
-            (k, len(v), min(v), medians[k], max(v)) for k, v in instructions.items()
-        ]
-        csv.writer(file).writerows(
-            [("frame", "n", "lowest", "median", "highest"), *rows]
-        )
+        csv.writer(file).writerows(rows)
     print(f"aarch64 instructions ({TABLE.relative_to(CHECKOUT)})\n{TABLE.read_text()}")
     assert 0 < medians["frame without contact"] < medians["frame in contact"]
     assert medians["frame in contact"] < medians["frame that decides"]

@@ -62,9 +62,8 @@ def test_it_is_small(wheel):
 
 def test_it_holds_edge_alone_and_all_of_it(contents):
     inside = {name for name in contents if ".dist-info/" not in name}
-    tracked = subprocess.check_output(
-        ["git", "ls-files", "edge"], cwd=CHECKOUT, text=True
-    )
+    command = ["git", "ls-files", "edge"]
+    tracked = subprocess.check_output(command, cwd=CHECKOUT, text=True)
     assert inside == set(tracked.split())
 
 
