@@ -39,9 +39,9 @@ def test_every_effect_of_the_sensor_is_added_or_left_out(scene):
     of_arm = ["speed x 0.5", "arm stiffness x 0.5", "speed x 2", "arm stiffness x 2"]
     assert list(changed)[:4] == of_arm
     effects = {name.split(" ")[1] for name in list(changed)[4:]}
-    analogue = "crosstalk hysteresis drift noise saturation dead_band"
-    digital = "quantisation dead_taxels jitter dropped_frames"
-    assert {*analogue.split(), *digital.split()} <= effects
+    assert {"crosstalk", "hysteresis", "drift", "noise", "saturation"} <= effects
+    assert {"dead_band", "quantisation", "dead_taxels"} <= effects
+    assert {"jitter", "dropped_frames"} <= effects
     assert "noise" not in changed["without noise"].add
     assert "drift" in changed["with drift"].add
     fast = changed["speed x 2"]

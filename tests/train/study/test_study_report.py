@@ -100,10 +100,10 @@ def studied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
     save_touches(folder, 12, seconds=1.3, rate=25.0)
     out = tmp_path_factory.mktemp("study")
-    words = ["study", "--data", str(folder), "--out", str(out), "--jobs", "1"]
+    words = ["--data", str(folder), "--out", str(out), "--jobs", "1"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(methods, "TREES", 10)
-        assert main(words) == 0
+        assert main(["study", *words]) == 0
     return out
 
 
