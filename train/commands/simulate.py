@@ -61,8 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         for key, error in written.rough.items():
             lines.append(
                 f"{key} and its kind: no step is within trials.tolerance; the step "
-                "taken errs by "
-                f"{100.0 * error:.2g} % of the peak force (see --explain)"
+                f"taken errs by {100.0 * error:.2g} % of the peak force (see --explain)"
             )
         print("\n".join(lines), file=sys.stderr)
     return 0

@@ -49,8 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if hidden:
         print(
             f"other thresholds show a contact in {hidden} more of the recordings; this "
-            "is noise, "
-            "or touches as weak as noise. `make export` also tries lower ones and "
-            "keeps the best"
+            "is noise, or touches as weak as noise. `make export` also tries lower "
+            "ones and keeps the best"
         )
     return 0

@@ -124,20 +124,15 @@ def section(context: Context) -> Section:
         [
             *text,
             "These accuracies come from nested cross-validation: the trials that test "
-            "a model take "
-            "no part in choosing its shrinkage, number of components and k. The "
-            "brackets hold the "
-            "95 % interval. For objects never met, all trials of an object, fixed and "
-            "movable, are "
-            "left out together; the paper's claim is about such objects.",
+            "a model take no part in choosing its shrinkage, number of components and "
+            "k. The brackets hold the 95 % interval. For objects never met, all trials "
+            "of an object, fixed and movable, are left out together; the paper's claim "
+            "is about such objects.",
             "The paper's method is PCA and k-NN on its three features, unscaled. The "
-            "best of its "
-            "grid is the accuracy that its grid search maximised with leave-one-out, "
-            "so it is too "
-            "high. The other k-NN methods scale their features by the paper's Method "
-            "IV; "
-            "`train/feature_sets.py` lists the features. Extra trees have default "
-            "settings.",
+            "best of its grid is the accuracy that its grid search maximised with "
+            "leave-one-out, so it is too high. The other k-NN methods scale their "
+            "features by the paper's Method IV; `train/feature_sets.py` lists the "
+            "features. Extra trees have default settings.",
         ],
         [Table("methods", title, rows)],
         [

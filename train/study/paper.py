@@ -181,28 +181,20 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
         "Ours beside the paper's",
         [
             f"The paper's Tables I to III give {len(rows)} accuracies. The simulation "
-            "agrees with "
-            f"{len(inside)} of them: the 95 % interval of the difference contains "
-            "zero. The "
-            f"interval allows for chance in the {tested} trials here "
-            f"({counted(len(data_sets), 'simulated data set')}) and in the paper's "
-            f"{TRIALS}. The "
-            "objects touched are not the same.",
-            f"{len(rows) - len(plain_rows)} of the {len(rows)} repeat the three headline "
-            "accuracies of "
-            "the paper's section IV-A. The free values of the scene were chosen to "
-            "meet these, so "
-            f"they are no predictions. Of the other {len(plain_rows)}, {others_inside} "
-            "agree. Nothing "
-            "was changed to meet them.",
+            f"agrees with {len(inside)} of them: the 95 % interval of the difference "
+            f"contains zero. The interval allows for chance in the {tested} trials "
+            f"here ({counted(len(data_sets), 'simulated data set')}) and in the "
+            f"paper's {TRIALS}. The objects touched are not the same.",
+            f"{len(rows) - len(plain_rows)} of the {len(rows)} repeat the three "
+            "headline accuracies of the paper's section IV-A. The free values of the "
+            "scene were chosen to meet these, so they are no predictions. Of the other "
+            f"{len(plain_rows)}, {others_inside} agree. Nothing was changed to meet "
+            "them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
             "A negative rank correlation means that the simulation does not support "
-            "the order in "
-            "which the paper ranks these settings. Beside it stand the number of data "
-            "sets in "
-            "which it is positive, and the share of perfect replications of the paper "
-            "in which it "
-            "would be negative by chance.",
+            "the order in which the paper ranks these settings. Beside it stand the "
+            "number of data sets in which it is positive, and the share of perfect "
+            "replications of the paper in which it would be negative by chance.",
             *_wrong_objects({e.key: e.percent for e in known}, mean),
         ],
         [
@@ -281,14 +273,11 @@ def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
         return []
     return [
         "When the classifier names the wrong object, it still names the right category "
-        "in "
-        f"{paper:.0f} % of the trials in the paper and in {here:.0f} % here, as a mean "
-        "over the "
-        "settings that have both tasks; guessing among four categories gives 25 %. A "
-        "higher share "
-        "means that the objects of a category feel more alike: a skin that is too "
-        "coarse to "
-        "recognise the object still recognises its category."
+        f"in {paper:.0f} % of the trials in the paper and in {here:.0f} % here, as a "
+        "mean over the settings that have both tasks; guessing among four categories "
+        "gives 25 %. A higher share means that the objects of a category feel more "
+        "alike: a skin that is too coarse to recognise the object still recognises its "
+        "category."
     ]
 
 
@@ -303,14 +292,10 @@ def _disagreements(outside: Sequence[Row]) -> str:
     higher = sum(row["difference"] > 0 for row in outside)
     return (
         f"{len(outside)} disagree; {higher} of them are higher here than in the paper. "
-        "The largest "
-        f"differences are {'; '.join(listed)}. A higher accuracy means that the "
-        "simulated skin "
-        "gives information that the real skin did not give; a lower one means that it "
-        "lacks some. "
-        "In Table II some of the paper's methods are the same classifier; see the "
-        "section on "
-        "scaling."
+        f"The largest differences are {'; '.join(listed)}. A higher accuracy means "
+        "that the simulated skin gives information that the real skin did not give; a "
+        "lower one means that it lacks some. In Table II some of the paper's methods "
+        "are the same classifier; see the section on scaling."
     )
 
 

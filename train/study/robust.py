@@ -133,19 +133,15 @@ def section(context: Context) -> Section | None:
         "Another speed, arm or sensor",
         [
             "Each row simulates the scene again with one change and the same random "
-            "draws. The "
-            "changes are half and twice the speed of the equilibrium point over the "
-            "same distance, "
-            "half and twice the stiffness of all joints, and each effect of the sensor "
-            "at its "
-            "default size. An effect that the scene has is left out instead.",
+            "draws. The changes are half and twice the speed of the equilibrium point "
+            "over the same distance, half and twice the stiffness of all joints, and "
+            "each effect of the sensor at its default size. An effect that the scene "
+            "has is left out instead.",
             "All tests are on changed trials. The first bar is a classifier that was "
-            "trained on "
-            "changed trials too; the second was trained on the trials as they were "
-            "recorded. The "
-            "gap between them is the cost for a robot that was not trained for the "
-            "change. The "
-            "unchanged version of a test trial is never in the training set.",
+            "trained on changed trials too; the second was trained on the trials as "
+            "they were recorded. The gap between them is the cost for a robot that was "
+            "not trained for the change. The unchanged version of a test trial is "
+            "never in the training set.",
         ],
         [Table("robustness", "Accuracy after each change", rows)],
         pictures,

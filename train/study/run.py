@@ -130,13 +130,10 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
         source = f"The trials were simulated from the scene {scene.name} with seed {scene.seed}."
     lead = [
         f"{counted(len(dataset.trials), 'trial')} on {layout.rows} x {layout.cols} "
-        "taxels, with "
-        f"the tasks {tasks}. Force is in {layout.force_unit}s; motion is in "
-        f"{layout.length_unit}s, in the frame of the {frame}. {source} Apart from the "
-        "findings, "
-        "accuracies come from leave-one-out cross-validation, with 95 % binomial "
-        "(Wilson) "
-        "intervals."
+        f"taxels, with the tasks {tasks}. Force is in {layout.force_unit}s; motion is "
+        f"in {layout.length_unit}s, in the frame of the {frame}. {source} Apart from "
+        "the findings, accuracies come from leave-one-out cross-validation, with 95 % "
+        "binomial (Wilson) intervals."
     ]
     if constant:
         lead.append(

@@ -18,24 +18,7 @@ from train.study.context import Context
 from train.study.paper import papers
 from train.vectors import Labels
 
-WINDOWS_S = (
-    0.1,
-    0.2,
-    0.3,
-    0.4,
-    0.5,
-    0.6,
-    0.7,
-    0.8,
-    0.9,
-    1.0,
-    1.1,
-    1.2,
-    1.4,
-    1.6,
-    1.8,
-    2.0,
-)
+WINDOWS_S = tuple(tenths / 10 for tenths in (*range(1, 12), *range(12, 21, 2)))
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))
 
 Results = Mapping[Any, Mapping[str, Result]]
@@ -76,12 +59,9 @@ def confusion(context: Context) -> Section:
         "Classification (Figs. 6 to 8)",
         [
             "The classifier uses the paper's three features over 1.2 s, unscaled. A "
-            "grid search "
-            "with leave-one-out tries 1 to 20 components and k from 1 to 20, and takes "
-            "the "
-            "smallest of equally accurate models. The accuracy shown is the one that "
-            "the search "
-            "maximised, so it is too high."
+            "grid search with leave-one-out tries 1 to 20 components and k from 1 to "
+            "20, and takes the smallest of equally accurate models. The accuracy shown "
+            "is the one that the search maximised, so it is too high."
         ],
         [
             Table(
@@ -104,16 +84,13 @@ def window(context: Context) -> Section:
         at = {seconds: result[task].accuracy for seconds, result in results.items()}
         text.append(
             f"{task}: {at[0.8]:.1%} of the decisions are right after 0.8 s, "
-            f"{at[1.2]:.1%} after "
-            f"1.2 s and {at[2.0]:.1%} after 2 s."
+            f"{at[1.2]:.1%} after 1.2 s and {at[2.0]:.1%} after 2 s."
         )
     if "category" in context.labels and context.scene is not None:
         text.append(
             "In the paper, accuracy falls substantially when the window is shortened "
-            "from 1.2 s to "
-            "0.8 s. Physics sets a limit: a movable object cannot be told from a fixed "
-            "one before "
-            "static friction breaks."
+            "from 1.2 s to 0.8 s. Physics sets a limit: a movable object cannot be "
+            "told from a fixed one before static friction breaks."
         )
     title = "Effect of the time window (Fig. 10)"
     png = figures.lines(
@@ -127,18 +104,13 @@ def scaling(context: Context) -> Section:
     """Accuracy with each scaling (Table II)."""
     text = (
         "Scaling follows the paper's Eqs. 1 to 5. The statistics of a feature are "
-        "taken over all "
-        "of its samples in the training trials of a fold. Methods I and II differ only "
-        "by a "
-        "constant for each feature, and so do Method III and no scaling. PCA subtracts "
-        "the mean, "
-        "and the constant with it, so each pair is the same classifier and has the "
-        "same accuracy "
-        "here, up to rounding. In the paper, the two methods of a pair differ by up to "
-        "9.3 points "
-        "(80 % and 75 %, 72.14 % and 62.86 %). Either its statistics were not taken "
-        "over all "
-        "trials, or its PCA did not subtract the mean."
+        "taken over all of its samples in the training trials of a fold. Methods I and "
+        "II differ only by a constant for each feature, and so do Method III and no "
+        "scaling. PCA subtracts the mean, and the constant with it, so each pair is "
+        "the same classifier and has the same accuracy here, up to rounding. In the "
+        "paper, the two methods of a pair differ by up to 9.3 points (80 % and 75 %, "
+        "72.14 % and 62.86 %). Either its statistics were not taken over all trials, "
+        "or its PCA did not subtract the mean."
     )
     cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
     return _compared(
@@ -236,12 +208,10 @@ def resolution(context: Context) -> Section:
         title,
         [
             "A larger taxel reads the whole force on its area, which is the sum over "
-            "the taxels "
-            "that it replaces. The threshold in newtons stays the same. With a single "
-            "taxel, the "
-            "contact area only tells whether there is contact, and the contact motion "
-            "is that of "
-            "the skin's middle, which follows from the joint angles.",
+            "the taxels that it replaces. The threshold in newtons stays the same. "
+            "With a single taxel, the contact area only tells whether there is "
+            "contact, and the contact motion is that of the skin's middle, which "
+            "follows from the joint angles.",
         ],
         [Table("resolution", "Accuracy with larger taxels", cells)],
         [png],
