@@ -9,7 +9,6 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -27,8 +26,9 @@ from tests.fuzz import mutate
 from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import (
     FRAMES,
-    STORES,
     array,
+    json_topics,
+    skin,
     write_bag,
     write_mcap,
 )
@@ -182,13 +182,16 @@ def made(write):
 def logs():
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
     ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
-    return [made(partial(write_mcap, cdr=False, **way)) for way in ways]
+    return [
+        made(lambda path, way=way: write_mcap(path, *json_topics(), **way))
+        for way in ways
+    ]
 
 
 def bags():
     """A ROS 1 bag of arrays."""
-    messages = [array(STORES[1], frame) for frame in FRAMES]
-    return [made(lambda log: write_bag(Path(f"{log}.bag"), 1, messages, joints=False))]
+    topic = skin([array(frame, version=1) for frame in FRAMES])
+    return [made(lambda path: write_bag(path.with_suffix(".bag"), topic, version=1))]
 
 
 FRAME_FILES = [

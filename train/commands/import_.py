@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
+from logging.handlers import BufferingHandler
 from pathlib import Path
 
 import numpy as np
@@ -71,36 +72,22 @@ def run(arguments: argparse.Namespace) -> int:
         return write(importer.trials(arguments.file, arm, *options), arm, arguments)
 
 
-class Counted(logging.Handler):
-    """Keeps the first of the warnings that recordings give, and counts them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.first = ""
-        self.count = 0
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Take in a warning."""
-        self.first = self.first or record.getMessage()
-        self.count += 1
-
-
 @contextmanager
 def counted_warnings() -> Iterator[None]:
     """Print the first of many recordings' warnings, and how many there were."""
     logger = logging.getLogger("edge.recording")
-    counted = Counted()
-    logger.addHandler(counted)
+    kept = BufferingHandler(capacity=sys.maxsize)
+    logger.addHandler(kept)
     logger.propagate = False
     try:
         yield
     finally:
         logger.propagate = True
-        logger.removeHandler(counted)
-        if counted.count:
-            more = counted.count - 1
-            more_text = f" ({more} more recordings are like it)" if more else ""
-            LOG.warning(printable(f"{counted.first}{more_text}"))
+        logger.removeHandler(kept)
+        if kept.buffer:
+            (first, *others) = kept.buffer
+            more = f" ({len(others)} more recordings are like it)" if others else ""
+            LOG.warning(printable(f"{first.getMessage()}{more}"))
 
 
 def write(

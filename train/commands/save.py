@@ -23,6 +23,7 @@ from edge.errors import InputError
 from edge.recording import Recording, load
 from edge.saving import find
 from edge.writing import write_whole
+from train.importers.reading import needs
 from train.progress import bar
 
 FORMATS = ("parquet", "hdf5")
@@ -78,10 +79,7 @@ def check_alike(paths: Sequence[Path], recordings: Sequence[Recording]) -> None:
 
 def tasks_of(recordings: Sequence[Recording]) -> list[str]:
     """The tasks for which some recording has a label."""
-    tasks: dict[str, None] = {}
-    for recording in recordings:
-        tasks.update(dict.fromkeys(recording.labels))
-    return sorted(tasks)
+    return sorted(set().union(*(recording.labels for recording in recordings)))
 
 
 def valid_of(recording: Recording) -> NDArray[np.bool_]:
@@ -171,13 +169,8 @@ def write_parquet(out: Path, long: Long) -> None:
     if long.joints is not None:
         columns |= dict(zip(long.joint_columns, long.joints.T, strict=True))
     table = pd.DataFrame(columns)
-    with write_whole(out) as file:
-        try:
-            table.to_parquet(file, index=False)
-        except ImportError:
-            raise InputError(
-                f"{out}: writing Parquet needs pyarrow; `pip install pyarrow`"
-            ) from None
+    with write_whole(out) as file, needs("pyarrow", f"{out}: writing Parquet"):
+        table.to_parquet(file, index=False)
 
 
 def write_hdf5(out: Path, long: Long) -> None:
@@ -186,12 +179,8 @@ def write_hdf5(out: Path, long: Long) -> None:
     Raises:
         InputError: its writer is not installed, or the file cannot be written.
     """
-    try:
+    with needs("h5py", f"{out}: writing HDF5"):
         import h5py
-    except ImportError:
-        raise InputError(
-            f"{out}: writing HDF5 needs h5py; `pip install h5py`"
-        ) from None
     text = h5py.string_dtype()
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as target:

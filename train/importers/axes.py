@@ -2,6 +2,7 @@
 
 import argparse
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,9 +16,8 @@ from train.importers.reading import Table, numbers_of
 LETTERS = "xyz"
 LAST = re.compile(r"(?P<stem>.*?\d)[ _.-]*(?P<axis>[xyz])", re.I)
 """A name that ends in its axis, such as s1_x or force2Z."""
-FIRST = re.compile(r"(?P<word>[a-z]*?)(?P<axis>[xyz])(?P<rest>[ _.-]*\d.*)", re.I)
+FIRST = re.compile(r"(?P<word>[a-z]*?)(?P<axis>[xyz])[ _.-]*(?P<rest>\d.*)", re.I)
 """A name with its axis before its number, such as Fx_1, z12, or x.3 of an array x."""
-LARGEST = 32767
 
 
 def axis_letters(text: str) -> str:
@@ -48,7 +48,7 @@ def flipped_letters(text: str) -> str:
 
 @dataclass(frozen=True)
 class Axes:
-    """How a table names its axes.
+    """How the axes of a taxel are named.
 
     Attributes:
         along, around, normal: the letter of each axis.
@@ -67,22 +67,18 @@ class Axes:
         Raises:
             InputError: axes are turned round that are not named.
         """
-        if options.axes is None:
-            if options.flip:
-                raise InputError("--flip needs --axes, such as --axes xyz")
-            return None
-        along, around, normal = options.axes
-        return cls(along, around, normal, options.flip or "")
-
-    def sign(self, letter: str) -> float:
-        """1, or -1 for an axis that is turned round."""
-        return -1.0 if letter in self.flipped else 1.0
+        if options.axes is not None:
+            along, around, normal = options.axes
+            return cls(along, around, normal, options.flip or "")
+        if options.flip:
+            raise InputError("--flip needs --axes, such as --axes xyz")
+        return None
 
     def split(
         self, values: NDArray[np.float64], where: object
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Normal values (n, ...) and shear (n, ..., 2) of values (n, ..., 3) of x, y
-        and z.
+        """Normal values (n, taxels) and shear (n, taxels, 2) of values (n, ..., 3) of
+        x, y and z.
 
         Raises:
             InputError: the values of a taxel are not three.
@@ -91,7 +87,8 @@ class Axes:
             raise InputError(
                 f"{where}: --axes needs values of x, y and z, not {values.shape[1:]}"
             )
-        turned = values * [self.sign(letter) for letter in LETTERS]
+        signs = [-1.0 if letter in self.flipped else 1.0 for letter in LETTERS]
+        turned = values.reshape(len(values), -1, 3) * signs
         places = [LETTERS.index(letter) for letter in (self.along, self.around)]
         return turned[..., LETTERS.index(self.normal)], turned[..., places]
 
@@ -107,134 +104,105 @@ class Axes:
 
 @dataclass(frozen=True)
 class Parted:
-    """A table of one axis, and where the other two are.
+    """A table whose taxels have three axes.
 
     Attributes:
-        table: the normal axis, by names without its letter, and all other columns.
-        shear: {name of a taxel: its columns along and around in the whole table}.
+        whole: the table as it stands.
+        table: its normal axis, by names without the letter, and all other columns.
+        columns: {name of a taxel: {letter of an axis: its column in the whole table}}.
     """
 
+    whole: Table
     table: Table
-    shear: Mapping[str, tuple[str, str]]
+    columns: Mapping[str, Mapping[str, str]]
+
+    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
+        """(n, taxels, 3) values x, y and z of some taxels.
+
+        Raises:
+            InputError: one of them has no such columns.
+        """
+        for name in taxels:
+            if name not in self.columns:
+                raise InputError(f"{self.whole.path}: taxel {name} has one axis alone")
+        numbers = [
+            numbers_of(self.whole, self.columns[name][letter])
+            for name in taxels
+            for letter in LETTERS
+        ]
+        return np.column_stack(numbers).reshape(-1, len(taxels), 3)
 
 
 def lettered(name: str) -> tuple[str, str] | None:
     """The letter of a column's axis, and its name without it; None without one."""
-    last = LAST.fullmatch(name)
-    if last is not None:
+    if last := LAST.fullmatch(name):
         return last["axis"].lower(), last["stem"]
-    first = FIRST.fullmatch(name)
-    if first is not None:
-        return first["axis"].lower(), first["word"] + first["rest"].lstrip(" _.-")
+    if first := FIRST.fullmatch(name):
+        return first["axis"].lower(), first["word"] + first["rest"]
     return None
 
 
-def parted(table: Table, axes: Axes) -> Parted:
+def parted(table: Table, normal: str) -> Parted:
     """The normal axis of a table apart from the two others.
 
     Columns without letters are read three by three, as x, y and z of one taxel after
     another, where the table has no header, or is an array whose last axis has three
     entries.
 
+    Args:
+        table: as it stands in the file.
+        normal: letter of the normal axis.
+
     Raises:
         InputError: the columns of the axes do not belong together.
     """
-    columns: dict[str, dict[str, str]] = {letter: {} for letter in LETTERS}
-    plain_names = []
+    columns: dict[str, dict[str, str]] = defaultdict(dict)
     for name in table.names:
-        found = lettered(name)
-        if found is None:
-            plain_names.append(name)
-        else:
-            columns[found[0]][found[1]] = name
-    if not any(columns.values()):
-        return three_by_three(table, axes)
-    taxels = columns[axes.normal]
-    for letter in (axes.along, axes.around):
-        if set(columns[letter]) != set(taxels):
-            odd = sorted(set(columns[letter]) ^ set(taxels))[:3]
-            raise InputError(
-                f"{table.path}: {shown(odd)} lacks one of the axes {axes.along}, "
-                f"{axes.around}, {axes.normal}; leave --axes out, or mend the names"
-            )
-    shear = {
-        name: (columns[axes.along][name], columns[axes.around][name]) for name in taxels
-    }
-    names = {column: name for name, column in taxels.items()}
-    data = table.data[[*plain_names, *taxels.values()]].rename(columns=names)
-    return Parted(replace(table, data=data), shear)
+        if parts := lettered(name):
+            letter, taxel = parts
+            columns[taxel][letter] = name
+    shape = table.shape
+    if not columns:
+        columns = _three_by_three(table)
+        shape = ()
+    odd = sorted(taxel for taxel, axes in columns.items() if len(axes) < 3)
+    if odd:
+        raise InputError(
+            f"{table.path}: {shown(odd[:3])} lacks one of the axes x, y, z; leave --axes "
+            "out, or mend the names"
+        )
+    of_axes = {name for axes in columns.values() for name in axes.values()}
+    normals = {axes[normal]: taxel for taxel, axes in columns.items()}
+    others = [name for name in table.names if name not in of_axes]
+    of_normal = [name for name in table.names if name in normals]
+    data = table.data[[*others, *of_normal]].rename(columns=normals)
+    if not data.columns.is_unique:
+        twice = data.columns[data.columns.duplicated()][0]
+        raise InputError(
+            f"{table.path}: {twice} names a column and a taxel of three axes; rename one "
+            "of them"
+        )
+    part = replace(table, data=data, shape=shape, file_names=())
+    return Parted(table, part, columns)
 
 
-def three_by_three(table: Table, axes: Axes) -> Parted:
-    """The normal axis of a table whose values stand in threes.
+def _three_by_three(table: Table) -> dict[str, dict[str, str]]:
+    """{taxel: {letter: column}} of a table whose values stand in threes.
 
     Raises:
         InputError: they do not.
     """
-    stems: dict[str, list[str]] = {}
-    for name in table.names:
-        stems.setdefault(name.rpartition(".")[0], []).append(name)
-    threes = [(stem, names) for stem, names in stems.items() if len(names) % 3 == 0]
-    array = bool(table.shape) and table.shape[-1] == 3
-    if (table.named and not array) or len(threes) != 1:
+    threes = {stem: n for stem, n in table.arrays.items() if len(n) % 3 == 0}
+    is_array = table.shape[-1:] == (3,)
+    if (table.named and not is_array) or len(threes) != 1:
         raise InputError(
             f"{table.path}: no columns are named by an axis, such as s1_x, s1_y and "
             f"s1_z; it has {shown(table.names)}"
         )
-    ((stem, names),) = threes
-    shear = {}
-    dropped = []
-    renamed = {}
-    for first in range(0, len(names), 3):
-        of_taxel = dict(zip(LETTERS, names[first : first + 3], strict=True))
-        plain = f"{stem}.{first // 3 + 1}".strip(".")
-        along = of_taxel[axes.along]
-        around = of_taxel[axes.around]
-        shear[plain] = along, around
-        dropped += [along, around]
-        renamed[of_taxel[axes.normal]] = plain
-    data = table.data.drop(columns=dropped).rename(columns=renamed)
-    return Parted(replace(table, data=data, shape=()), shear)
-
-
-def shear_of(
-    table: Table, part: Parted, taxels: Sequence[str], axes: Axes
-) -> NDArray[np.float64]:
-    """(n, taxels, 2) values along and around of some taxels.
-
-    Raises:
-        InputError: one of them has no such columns.
-    """
-    missing = next((name for name in taxels if name not in part.shear), None)
-    if missing is not None:
-        raise InputError(f"{table.path}: taxel {missing} has one axis alone")
-    pairs = []
-    for name in taxels:
-        along, around = part.shear[name]
-        pairs.append(
-            np.column_stack(
-                [
-                    axes.sign(axes.along) * numbers_of(table, along),
-                    axes.sign(axes.around) * numbers_of(table, around),
-                ]
-            )
+    ((stem, names),) = threes.items()
+    return {
+        f"{stem}.{place + 1}".strip("."): dict(
+            zip(LETTERS, names[3 * place : 3 * place + 3], strict=True)
         )
-    return np.stack(pairs, axis=1)
-
-
-def counts_of(
-    path: object, shear: NDArray[np.float64], scale: float
-) -> NDArray[np.int16]:
-    """Shear values as whole counts.
-
-    Raises:
-        InputError: they are too large.
-    """
-    counts = np.rint(shear * scale)
-    largest = float(np.abs(counts).max(initial=0.0))
-    if largest > LARGEST:
-        raise InputError(
-            f"{path}: shear reaches {largest:.0f} counts, and at most {LARGEST} are "
-            "kept; give a smaller --scale"
-        )
-    return counts.astype(np.int16)
+        for place in range(len(names) // 3)
+    }

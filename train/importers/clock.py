@@ -30,25 +30,11 @@ class Order:
 
     Attributes:
         kept: (m,) indices of the frames.
-        swapped: number of frames whose time went back within the jitter.
-        repeated: number of frames left out, as a later one has the same time.
+        text: the change that was made, in words; empty for times that increase.
     """
 
     kept: NDArray[np.intp]
-    swapped: int
-    repeated: int
-
-    @property
-    def text(self) -> str:
-        """The change that was made, in words; empty for times that increase."""
-        parts = []
-        if self.swapped:
-            parts.append(f"{self.swapped} times went back within the jitter")
-        if self.repeated:
-            parts.append(
-                f"{self.repeated} frames were left out, as later ones have their times"
-            )
-        return "; ".join(parts)
+    text: str
 
 
 def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
@@ -77,14 +63,22 @@ def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
         )
     kept = np.argsort(t, kind="stable")
     last = np.append(np.diff(t[kept]) > 0.0, True)
-    repeated = int((~last).sum())
-    if repeated > MOST_REPEATED * len(t):
-        still = int(kept[np.flatnonzero(~last)[0] + 1])
+    repeated = np.flatnonzero(~last)
+    if len(repeated) > MOST_REPEATED * len(t):
+        still = kept[repeated[0] + 1]
         raise InputError(
             f"{where}: its time stands still at {frame} {still + 1}; name another time, "
             "or mend the times"
         )
-    return Order(kept[last], int((steps < 0.0).sum()), repeated)
+    changes = []
+    swapped = int((steps < 0.0).sum())
+    if swapped:
+        changes.append(f"{swapped} times went back within the jitter")
+    if len(repeated):
+        changes.append(
+            f"{len(repeated)} frames were left out, as later ones have their times"
+        )
+    return Order(kept[last], "; ".join(changes))
 
 
 def angles_at(
@@ -108,7 +102,7 @@ def angles_at(
     """
     whole = np.unwrap(angles, axis=0)
     columns = [np.interp(t, joints_t, column) for column in whole.T]
-    times = np.stack(columns, axis=1)
+    at_frames = np.stack(columns, axis=1)
     gap_s = release_s
     if len(joints_t) > 1:
         gap_s = max(release_s, GAP_STEPS * float(np.median(np.diff(joints_t))))
@@ -118,5 +112,5 @@ def angles_at(
     outside_s = np.maximum(joints_t[0] - t, t - joints_t[-1])
     # A clock counts in steps of its own; a gap is longer by more than rounding.
     unknown = (across_s > gap_s * (1.0 + 1e-9)) | (outside_s > HOLD_S * (1.0 + 1e-9))
-    times[unknown] = np.nan
-    return np.asarray(times)
+    at_frames[unknown] = np.nan
+    return at_frames

@@ -17,7 +17,8 @@ out. Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays:
 
 import argparse
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,20 +33,14 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers import arrays, clock, counts
-from train.importers.axes import Axes, Parted, parted, shear_of
-from train.importers.columns import (
-    UNITS,
-    Meaning,
-    Wishes,
-    meaning,
-    times_of,
-)
-from train.importers.counts import Values, asked_shape, rest_of
+from train.importers import arrays, counts
+from train.importers.axes import Axes, parted
+from train.importers.columns import UNITS, Meaning, is_date, meaning, times_of
+from train.importers.counts import Trial, rest_of, skin_shape
 from train.importers.reading import (
-    PACKED,
     TEXTS,
     Table,
+    inner,
     is_text,
     numbers_of,
     read_frame,
@@ -110,33 +105,27 @@ class Source:
         labels: {task: label}.
         label: where the label comes from.
         table: its values.
-        names: of all columns of the file, as they stand.
     """
 
     name: str
     labels: dict[str, str]
     label: str
     table: Table
-    names: list[str]
 
 
 @dataclass(frozen=True)
 class Measured:
-    """The numbers of a trial.
+    """A trial whose columns are understood.
 
     Attributes:
-        source: where they come from.
-        t: (n,) seconds.
-        values: of the taxels.
-        joints: (n, dof) radians, or None.
+        source: where it comes from, without the values.
         meaning: of the columns.
+        trial: its numbers.
     """
 
     source: Source
-    t: NDArray[np.float64]
-    values: Values
-    joints: NDArray[np.float64] | None
     meaning: Meaning
+    trial: Trial
 
 
 def trials(
@@ -152,150 +141,113 @@ def trials(
     options.skipped = []
     axes = Axes.of(options)
     folder = path if path.is_dir() else path.parent
-    measured = list(_understood(_collected(path, folder, options), options))
+    measured = _measured(_sources(path, folder, options), axes, options)
     if not measured:
         raise _nothing(path, options)
-    beside = _labels(folder / LABELS, [m.source.name for m in measured], options)
+    if (folder / LABELS).is_file():
+        measured = _labelled(measured, folder / LABELS, options)
     file = folder / "skin.json"
     skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
-    first = measured[0]
-    shape = _shape(options.shape, first, skin)
-    _announce(first, shape, beside is not None)
-    if axes is not None:
-        say(axes.text)
-    rest = rest_of([trial.values for trial in measured], options)
+    shape = _announced(measured[0], skin, axes, options)
+    rest = rest_of([each.trial for each in measured], options)
     missing = 0
     imported = 0
-    for trial in measured:
-        name = trial.source.name
-        meta: dict[str, Any] = {"skin": skin.raw, "trial": name}
-        place = trial.source.table.path
-        try:
-            recording = rest.recording(
-                place, trial.t, trial.values, shape, meta, trial.joints
-            )
-        except InputError as error:
-            _skip(options, error)
-            continue
-        imported += 1
-        missing += int(trial.values.missing.sum())
-        labels = _labelled(trial, beside, options)
-        meta = {**recording.meta, "labels": labels, "source": path.name}
-        if trial.joints is not None:
+    for each in measured:
+        name = each.source.name
+        meta: dict[str, Any] = {"skin": skin.raw, "labels": each.source.labels}
+        meta |= {"source": path.name, "trial": name}
+        if each.trial.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
-        yield name, _with_meta(recording, meta)
+        with _skipping(options):
+            recording = rest.recording(each.trial, shape, meta)
+            imported += 1
+            missing += int(each.trial.missing.sum())
+            yield name, recording
     if not imported:
         raise _nothing(path, options)
     if missing:
         say(f"{missing} values are missing; these taxels are not valid in their frames")
 
 
+@contextmanager
+def _skipping(options: argparse.Namespace) -> Iterator[None]:
+    """Leave out a file that cannot be used, unless the user is strict."""
+    try:
+        yield
+    except InputError as error:
+        if options.strict:
+            raise
+        options.skipped.append(str(error))
+
+
 def _nothing(path: Path, options: argparse.Namespace) -> InputError:
     """The error where nothing can be imported."""
     if options.skipped:
-        return InputError(options.skipped[0] + _more(options.skipped))
+        (first, *others) = options.skipped
+        more = f"; {len(others)} more cannot be used either" if others else ""
+        return InputError(first + more)
     kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
     return InputError(f"{path}: holds no {kind}; give a folder of trials")
 
 
+def _announced(
+    first: Measured, skin: ConfigTable, axes: Axes | None, options: argparse.Namespace
+) -> tuple[int, int]:
+    """The rows and columns of the skin; prints what was taken, once for all files."""
+    taxels = len(first.meaning.taxels)
+    told = first.meaning.shape
+    told = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
+    shape = skin_shape(first.trial, told, options)
+    text = first.meaning.text(first.source.label, shape)
+    say("; ".join([text, *first.source.table.form]))
+    if axes is not None:
+        say(axes.text)
+    return shape
+
+
 def _labelled(
-    trial: Measured,
-    beside: Mapping[str, Mapping[str, str]] | None,
-    options: argparse.Namespace,
-) -> Mapping[str, str]:
-    """A trial's labels: those of a labels.csv instead of its own where there is one."""
-    labels = trial.source.labels
-    if beside is None:
-        return labels
-    return {**_others(labels, options.task), **beside.get(trial.source.name, {})}
+    measured: list[Measured], path: Path, options: argparse.Namespace
+) -> list[Measured]:
+    """The trials with the labels of a labels.csv instead of those of the files' names.
+
+    Raises:
+        InputError: it names none of the trials.
+    """
+    table = read_text(path)
+    data = table.data.astype(str).where(table.data.notna(), "")
+    trials = [each.source.name for each in measured]
+    if "trial" not in data or not data["trial"].isin(trials).any():
+        raise InputError(
+            f"{path}: needs a column trial with names such as {shown(trials)}"
+        )
+    rows = {row.pop("trial"): row for row in data.to_dict("records")}
+    unknown = [row for row in rows if row not in trials]
+    unlabelled = [trial for trial in trials if trial not in rows]
+    options.skipped += [f"{path}: {row} names no file" for row in unknown]
+    options.skipped += [
+        f"{path}: has no row for {trial}, which has no label" for trial in unlabelled
+    ]
+    labelled = []
+    for each in measured:
+        labels = {**each.source.labels, options.task: ""}
+        labels |= rows.get(each.source.name, {})
+        labels = {task: label for task, label in labels.items() if label}
+        source = replace(each.source, labels=labels, label=LABELS)
+        labelled.append(replace(each, source=source))
+    return labelled
 
 
-def _others(labels: dict[str, str], task: str) -> dict[str, str]:
-    """Labels without that of the file's own name, which labels.csv replaces."""
-    return {name: label for name, label in labels.items() if name != task}
-
-
-def _with_meta(recording: Recording, meta: dict[str, Any]) -> Recording:
-    return replace(recording, meta=meta)
-
-
-def _more(skipped: Sequence[str]) -> str:
-    rest = len(skipped) - 1
-    return f"; {rest} more cannot be used either" if rest else ""
-
-
-def _skip(options: argparse.Namespace, error: InputError) -> None:
-    if options.strict:
-        raise error
-    options.skipped.append(str(error))
-
-
-def _announce(first: Measured, shape: tuple[int, ...], beside: bool) -> None:
-    """Print what was taken, once for all files."""
-    label = LABELS if beside else first.source.label
-    text = first.meaning.text(label, shape)
-    form = first.source.table.form
-    say("; ".join([text, *form]))
-
-
-def _collected(
-    path: Path, folder: Path, options: argparse.Namespace
-) -> Iterator[Source]:
-    """The trials of the file, or of the files in the folder."""
+def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
+    """The trials of the file, or of the files or folders in the folder."""
+    places = [path]
     if options.frames:
-        yield from _framed(path, folder, options)
-        return
-    for file in _files(folder.rglob("*")) if path.is_dir() else [path]:
-        try:
-            yield from _of_file(file, folder, options)
-        except InputError as error:
-            _skip(options, error)
-
-
-def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
-    """The trials in a file."""
-    name, labels, label = _called(_stem(file.relative_to(folder)), options.task)
-    suffix = suffix_of(file)
-    if suffix in arrays.SUFFIXES:
-        stored = arrays.read_arrays(file)
-        axis = None if options.axis is None else options.axis - 1
-        names = _used(stored, options)
-        if options.trials:
-            for of_trial in arrays.trials_of(file, stored, options.task):
-                trial_name, trial_labels, trial_arrays = of_trial
-                table = arrays.table_of(file, trial_arrays, axis, names)
-                every = {**labels, **trial_labels}
-                yield Source(trial_name, every, "the arrays", table, table.names)
-            return
-        table = arrays.table_of(file, stored, axis, names)
-    else:
-        table = read_parquet(file) if suffix == ".parquet" else read_text(file)
-    if "trial" in table.names:
-        with parsing(str(file), "a table of trials"):
-            yield from _trials_in(table)
-    else:
-        yield Source(name, labels, label, table, table.names)
-
-
-def _used(stored: Iterable[str], options: argparse.Namespace) -> set[str]:
-    """The arrays that the options name."""
-    words = [options.taxels, options.joints, options.time]
-    terms = {term for word in words if word for term in word.split(",")}
-    return terms & set(stored) if options.taxels else set()
-
-
-def _framed(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
-    """The trials of a folder that has a folder for each, with a file for each frame."""
-    for inside in sorted(place for place in path.rglob("*") if place.is_dir()):
-        files = _files(inside.glob("*"))
-        if files:
-            name, labels, label = _called(inside.relative_to(folder), options.task)
-            try:
-                table = _stacked(inside, files, timed=options.rate is None)
-            except InputError as error:
-                _skip(options, error)
-                continue
-            yield Source(name, labels, label, table, table.names)
+        places = sorted(place for place in path.rglob("*") if place.is_dir())
+    elif path.is_dir():
+        places = _files(path.rglob("*"))
+    read = _of_frames if options.frames else _of_file
+    for place in places:
+        with _skipping(options):
+            yield from read(place, folder, options)
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
@@ -303,72 +255,64 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     return sorted(p for p in paths if suffix_of(p) in SUFFIXES and p.name != LABELS)
 
 
-def _stem(place: Path) -> Path:
-    """A file's place without its suffixes."""
-    bare = place.with_suffix("")
-    return bare.with_suffix("") if place.suffix.lower() in PACKED else bare
-
-
-def _called(place: Path, task: str) -> tuple[str, dict[str, str], str]:
-    """The name and label of the trial at a place in the folder, and where the label
-    comes from."""
+def _source(place: Path, table: Table, task: str) -> Source:
+    """The trial at a place in the folder, with the label that its names tell."""
     folders = [part for part in place.parts[:-1] if not NUMBERED.fullmatch(part)]
-    stem = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
     name = "_".join(place.parts)
     if folders:
-        return name, {task: folders[-1]}, "the folder's name"
-    return name, {task: stem}, "the file's name"
+        return Source(name, {task: folders[-1]}, "the folder's name", table)
+    stem = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
+    return Source(name, {task: stem}, "the file's name", table)
 
 
-def _labels(
-    path: Path, trials: list[str], options: argparse.Namespace
-) -> dict[str, dict[str, str]] | None:
-    """{trial: its labels} of a labels.csv; None without one."""
-    if not path.is_file():
-        return None
-    table = read_text(path)
-    data = table.data.astype(str).where(table.data.notna(), "")
-    rows = [] if "trial" not in table.names else data["trial"].tolist()
-    if not set(rows) & set(trials):
-        raise InputError(
-            f"{path}: needs a column trial with names such as {shown(trials)}"
-        )
-    strange = [row for row in rows if row not in trials]
-    without = [trial for trial in trials if trial not in rows]
-    options.skipped += [f"{path}: {row} names no file" for row in strange]
-    options.skipped += [
-        f"{path}: has no row for {trial}, which has no label" for trial in without
-    ]
-    tasks = [name for name in table.names if name != "trial"]
-    labels = {}
-    for trial, row in zip(rows, data[tasks].to_dict("records"), strict=True):
-        labels[trial] = {str(task): label for task, label in row.items() if label}
-    return labels
+def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
+    """The trials in a file."""
+    place = inner(file.relative_to(folder)).with_suffix("")
+    suffix = suffix_of(file)
+    if suffix in arrays.SUFFIXES and options.trials:
+        stored = arrays.read_arrays(file)
+        for name, labels, of_trial in arrays.trials_of(file, stored, options.task):
+            table = arrays.table_of(file, of_trial, options)
+            source = _source(place, table, options.task)
+            labels = {**source.labels, **labels}
+            yield Source(name, labels, "the arrays", table)
+        return
+    if suffix in arrays.SUFFIXES:
+        table = arrays.table_of(file, arrays.read_arrays(file), options)
+    else:
+        table = read_parquet(file) if suffix == ".parquet" else read_text(file)
+    if "trial" in table.names:
+        with parsing(str(file), "a table of trials"):
+            yield from _trials_in(table)
+    else:
+        yield _source(place, table, options.task)
 
 
-def _stacked(folder: Path, files: list[Path], *, timed: bool) -> Table:
-    """The frames of a trial, a row for each; `timed` if their files are named by their
-    times."""
+def _of_frames(
+    inside: Path, folder: Path, options: argparse.Namespace
+) -> Iterator[Source]:
+    """The trial of a folder with a file for each frame, if it has files."""
+    files = _files(inside.glob("*"))
+    if not files:
+        return
     frames = [_frame(file) for file in files]
     shape = frames[0].shape
     for file, frame in zip(files, frames, strict=True):
         if frame.shape != shape:
             sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
             raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
-    values = np.array(frames).reshape(len(files), -1)
-    data = pd.DataFrame(values, columns=[str(i + 1) for i in range(values.shape[1])])
-    if timed:
-        with parsing(
-            str(folder),
-            "a folder of files that are named by their times",
-            "; give --rate",
-        ):
-            t = np.array([float(_stem(Path(file.name)).name) for file in files])
+    values = np.reshape(frames, (len(files), -1))
+    data = pd.DataFrame(values).rename(columns=lambda place: str(place + 1))
+    if options.rate is None:
+        kind = "a folder of files that are named by their times"
+        with parsing(str(inside), kind, "; give --rate"):
+            t = [float(inner(file).stem) for file in files]
             if not np.isfinite(t).all():
                 raise ValueError("a time is not finite")
         data.insert(0, "time_s", t)
         data = data.sort_values("time_s", kind="stable", ignore_index=True)
-    return Table(folder, data, False, shape)
+    table = Table(inside, data, False, shape)
+    yield _source(inside.relative_to(folder), table, options.task)
 
 
 def _frame(file: Path) -> NDArray[np.float64]:
@@ -380,57 +324,45 @@ def _frame(file: Path) -> NDArray[np.float64]:
 
 def _trials_in(table: Table) -> Iterator[Source]:
     """The trials of a long table."""
-    texts = [name for name in table.names if name != "trial" and is_text(table, name)]
-    dates = [name for name in texts if _is_time(table, name)]
-    values = [name for name in texts if name in dates or name == "taxel"]
-    labels = [name for name in texts if name not in values]
+    by_trial = table.data.groupby("trial", sort=False)
+    labels = [
+        name
+        for name in table.names
+        if name not in ("trial", "taxel")
+        and is_text(table, name)
+        and not (is_date(table, name) and by_trial[name].nunique().max() > 1)
+    ]
     label = f"columns {', '.join(labels)}" if labels else "none"
-    columns_of_values = [n for n in table.names if n != "trial" and n not in labels]
-    for trial, rows in table.data.groupby("trial", sort=False):
-        of_trial = {name: _constant(table, name, str(trial), rows) for name in labels}
-        data = rows[columns_of_values].reset_index(drop=True)
-        part = Table(table.path, data, table.named, table.shape, table.form)
-        if "taxel" in table.names:
+    for trial, rows in by_trial:
+        of_trial = {}
+        for name in labels:
+            (text, *others) = map(str, rows[name].unique())
+            if others:
+                raise InputError(
+                    f"{table.path}: {name} changes within trial {trial}, from "
+                    f"{shown(text)} to {shown(others[0])}"
+                )
+            of_trial[name] = text
+        data = rows.drop(columns=["trial", *labels]).reset_index(drop=True)
+        part = replace(table, data=data, file_names=tuple(table.names))
+        if "taxel" in data:
             part = _pivoted(part, str(trial))
-        yield Source(str(trial), of_trial, label, part, table.names)
-
-
-def _constant(table: Table, name: str, trial: str, rows: pd.DataFrame) -> str:
-    """The one label in a column of a trial's rows.
-
-    Raises:
-        InputError: there are several.
-    """
-    values = [str(value) for value in rows[name].unique()]
-    if len(values) > 1:
-        raise InputError(
-            f"{table.path}: {name} changes within trial {trial}, from "
-            f"{shown(values[0])} to {shown(values[1])}"
-        )
-    return values[0]
-
-
-def _is_time(table: Table, name: str) -> bool:
-    first = Table(table.path, table.data[[name]].iloc[:1])
-    try:
-        return meaning(first, [name], Wishes(taxels=name)).time == name
-    except InputError:
-        return False
+        yield Source(str(trial), of_trial, label, part)
 
 
 def _pivoted(table: Table, trial: str) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
-    columns_beside = [name for name in table.names if name not in ("taxel", "value")]
-    if "value" not in table.names or not columns_beside:
+    data = table.data
+    times = [name for name in table.names if name not in ("taxel", "value")]
+    if "value" not in data or not times:
         raise InputError(
             f"{table.path}: needs the columns value and a time beside taxel"
         )
-    time = columns_beside[0]
-    data = table.data
-    again = data.duplicated([time, "taxel"])
-    if again.any():
-        row = data[again].iloc[0]
+    time = times[0]
+    again = data[data.duplicated([time, "taxel"])]
+    if len(again):
+        row = again.iloc[0]
         raise InputError(
             f"{table.path}: trial {trial} has two values of taxel {row['taxel']} at "
             f"time {row[time]}"
@@ -441,15 +373,13 @@ def _pivoted(table: Table, trial: str) -> Table:
             f"{table.path}: the {len(data)} values of trial {trial} would fill "
             f"{len(data) / cells:.1%} of a table; the taxels need times in common"
         )
-    wide = data.pivot(index=time, columns="taxel", values="value").reset_index()
-    names = sorted((n for n in wide.columns if n != time), key=_natural)
-    wide = wide[[time, *names]]
-    wide.columns = [time, *(_plain(name) for name in names)]
-    if not wide.columns.is_unique:
+    wide = data.pivot(index=time, columns="taxel", values="value")
+    wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
+    if not wide.columns.is_unique or time in wide:
         raise InputError(
             f"{table.path}: trial {trial} has two taxels of one name; rename one of them"
         )
-    return Table(table.path, wide, False, (), table.form)
+    return Table(table.path, wide.reset_index(), named=False, form=table.form)
 
 
 def _plain(name: Any) -> str:
@@ -462,40 +392,35 @@ def _natural(name: Any) -> list[Any]:
     return [int(part) if part.isdigit() else part for part in parts]
 
 
-def _understood(
-    sources: Iterable[Source], options: argparse.Namespace
-) -> Iterator[Measured]:
+def _measured(
+    sources: Iterable[Source], axes: Axes | None, options: argparse.Namespace
+) -> list[Measured]:
     """The numbers of the trials whose columns are those of the first."""
-    wishes = Wishes(
-        options.time, options.taxels, options.joints, options.time_unit, options.rate
-    )
-    first: Measured | None = None
+    measured: list[Measured] = []
     for source in sources:
-        try:
-            trial = _measured(source, wishes, options)
-            if first is None:
-                first = trial
-            else:
-                _compare(trial, first)
-        except InputError as error:
-            _skip(options, error)
-            continue
-        yield trial
+        with _skipping(options):
+            trial = _understood(source, axes, options)
+            if measured:
+                _compare(trial, measured[0])
+            measured.append(trial)
+    return measured
 
 
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
     path = trial.source.table.path
     first_path = first.source.table.path
-    if len(trial.meaning.taxels) != len(first.meaning.taxels):
-        few = f"{len(trial.meaning.taxels)} taxels, and {first_path} "
+    taxels = list(trial.meaning.taxels)
+    first_taxels = list(first.meaning.taxels)
+    if len(taxels) != len(first_taxels):
         raise InputError(
-            f"{path}: has {few}{len(first.meaning.taxels)}; name them by --taxels"
+            f"{path}: has {len(taxels)} taxels, and {first_path} {len(first_taxels)}; "
+            "name them by --taxels"
         )
-    if trial.meaning.taxels != first.meaning.taxels:
+    if taxels != first_taxels:
         raise InputError(
-            f"{path}: its taxels are {shown(list(trial.meaning.taxels))}, and those of "
-            f"{first_path} {shown(list(first.meaning.taxels))}"
+            f"{path}: its taxels are {shown(taxels)}, and those of {first_path} "
+            f"{shown(first_taxels)}"
         )
     if trial.meaning.unit != first.meaning.unit:
         raise InputError(
@@ -504,77 +429,33 @@ def _compare(trial: Measured, first: Measured) -> None:
         )
 
 
-def _measured(source: Source, wishes: Wishes, options: argparse.Namespace) -> Measured:
+def _understood(
+    source: Source, axes: Axes | None, options: argparse.Namespace
+) -> Measured:
     """The numbers of a trial."""
-    axes = Axes.of(options)
-    whole = source.table
-    part = Parted(whole, {}) if axes is None else parted(whole, axes)
-    table = part.table
-    source = replace(source, table=table)
-    if axes is not None:
-        source = replace(source, names=table.names)
-    if table.shape and not wishes.taxels:
-        wishes = _all_of_the_array(table, wishes)
-    sense = meaning(table, source.names if table.named else table.names, wishes)
-    values = np.column_stack([numbers_of(table, name) for name in sense.taxels])
-    shear = None
-    if axes is not None:
-        values *= axes.sign(axes.normal)
-        shear = shear_of(whole, part, sense.taxels, axes)
+    table = source.table
+    if axes is None:
+        table = source.table
+        sense = meaning(table, options)
+        values = _columns(table, sense.taxels)
+    else:
+        part = parted(source.table, axes.normal)
+        table = part.table
+        sense = meaning(table, options)
+        values = part.values(sense.taxels)
     values[~np.isfinite(values)] = np.nan
-    if np.isnan(values).all():
-        raise InputError(f"{table.path}: none of its values is a finite number")
     joints = None
     if sense.joints:
-        angles = [numbers_of(table, name) for name in sense.joints]
-        joints = np.column_stack(angles) * (np.pi / 180.0 if options.degrees else 1.0)
-    head = replace(table, data=table.data.iloc[:0])
-    source = replace(source, table=head)
-    if sense.time is None:
-        assert options.rate is not None
-        t = np.arange(len(values)) / options.rate
-        return Measured(source, t, Values(values, shear), joints, sense)
-    t = times_of(table, sense)
-    return _in_order(Measured(source, t, Values(values, shear), joints, sense))
+        unit = np.pi / 180.0 if options.degrees else 1.0
+        joints = unit * _columns(table, sense.joints)
+    t = times_of(table, sense, options)
+    trial = Trial.of(str(table.path), t, values, axes, joints)
+    if np.isnan(trial.values).all():
+        raise InputError(f"{table.path}: none of its values is a finite number")
+    source = replace(source, table=replace(table, data=table.data.iloc[:0]))
+    return Measured(source, sense, trial.in_order("row"))
 
 
-def _in_order(trial: Measured) -> Measured:
-    """The rows of a trial in the order of their times; says what that leaves out."""
-    path = trial.source.table.path
-    order = clock.order(trial.t, path, "row")
-    if order.text:
-        say(f"{path}: {order.text}")
-    rows = order.kept
-    shear = trial.values.shear
-    joints = trial.joints
-    values = Values(trial.values.normal[rows], None if shear is None else shear[rows])
-    joints = None if joints is None else joints[rows]
-    return replace(trial, t=trial.t[rows], values=values, joints=joints)
-
-
-def _all_of_the_array(table: Table, wishes: Wishes) -> Wishes:
-    """The user's wishes, with the array of rows and columns for the taxels."""
-    size = int(np.prod(table.shape))
-    stems: dict[str, list[str]] = {}
-    for name in table.names:
-        stems.setdefault(name.rpartition(".")[0], []).append(name)
-    fitting = [names for names in stems.values() if len(names) == size]
-    if len(fitting) != 1:
-        return wishes
-    taxels = ",".join(fitting[0])
-    return Wishes(wishes.time, taxels, wishes.joints, wishes.unit, wishes.rate)
-
-
-def _shape(text: str | None, first: Measured, skin: ConfigTable) -> tuple[int, ...]:
-    """Rows and columns of the skin."""
-    taxels = len(first.meaning.taxels)
-    table = first.source.table
-    told = table.shape or first.meaning.shape
-    shape = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = asked_shape(text) or shape
-    if len(shape) != 2 or shape[0] * shape[1] != taxels:
-        size = " x ".join(map(str, shape))
-        raise InputError(
-            f"{table.path}: {taxels} columns are not {size} taxels; give --shape"
-        )
-    return shape
+def _columns(table: Table, names: Iterable[str]) -> NDArray[np.float64]:
+    """(rows, names) the numbers of some columns."""
+    return np.column_stack([numbers_of(table, name) for name in names])

@@ -22,9 +22,9 @@ from edge.errors import InputError
 from edge.files import parsing, read_text
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers import clock, counts
+from train.importers import counts
 from train.importers.axes import Axes
-from train.importers.counts import Values, asked_shape, rest_of
+from train.importers.counts import Trial, rest_of, skin_shape
 from train.importers.reading import read_parquet
 from train.json_files import read_json
 from train.progress import say
@@ -50,18 +50,14 @@ class Episode:
     Attributes:
         number: of the episode.
         label: its task; empty without one.
-        t: (n,) seconds.
-        values: of its taxels, (n, taxels).
-        shape: that the values of a frame have.
-        joints: (n, dof) radians, or None.
+        shape: that the taxels of a frame have.
+        trial: its numbers.
     """
 
     number: int
     label: str
-    t: NDArray[np.float64]
-    values: Values
     shape: tuple[int, ...]
-    joints: NDArray[np.float64] | None
+    trial: Trial
 
 
 def trials(
@@ -81,25 +77,24 @@ def trials(
     names = joint_names(table, options.joints)
     episodes = list(_episodes(path, options))
     check_alike(path, episodes)
-    rest = rest_of([episode.values for episode in episodes], options)
-    shape = _shape(path, episodes[0], options)
-    first = episodes[0].values.normal.shape[1]
+    rest = rest_of([episode.trial for episode in episodes], options)
+    first = episodes[0]
+    taxels = first.trial.values.shape[1]
+    told = first.shape if len(first.shape) == 2 else (1, taxels)
+    rows, cols = skin_shape(first.trial, told, options)
     say(
-        f'time: "timestamp" in s, taxels: "{options.taxels}" ({first}, as '
-        f"{shape[0]} x {shape[1]}), label: the episode's task"
+        f'time: "timestamp" in s, taxels: "{options.taxels}" ({taxels}, as '
+        f"{rows} x {cols}), label: the episode's task"
     )
     for episode in episodes:
         meta: dict[str, Any] = {"source": path.name, "trial": episode.number}
         if episode.label:
             meta["labels"] = {options.task: episode.label}
-        if episode.joints is not None:
+        if episode.trial.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
             if names is not None:
                 meta["joint_names"] = names
-        where = f"{path}: episode {episode.number}"
-        recording = rest.recording(
-            where, episode.t, episode.values, shape, meta, episode.joints
-        )
+        recording = rest.recording(episode.trial, (rows, cols), meta)
         yield f"episode_{episode.number:06}", recording
 
 
@@ -132,8 +127,9 @@ def joint_names(info: ConfigTable, column: str | None) -> list[str] | None:
     names = feature.get("names") if isinstance(feature, Mapping) else None
     if isinstance(names, Mapping):  # such as {"motors": [...]}
         names = next(iter(names.values()), None)
-    texts = isinstance(names, list) and all(isinstance(n, str) for n in names)
-    return list(names) if texts else None  # type: ignore[arg-type] # checked above
+    if isinstance(names, list) and all(isinstance(name, str) for name in names):
+        return names
+    return None
 
 
 def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
@@ -142,7 +138,6 @@ def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
     if not files:
         raise InputError(f"{path}: holds no data/**/*.parquet; fetch it again")
     tasks = task_names(path)
-    axes = Axes.of(options)
     for file in files:
         data = read_parquet(file).data
         for column in ("episode_index", "timestamp", options.taxels, options.joints):
@@ -151,37 +146,28 @@ def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
                     f"{file}: has no column {column}; it has {shown(list(data.columns))}"
                 )
         for number, rows in data.groupby("episode_index", sort=True):
-            yield _episode(file, int(number), rows, tasks, options, axes)
+            where = f"{file}: episode {int(number)}"
+            yield _episode(where, rows, tasks, options)
 
 
 def _episode(
-    file: Path,
-    number: int,
+    where: str,
     rows: pd.DataFrame,
     tasks: Mapping[int, str],
     options: argparse.Namespace,
-    axes: Axes | None,
 ) -> Episode:
     """One episode of a file."""
-    where = f"{file}: episode {number}"
+    axes = Axes.of(options)
     t = rows["timestamp"].to_numpy(np.float64)
-    order = clock.order(t, where)
-    if order.text:
-        say(f"{where}: {order.text}")
-    kept = order.kept
-    frames = stacked(where, rows[options.taxels])[kept]
+    values = stacked(where, rows[options.taxels])
     joints = None
     if options.joints is not None:
-        joints = stacked(where, rows[options.joints])[kept].reshape(len(kept), -1)
-    shear = None
-    if axes is not None:
-        frames, both = axes.split(frames, where)
-        shear = both.reshape(len(kept), -1, 2)
-    label = ""
-    if "task_index" in rows.columns:
-        label = tasks.get(int(rows["task_index"].iloc[0]), "")
-    values = Values(frames.reshape(len(kept), -1), shear)
-    return Episode(number, label, t[kept], values, frames.shape[1:], joints)
+        joints = stacked(where, rows[options.joints]).reshape(len(t), -1)
+    trial = Trial.of(where, t, values, axes, joints).in_order("frame")
+    first = rows.iloc[0]
+    shape = values.shape[1:] if axes is None else values.shape[1:-1]
+    label = tasks.get(int(first.get("task_index", -1)), "")
+    return Episode(int(first["episode_index"]), label, shape, trial)
 
 
 def stacked(where: str, column: pd.Series) -> NDArray[np.float64]:
@@ -191,12 +177,12 @@ def stacked(where: str, column: pd.Series) -> NDArray[np.float64]:
         InputError: its lists are of several lengths, or hold no numbers.
     """
     try:
-        nested = [np.array(_plain(value), dtype=np.float64) for value in column]
-        return np.stack(nested).reshape(len(column), *(nested[0].shape or (1,)))
+        values = np.stack([np.array(_plain(v), dtype=np.float64) for v in column])
     except (TypeError, ValueError):
         raise InputError(
             f"{where}: {column.name} does not hold numbers of one shape in each frame"
         ) from None
+    return values if values.ndim > 1 else values[:, None]
 
 
 def _plain(value: Any) -> Any:
@@ -227,18 +213,3 @@ def task_names(path: Path) -> dict[int, str]:
             for index, text in zip(data["task_index"], texts, strict=True):
                 tasks[int(index)] = str(text)
     return tasks
-
-
-def _shape(
-    path: Path, episode: Episode, options: argparse.Namespace
-) -> tuple[int, int]:
-    """The rows and columns of the skin."""
-    taxels = episode.values.normal.shape[1]
-    told = episode.shape if len(episode.shape) == 2 else (1, taxels)
-    rows, cols = asked_shape(options.shape) or (told[0], told[1])
-    if rows * cols != taxels:
-        raise InputError(
-            f"{path}: {options.taxels} has {taxels} values, not {rows} x {cols}; give "
-            "--shape"
-        )
-    return rows, cols

@@ -14,7 +14,8 @@ from edge.errors import printable
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers.topics import Log, add_options, needs
+from train.importers.reading import needs
+from train.importers.topics import Log, add_options
 from train.progress import say
 
 __all__ = ["add_options", "trials"]
@@ -24,9 +25,9 @@ def trials(
     path: Path, arm: Chain | None, options: argparse.Namespace
 ) -> Iterator[tuple[str, Recording]]:
     """The one trial of the file."""
-    with needs("mcap"):
+    with needs("mcap", "this"):
         from mcap.reader import make_reader
-    with needs("rosbags"):
+    with needs("rosbags", "this"):
         from rosbags.typesys import Stores, get_typestore
     log = Log.of(path, arm, options)
     unread: dict[str, set[str]] = defaultdict(set)

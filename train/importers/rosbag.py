@@ -11,7 +11,8 @@ from pathlib import Path
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers.topics import Log, add_options, needs
+from train.importers.reading import needs
+from train.importers.topics import Log, add_options
 
 __all__ = ["add_options", "trials"]
 
@@ -20,7 +21,7 @@ def trials(
     path: Path, arm: Chain | None, options: argparse.Namespace
 ) -> Iterator[tuple[str, Recording]]:
     """The one trial of the bag."""
-    with needs("rosbags"):
+    with needs("rosbags", "this"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     log = Log.of(path, arm, options)

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ from edge.touch.arm import Chain, joint_columns
 from edge.touch.layout import RELEASE_S
 from train.importers import clock, counts
 from train.importers.axes import Axes
-from train.importers.counts import Values, asked_shape, rest_of
+from train.importers.counts import Trial, rest_of, skin_shape
 from train.json_files import read_json
 from train.progress import say
 
@@ -55,17 +55,6 @@ JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
 ENCODINGS = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
 """Bytes of a pixel."""
-
-
-@contextmanager
-def needs(package: str) -> Iterator[None]:
-    """Name the package to install if an import in the block fails."""
-    try:
-        yield
-    except ImportError:
-        raise InputError(
-            f"this needs {package}; install it with `pip install {package}`"
-        ) from None
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -102,6 +91,10 @@ class Stream:
         self.logged.append(logged)
         self.values.append(value)
 
+    def times(self, by_logging: bool) -> NDArray[np.float64]:
+        """(n,) seconds of their own clock, or of logging."""
+        return np.array(self.logged if by_logging else self.stamps)
+
 
 @dataclass
 class Log:
@@ -121,14 +114,12 @@ class Log:
     options: argparse.Namespace
     axes: Axes | None
     _frames: dict[str, Stream] = field(default_factory=lambda: defaultdict(Stream))
-    _joints: dict[str, dict[str, Stream]] = field(
+    _joints: dict[str, dict[str | int, Stream]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(Stream))
     )
-    """{topic: {joint: its angles}}"""
-    _left_out: dict[str, str] = field(default_factory=dict)
-    """{topic: why no frame can be read from one of its messages}."""
-    _unusable: Counter[str] = field(default_factory=Counter)
-    """{topic: its messages without a frame}."""
+    """{topic: {name of a joint, or its place if it has none: its angles}}"""
+    _left_out: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    """{topic: why no frame can be read from each of some messages}."""
     _seen: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     """{`frames` or `joints`: all topics of such a kind}."""
 
@@ -169,8 +160,7 @@ class Log:
         try:
             values = self._values(kind, message)
         except Unusable as reason:
-            self._left_out.setdefault(topic, str(reason))
-            self._unusable[topic] += 1
+            self._left_out[topic].append(str(reason))
             return
         self._frames[topic].add(t, logged_s, values)
 
@@ -200,8 +190,7 @@ class Log:
         names: list[str],
         angles: NDArray[np.float64],
     ) -> None:
-        """Take in a message's angles; joints without names get their positions as
-        names.
+        """Take in a message's angles.
 
         A message without positions, and an angle that is not finite, tell nothing.
         """
@@ -214,8 +203,8 @@ class Log:
             )
         if len(set(names)) < len(names):
             raise InputError(f"{where} names a joint twice")
-        called = names or [str(place) for place in range(len(angles))]
-        for name, angle in zip(called, angles.tolist(), strict=True):
+        keys: Sequence[str | int] = names or range(len(angles))
+        for name, angle in zip(keys, angles.tolist(), strict=True):
             if np.isfinite(angle):
                 self._joints[topic][name].add(*times, angle)
 
@@ -250,134 +239,108 @@ class Log:
         name, frames = self._topic("frames", self._frames)
         if frames is None:
             raise InputError(f"{self.path}: {self._why_empty()}")
-        for topic, reason in self._left_out.items():
-            part = f"{topic},"
-            if topic == name:
-                unusable = self._unusable[topic]
-                messages = unusable + len(frames.values)
-                part = f"{unusable} of {messages} messages of {topic}, the first of"
-            say(f"{self.path}: left out {part} which {reason}")
+        self._say_left_out(name, len(frames.values))
         shapes = {np.shape(values) for values in frames.values}
         if len(shapes) > 1:
             raise InputError(
                 f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
             )
-        values = np.stack(frames.values)
         topic, joints = self._topic("joints", self._joints)
-        t = np.array(frames.stamps)
         by_logging = joints is not None and self._never_meet(frames, joints)
-        if by_logging:
-            t = np.array(frames.logged)
-        order = clock.order(t, f"{self.path}: {name}", "message")
-        if order.text:
-            say(f"{self.path}: {name}: {order.text}")
-        t = t[order.kept]
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
             "source": f"{self.path.name} {name}",
+            "skin": self.beside.table("skin", {}).raw,
         }
-        angles = None
-        if joints is not None:
-            angles, names = self._angles(topic, t, joints, by_logging=by_logging)
-            if names is not None:
-                meta["joint_names"] = list(names)
         if self.arm is not None:
             meta["arm"] = self.arm.to_dict()
-        return self._counted(t, values[order.kept], angles, meta)
+        where = f"{self.path}: {name}"
+        t = frames.times(by_logging)
+        trial = Trial.of(where, t, np.stack(frames.values), self.axes)
+        trial = trial.in_order("message")
+        if joints is not None:
+            names = self._joint_names(topic, tuple(joints))
+            streams = [joints[name] for name in names]
+            angles = self._angles(topic, trial.t, streams, by_logging)
+            trial = replace(trial, joints=angles)
+            if isinstance(names[0], str):
+                meta["joint_names"] = list(names)
+        if self.axes is not None:
+            say(self.axes.text)
+        (told,) = shapes
+        shape = skin_shape(trial, self._told(told), self.options)
+        return rest_of([trial], self.options).recording(trial, shape, meta)
 
     def _why_empty(self) -> str:
         """The sentence for a log without frames."""
-        for topic, reason in self._left_out.items():
-            return f"holds no frames: {topic} {reason}"
+        for topic, reasons in self._left_out.items():
+            return f"holds no frames: {topic} {reasons[0]}"
         kinds = f"{IMAGE}, {ARRAYS[2]} or another array"
         return (
             f'holds no frames; they must be {kinds}, JSON {{"counts": [[...]]}}, or a '
             "message of a sensor's own with --field"
         )
 
-    def _counted(
-        self,
-        t: NDArray[np.float64],
-        values: NDArray[np.float64],
-        angles: NDArray[np.float64] | None,
-        meta: dict[str, Any],
-    ) -> Recording:
-        """The recording of values (n, ...) as counts."""
-        shear = None
-        if self.axes is not None:
-            values, both = self.axes.split(values, self.path)
-            shear = both.reshape(len(t), -1, 2)
-            say(self.axes.text)
-        shape = self._shape(values.shape[1:])
-        flat = Values(values.reshape(len(t), -1), shear)
-        rest = rest_of([flat], self.options)
-        skin = self.beside.table("skin", {}).raw
-        return rest.recording(self.path, t, flat, shape, {**meta, "skin": skin}, angles)
+    def _say_left_out(self, name: str, frames: int) -> None:
+        """Say which topics are no frames, and how many messages of the frames' topic."""
+        for topic, reasons in self._left_out.items():
+            part = f"{topic},"
+            if topic == name:
+                count = len(reasons)
+                part = f"{count} of {count + frames} messages of {topic}, the first of"
+            say(f"{self.path}: left out {part} which {reasons[0]}")
 
-    def _shape(self, told: tuple[int, ...]) -> tuple[int, int]:
-        """The rows and columns of frames whose messages tell a shape.
+    def _told(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """The rows and columns that frames of a shape tell, or the file beside the log.
 
         Raises:
-            InputError: nothing tells it, or it is another number of taxels.
+            InputError: neither does, nor --shape.
         """
-        shape_option = asked_shape(self.options.shape)
-        if shape_option is None and len(told) != 2:
-            skin = self.beside.table("skin", {})
-            if not (skin.has("rows") and skin.has("cols")):
-                raise InputError(
-                    f"{self.path}: its frames do not state their rows and columns; give "
-                    "--shape ROWSxCOLS, or put them as "
-                    f'{{"skin": {{"rows": ..., "cols": ...}}}} into '
-                    f"{self.path.stem}.json beside it"
-                )
-            shape_option = skin.whole("rows"), skin.whole("cols")
-        rows, cols = shape_option or (told[0], told[1])
-        taxels = int(np.prod(told))
-        if rows * cols != taxels:
-            raise InputError(
-                f"{self.path}: its frames have {taxels} values, not {rows} x {cols}"
-            )
-        return rows, cols
+        if self.axes is not None:
+            shape = shape[:-1]
+        if len(shape) == 2 or self.options.shape is not None:
+            return shape
+        skin = self.beside.table("skin", {})
+        if skin.has("rows") and skin.has("cols"):
+            return skin.whole("rows"), skin.whole("cols")
+        raise InputError(
+            f"{self.path}: its frames do not state their rows and columns; give --shape "
+            'ROWSxCOLS, or put them as {"skin": {"rows": ..., "cols": ...}} into '
+            f"{self.path.stem}.json beside it"
+        )
 
-    def _never_meet(self, frames: Stream, joints: Mapping[str, Stream]) -> bool:
+    def _never_meet(self, frames: Stream, joints: Mapping[Any, Stream]) -> bool:
         """Whether the stamps of frames and angles are of clocks that never meet; it is
         said."""
         of_joints = [t for stream in joints.values() for t in stream.stamps]
-        meet = min(of_joints) <= max(frames.stamps) and min(frames.stamps) <= max(
-            of_joints
-        )
-        if meet:
-            return False
-        say(
-            f"{self.path}: the clocks of frames (from {frames.stamps[0]:.3f} s) and joint "
-            f"angles (from {of_joints[0]:.3f} s) never meet; both are taken by the time "
-            "at which they were logged"
-        )
-        return True
+        of_frames = frames.stamps
+        meet = min(of_joints) <= max(of_frames) and min(of_frames) <= max(of_joints)
+        if not meet:
+            say(
+                f"{self.path}: the clocks of frames (from {of_frames[0]:.3f} s) and joint "
+                f"angles (from {of_joints[0]:.3f} s) never meet; both are taken by the "
+                "time at which they were logged"
+            )
+        return not meet
 
     def _angles(
         self,
         topic: str,
         t: NDArray[np.float64],
-        joints: Mapping[str, Stream],
-        *,
+        joints: Sequence[Stream],
         by_logging: bool,
-    ) -> tuple[NDArray[np.float64], tuple[str, ...] | None]:
-        """Angles (n, dof) at the frames' times, and the joints' names if the log has
-        them."""
-        logged = tuple(joints)
-        field = self._wanted(topic, logged)
+    ) -> NDArray[np.float64]:
+        """(n, dof) angles at the frames' times."""
         release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
         columns = []
-        for name in field:
-            stream = joints[name]
-            at = np.array(stream.logged if by_logging else stream.stamps)
-            order = clock.order(at, f"{self.path}: {topic}", "message")
-            angles = np.array(stream.values)[order.kept, None]
-            columns.append(clock.angles_at(t, at[order.kept], angles, release_s)[:, 0])
-        values = np.stack(columns, axis=1)
-        unknown = ~np.isfinite(values).all(axis=1)
-        values[unknown] = np.nan
+        for stream in joints:
+            joints_t = stream.times(by_logging)
+            rows = clock.order(joints_t, f"{self.path}: {topic}", "message").kept
+            angles = np.array(stream.values)[rows, None]
+            columns.append(clock.angles_at(t, joints_t[rows], angles, release_s))
+        at_frames = np.hstack(columns)
+        unknown = ~np.isfinite(at_frames).all(axis=1)
+        at_frames[unknown] = np.nan
         if unknown.all():
             raise InputError(
                 f"{self.path}: {topic} has no joint angle at the time of any frame; "
@@ -388,29 +351,30 @@ class Log:
                 f"{self.path}: {topic} lacks joint angles for {int(unknown.sum())} of "
                 f"{len(t)} frames, where they are unknown"
             )
-        named = logged != tuple(map(str, range(len(logged))))
-        return values, field if named else None
+        return at_frames
 
-    def _wanted(self, topic: str, logged: Sequence[str]) -> tuple[str, ...]:
+    def _joint_names(
+        self, topic: str, logged: tuple[str | int, ...]
+    ) -> Sequence[str | int]:
         """The joints whose angles are taken, in their order."""
-        named = tuple(logged) != tuple(map(str, range(len(logged))))
         if self.arm is None:
-            return tuple(logged)
-        if not named:
+            return logged
+        names = [name for name in logged if isinstance(name, str)]
+        if not names:
             if len(logged) != self.arm.dof:
                 raise InputError(
                     f"{self.path}: {topic} has {len(logged)} angles without names, but "
                     f"the arm has {self.arm.dof} joints"
                 )
-            return tuple(logged)
+            return logged
         try:
-            joint_columns(logged, self.arm.names)
+            joint_columns(names, self.arm.names)
         except InputError as error:
             raise InputError(f"{self.path}: {topic} has {error}") from None
-        names = [name for name in logged if name not in self.arm.names]
-        if names:
+        others = [name for name in names if name not in self.arm.names]
+        if others:
             LOG.warning(
-                f"{self.path}: {topic}: joints outside the arm: {', '.join(names)}"
+                f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
             )
         return self.arm.names
 
@@ -419,8 +383,8 @@ class Log:
         messages; None where there is none."""
         name = self.beside.get(f"{kind}_topic", None)
         if name is not None and not (isinstance(name, str) and name in topics):
-            reason = self._left_out.get(str(name))
-            why = f"; it {reason}" if reason else ""
+            reasons = self._left_out.get(str(name))
+            why = f"; it {reasons[0]}" if reasons else ""
             raise InputError(
                 f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
                 f"{sorted(self._seen[kind])}, not {shown(name)}{why}"

@@ -1,5 +1,6 @@
 """Arrays: which axis is the time, trials within a file, and sizes."""
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from train.importers import arrays
 from train.importers.arrays import read_arrays, table_of, trials_of
 
 PATH = Path("a.mat")
+OPTIONS = argparse.Namespace(axis=None, taxels=None, joints=None, time=None)
 FRAMES = np.arange(24).reshape(6, 4)
 
 
@@ -24,7 +26,7 @@ FRAMES = np.arange(24).reshape(6, 4)
     ],
 )
 def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
-    table = table_of(PATH, stored, None, set())
+    table = table_of(PATH, stored, OPTIONS)
     assert form in table.form
     skin = [name for name in table.names if name.startswith("skin")]
     assert table.data[skin].to_numpy().tolist() == FRAMES.tolist()
@@ -43,19 +45,20 @@ def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
 )
 def test_what_would_be_guessed_is_asked(stored, sentence):
     with pytest.raises(InputError, match=sentence):
-        table_of(PATH, stored, None, set())
+        table_of(PATH, stored, OPTIONS)
 
 
 def test_an_axis_that_is_named_is_taken():
     square = np.arange(36).reshape(6, 6)
     stored = {"a": square, "b": np.ones((6, 2))}
-    table = table_of(PATH, stored, 1, {"a"})
+    named = argparse.Namespace(axis=2, taxels="a", joints=None, time=None)
+    table = table_of(PATH, stored, named)
     assert table.data.to_numpy().tolist() == square.T.tolist()
 
 
 def test_an_array_of_rows_and_columns_tells_the_shape():
     stored = {"t": np.arange(6.0), "skin": FRAMES.reshape(6, 2, 2)}
-    assert table_of(PATH, stored, None, set()).shape == (2, 2)
+    assert table_of(PATH, stored, OPTIONS).shape == (2, 2)
 
 
 def of_structures(path):
@@ -88,6 +91,12 @@ def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
     assert second[1] == {"object": "pen"}
     assert first[2]["frames"].tolist() == FRAMES.tolist()
     assert second[2]["frames"].tolist() == (FRAMES + 1).tolist()
+
+
+def test_arrays_with_other_numbers_of_trials_are_named():
+    stored = {"a": np.ones((2, 3)), "b": np.array(1.0)}
+    with pytest.raises(InputError, match="{'a': 2, 'b': 1} trials; leave out"):
+        list(trials_of(PATH, stored, "object"))
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])

@@ -1,6 +1,8 @@
 """Tables of three axes: which column is which axis of which taxel, signs, and what is
 refused."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -10,28 +12,57 @@ from train.importers.axes import lettered
 
 FRAMES = 60
 TAXELS = 4
+TIME = 0.01 * np.arange(FRAMES)
+RNG = np.random.default_rng(3)
+THREE = RNG.integers(-900, 900, (FRAMES, TAXELS, 3))
+"""Whole numbers x, y, z; z is pressed from frame 20 on."""
+THREE[..., 2] = RNG.integers(200, 2000, (FRAMES, TAXELS))
+THREE[:20] = 0
 
 
-def values() -> np.ndarray:
-    """(frames, taxels, 3) whole numbers x, y, z; z is pressed from frame 20 on."""
-    rng = np.random.default_rng(3)
-    three = rng.integers(-900, 900, (FRAMES, TAXELS, 3))
-    three[..., 2] = rng.integers(200, 2000, (FRAMES, TAXELS))
-    three[:20] = 0
-    return three
+def named(form="s{i}_{a}", axes="xyz"):
+    return [form.format(i=i + 1, a=a) for i in range(TAXELS) for a in axes]
 
 
-def write(folder, names, columns) -> None:
-    folder.mkdir(exist_ok=True)
+def write_table(folder, names, values=THREE):
     lines = [",".join(["t", *names])]
-    for n, row in enumerate(columns):
-        lines.append(",".join([f"{0.01 * n:.2f}", *map(str, row.tolist())]))
+    for t, row in zip(TIME, values.reshape(FRAMES, -1), strict=True):
+        lines.append(",".join([f"{t:.2f}", *map(str, row[: len(names)])]))
     (folder / "cup_1.csv").write_text("\n".join(lines) + "\n")
 
 
-def imported(folder, out, *options) -> edge.Recording:
-    assert main(["import", "csv", str(folder), "--out", str(out), *options]) == 0
-    return edge.load(out / "cup_1.npz")
+def columns_in_another_order(folder):
+    order = RNG.permutation(3 * TAXELS)
+    names = [named()[i] for i in order]
+    write_table(folder, names, THREE.reshape(FRAMES, -1)[:, order])
+
+
+def three_arrays(folder):
+    arrays = {a: THREE[..., i] for i, a in enumerate("xyz")}
+    np.savez(folder / "cup_1.npz", t=TIME, **arrays)
+
+
+def an_array_whose_last_axis_is_three(folder):
+    np.savez(folder / "cup_1.npz", t=TIME, tactile=THREE)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "in").mkdir()
+    return tmp_path / "in"
+
+
+@pytest.fixture
+def imported(folder):
+    """The function that imports the folder with some options."""
+
+    def run(*options):
+        out = folder.parent / "out"
+        words = ["import", "csv", str(folder), "--out", str(out)]
+        assert main([*words, *options]) == 0
+        return edge.load(out / "cup_1.npz")
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -55,69 +86,39 @@ def test_other_names_have_no_axis(name):
     assert lettered(name) is None
 
 
-@pytest.mark.parametrize("form", ["s{i}_{a}", "f{a}{i}", "{a}_{i}"])
-def test_each_axis_arrives_in_its_place(form, tmp_path):
-    three = values()
-    names = [form.format(i=i + 1, a=a) for i in range(TAXELS) for a in "xyz"]
-    write(tmp_path / "in", names, three.reshape(FRAMES, -1))
-    recording = imported(tmp_path / "in", tmp_path / "out", "--axes", "xyz")
-    assert recording.frames[:, 0].tolist() == three[..., 2].tolist()
-    assert recording.shear[:, 0].tolist() == three[..., :2].tolist()
+@pytest.mark.parametrize(
+    "write",
+    [
+        partial(write_table, names=named("s{i}_{a}")),
+        partial(write_table, names=named("f{a}{i}")),
+        partial(write_table, names=named("{a}_{i}")),
+        columns_in_another_order,
+        three_arrays,
+        an_array_whose_last_axis_is_three,
+    ],
+)
+def test_each_axis_arrives_in_its_place(write, folder, imported):
+    write(folder)
+    recording = imported("--axes", "xyz")
+    assert recording.frames[:, 0].tolist() == THREE[..., 2].tolist()
+    assert recording.shear[:, 0].tolist() == THREE[..., :2].tolist()
     assert recording.layout.axes == 3
 
 
-def test_the_letters_say_which_axis_is_which_and_signs_are_turned(tmp_path):
-    three = values()
-    names = [f"s{i + 1}_{a}" for i in range(TAXELS) for a in "yzx"]
+def test_the_letters_say_which_axis_is_which_and_signs_are_turned(folder, imported):
     # In this file x is the normal, y runs along the rows, and z around the columns.
-    columns = three[..., [0, 1, 2]].reshape(FRAMES, -1)
-    write(tmp_path / "in", names, columns)
-    recording = imported(
-        tmp_path / "in", tmp_path / "out", "--axes", "yzx", "--flip", "yz"
-    )
-    assert recording.frames[:, 0].tolist() == three[..., 2].tolist()
-    assert recording.shear[:, 0].tolist() == (-three[..., :2]).tolist()
+    write_table(folder, named(axes="yzx"))
+    recording = imported("--axes", "yzx", "--flip", "yz")
+    assert recording.frames[:, 0].tolist() == THREE[..., 2].tolist()
+    assert recording.shear[:, 0].tolist() == (-THREE[..., :2]).tolist()
 
 
-def test_columns_of_another_order_give_the_same_taxels(tmp_path):
-    three = values()
-    names = [f"s{i + 1}_{a}" for i in range(TAXELS) for a in "xyz"]
-    order = np.random.default_rng(0).permutation(len(names))
-    flat = three.reshape(FRAMES, -1)
-    write(tmp_path / "in", [names[i] for i in order], flat[:, order])
-    recording = imported(tmp_path / "in", tmp_path / "out", "--axes", "xyz")
-    assert recording.shear[:, 0].tolist() == three[..., :2].tolist()
-
-
-def test_three_arrays_are_three_axes(tmp_path):
-    three = values()
-    (tmp_path / "in").mkdir()
-    arrays = {a: three[..., i] for i, a in enumerate("xyz")}
-    np.savez(tmp_path / "in" / "cup_1.npz", t=0.01 * np.arange(FRAMES), **arrays)
-    recording = imported(tmp_path / "in", tmp_path / "out", "--axes", "xyz")
-    assert recording.frames[:, 0].tolist() == three[..., 2].tolist()
-    assert recording.shear[:, 0].tolist() == three[..., :2].tolist()
-
-
-def test_an_array_whose_last_axis_is_three_has_three_axes(tmp_path):
-    three = values()
-    (tmp_path / "in").mkdir()
-    time = 0.01 * np.arange(FRAMES)
-    np.savez(tmp_path / "in" / "cup_1.npz", t=time, tactile=three)
-    recording = imported(tmp_path / "in", tmp_path / "out", "--axes", "xyz")
-    assert recording.frames[:, 0].tolist() == three[..., 2].tolist()
-    assert recording.shear[:, 0].tolist() == three[..., :2].tolist()
-
-
-def test_signed_values_lose_their_rest_on_each_axis(tmp_path):
-    three = values()
-    rest = np.array([40, -70, -500])
-    names = [f"s{i + 1}_{a}" for i in range(TAXELS) for a in "xyz"]
-    write(tmp_path / "in", names, (three + rest).reshape(FRAMES, -1))
-    recording = imported(tmp_path / "in", tmp_path / "out", "--axes", "xyz", "--signed")
+def test_signed_values_lose_their_rest_on_each_axis(folder, imported):
+    write_table(folder, named(), THREE + np.array([40, -70, -500]))
+    recording = imported("--axes", "xyz", "--signed")
     counts = recording.meta["values"]["counts_per_unit"]
-    assert recording.frames[:, 0].tolist() == (counts * three[..., 2]).tolist()
-    assert recording.shear[:, 0].tolist() == (counts * three[..., :2]).tolist()
+    assert recording.frames[:, 0].tolist() == (counts * THREE[..., 2]).tolist()
+    assert recording.shear[:, 0].tolist() == (counts * THREE[..., :2]).tolist()
 
 
 @pytest.mark.parametrize(
@@ -127,16 +128,16 @@ def test_signed_values_lose_their_rest_on_each_axis(tmp_path):
         ("s1 s2 s3 s4", ("--axes", "xyz"), "no columns are named by an axis"),
         ("s1_x s1_y s1_z s2", (), "or --axes xyz for taxels of three axes"),
         ("s1_x s1_y s1_z s2", ("--flip", "x"), "--flip needs --axes"),
+        ("s1_x s1_y s1_z s1", ("--axes", "xyz"), "s1 names a column and a taxel"),
     ],
 )
 def test_what_is_not_three_axes_is_one_sentence(
-    names, options, sentence, tmp_path, capsys
+    names, options, sentence, folder, refusal
 ):
-    write(tmp_path / "in", names.split(), values().reshape(FRAMES, -1)[:, :4])
-    out = str(tmp_path / "out")
-    assert main(["import", "csv", str(tmp_path / "in"), "--out", out, *options]) == 2
-    assert sentence in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    write_table(folder, names.split())
+    out = folder.parent / "out"
+    assert sentence in refusal("import", "csv", folder, "--out", out, *options)
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("text", ["xy", "xxyz", "abc", ""])
@@ -146,12 +147,9 @@ def test_letters_that_are_no_axes_are_refused(text, tmp_path, capsys):
     assert "must be x, y and z in some order" in capsys.readouterr().err
 
 
-def test_shear_beyond_its_range_is_refused(tmp_path, capsys):
-    three = values()
-    three[30, 0, 0] = 40000
-    names = [f"s{i + 1}_{a}" for i in range(TAXELS) for a in "xyz"]
-    write(tmp_path / "in", names, three.reshape(FRAMES, -1))
-    out = str(tmp_path / "out")
-    folder = str(tmp_path / "in")
-    assert main(["import", "csv", folder, "--out", out, "--axes", "xyz"]) == 2
-    assert "shear reaches 40000 counts, and at most 32767" in capsys.readouterr().err
+def test_shear_beyond_its_range_is_refused(folder, refusal):
+    large = THREE.copy()
+    large[30, 0, 0] = 40000
+    write_table(folder, named(), large)
+    said = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
+    assert "shear reaches 40000 counts, and at most 32767" in said

@@ -1,5 +1,6 @@
 """What the columns of a table are taken for, and what is asked instead of guessed."""
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pandas as pd
 import pytest
 
 from edge.errors import InputError
-from train.importers.columns import Wishes, meaning, times_of
+from train.importers.columns import meaning, times_of
 from train.importers.reading import Table
 
 COUNTS = np.arange(5)
@@ -18,8 +19,13 @@ def table(*names, **columns):
     return Table(Path("a.csv"), data)
 
 
-def taken(given, **wishes):
-    return meaning(given, given.names, Wishes(**wishes))
+def options(**words):
+    usual = dict.fromkeys(("time", "taxels", "joints", "time_unit", "rate"))
+    return argparse.Namespace(**{**usual, **words})
+
+
+def taken(given, **words):
+    return meaning(given, options(**words))
 
 
 def test_taxels_are_those_of_a_stem_with_running_numbers():
@@ -110,7 +116,7 @@ def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit
     found = taken(table("s1", **{name: COUNTS * step}))
     assert found.unit == unit
     seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
-    times = times_of(table("s1", **{name: COUNTS * step}), found)
+    times = times_of(table("s1", **{name: COUNTS * step}), found, options())
     assert times == pytest.approx(COUNTS * step * seconds)
 
 
@@ -126,18 +132,18 @@ def test_iso_dates_are_times_whatever_their_column_is_called():
     given = table("s1", zeit=dates)
     found = taken(given)
     assert found.unit == "iso"
-    assert times_of(given, found) == pytest.approx(0.1 * COUNTS)
+    assert times_of(given, found, options()) == pytest.approx(0.1 * COUNTS)
 
 
 def test_steps_that_may_be_seconds_or_milliseconds_are_asked_for():
     with pytest.raises(InputError, match="give --time-unit s or ms"):
         taken(table("t", "s1"))
-    assert taken(table("t", "s1"), unit="ms").unit == "ms"
+    assert taken(table("t", "s1"), time_unit="ms").unit == "ms"
 
 
 def test_a_line_says_what_was_taken():
     given = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
-    found = meaning(given, given.names, Wishes(unit="ms"))
+    found = taken(given, time_unit="ms")
     assert found.text("folder", (4, 4)) == (
         'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
         'left out: "label", a column without a name'

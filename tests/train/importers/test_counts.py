@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.importers.counts import Rest, Values, asked_shape, rest_of
+from train.importers.counts import Rest, Trial, rest_of, shape_of_skin
 
 
 def options(**given):
@@ -14,16 +14,15 @@ def options(**given):
     return argparse.Namespace(**{**usual, **given})
 
 
-def trial(*rows, shear=None) -> Values:
-    return Values(np.array(rows, dtype=float), shear)
+def trial(*rows, shear=None) -> Trial:
+    """A frame of some taxels each 10 ms."""
+    t = 5.0 + 0.01 * np.arange(len(rows))
+    return Trial("a.csv", t, np.array(rows, dtype=float), shear)
 
 
-def recorded(rest, values, where="a"):
-    """A recording of one row of taxels, a frame each 10 ms."""
-    n, taxels = values.normal.shape
-    return rest.recording(
-        where, 5.0 + 0.01 * np.arange(n), values, (1, taxels), {}, None
-    )
+def recorded(rest, trial):
+    """A recording of one row of taxels."""
+    return rest.recording(trial, (1, trial.values.shape[1]), {})
 
 
 def test_counts_stay_as_they_are():
@@ -48,7 +47,10 @@ def test_signed_values_count_their_distance_with_all_their_digits():
     rest = rest_of([values], options(signed=True))
     assert rest.scale == 100.0
     assert recorded(rest, values).frames[3].tolist() == [[25, 50]]
-    assert rest.meta == {"values": {"counts_per_unit": 100.0, "rest": [0.5, -1.0]}}
+    assert recorded(rest, values).meta["values"] == {
+        "counts_per_unit": 100.0,
+        "rest": [0.5, -1.0],
+    }
 
 
 def test_shear_loses_its_rest_where_the_normal_does():
@@ -62,7 +64,7 @@ def test_shear_loses_its_rest_where_the_normal_does():
 
 
 def test_a_missing_value_is_not_valid():
-    counted = recorded(Rest(None, 1, 1.0), trial([1, np.nan]))
+    counted = recorded(Rest(), trial([1, np.nan]))
     assert counted.valid.tolist() == [[[True, False]]]
     assert counted.frames.tolist() == [[[1, 0]]]
 
@@ -71,14 +73,14 @@ def test_a_missing_value_is_not_valid():
 def test_a_taxel_without_one_of_its_axes_is_not_valid(unknown):
     shear = np.array([[[1.0, 2.0], [unknown, 4.0], [5.0, 6.0]]])
     values = trial([7, 8, 9], shear=shear)
-    counted = recorded(Rest(None, 1, 1.0), values)
+    counted = recorded(Rest(), values)
     assert counted.valid.tolist() == [[[True, False, True]]]
     assert counted.frames.tolist() == [[[7, 0, 9]]]
     assert counted.shear.tolist() == [[[[1, 2], [0, 0], [5, 6]]]]
 
 
 def test_a_taxel_without_a_value_at_rest_is_never_valid():
-    rest = Rest(np.array([1.0, np.nan]), 1, 1.0)
+    rest = Rest(np.array([1.0, np.nan]))
     counted = recorded(rest, trial([3, 4], [5, 6]))
     assert counted.valid.tolist() == [[[True, False]], [[True, False]]]
     assert counted.frames.tolist() == [[[2, 0]], [[4, 0]]]
@@ -90,7 +92,7 @@ def test_a_taxel_without_a_value_at_rest_is_never_valid():
 )
 def test_what_is_no_count_is_refused(values, hint):
     with pytest.raises(InputError, match=rf"a.csv: .* are no counts .*; {hint}"):
-        recorded(Rest(None, 1, 1.0), trial(values), "a.csv")
+        recorded(Rest(), trial(values))
 
 
 def test_values_cannot_fall_and_be_signed():
@@ -98,12 +100,26 @@ def test_values_cannot_fall_and_be_signed():
         rest_of([trial([1])], options(falls=True, signed=True))
 
 
+def test_a_taxel_without_a_shear_at_rest_is_never_valid():
+    shear = np.array([[[1.0, 2.0], [np.nan, 4.0]]] + 3 * [[[3.0, 4.0], [5.0, 6.0]]])
+    values = trial([1, 1], [1, 1], [1, 1], [2, 2], shear=shear)
+    counted = recorded(rest_of([values], options(signed=True)), values)
+    assert counted.valid.tolist() == [[[True, False]]] * 4
+    assert counted.shear[3].tolist() == [[[0, 0], [0, 0]]]
+
+
+def test_values_that_are_all_missing_at_rest_have_no_scale():
+    values = trial([1.0], [np.nan], [5.0])
+    rest = rest_of([values], options(signed=True))
+    assert rest.scale == 1.0
+    assert recorded(rest, values).valid.tolist() == [[[False]]] * 3
+
+
 def test_a_shape_is_rows_and_columns():
-    assert asked_shape("16x24") == (16, 24)
-    assert asked_shape(None) is None
+    assert shape_of_skin("16x24") == (16, 24)
 
 
 @pytest.mark.parametrize("text", ["16", "x", "axb", "16x", f"{'1' * 5000}x2", "²x2"])
 def test_another_text_is_no_shape(text):
-    with pytest.raises(InputError, match="--shape must be ROWSxCOLS"):
-        asked_shape(text)
+    with pytest.raises(argparse.ArgumentTypeError, match="must be ROWSxCOLS"):
+        shape_of_skin(text)

@@ -2,7 +2,6 @@
 used."""
 
 import io
-import json
 import os
 
 import numpy as np
@@ -85,6 +84,15 @@ def folder(tmp_path):
     return tmp_path / "in"
 
 
+def put(folder, files):
+    """Write files by their names; the folder, or the long table in it."""
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        data = content if isinstance(content, bytes) else content.encode()
+        (folder / name).write_bytes(data)
+    return next(folder.glob("all.*"), folder)
+
+
 def imported(folder, *words):
     """The exit status, and the recordings by name, of a folder or of the long table in
     it."""
@@ -122,8 +130,7 @@ def test_values_that_fall_are_taken_from_the_quietest_start(folder, capsys):
     rest = [240, 250]
     early = [[238, 249], [236, 250], [230, 241]]  # pressed from its first frame on
     quiet = [rest, [241, 249], rest, [233, 250]]
-    (folder / "pen_1.txt").write_text(text(early, " "))
-    (folder / "pen_2.txt").write_text(text(quiet, " "))
+    put(folder, {"pen_1.txt": text(early, " "), "pen_2.txt": text(quiet, " ")})
     status, recordings = imported(folder, "--falls", "--rate", "10")
     assert status == 0
     assert recordings["pen_1"].frames[:, 0].tolist() == [[2, 1], [4, 0], [10, 9]]
@@ -153,11 +160,12 @@ def test_trials_may_be_numbered_in_an_array(folder):
 
 def test_joints_fractions_gaps_and_files_beside(folder):
     rows = [[0.5 * i, "nan", 90, -90] for i in range(3)]
-    (folder / "a.csv").write_text(text(rows, head="left,right,q.1,q.2"))
-    (folder / "labels.csv").write_text("\ufefftrial,object,who\na,bear,me\n")
-    (folder / "skin.json").write_text(
-        json.dumps({"rows": 2, "cols": 1, "threshold_counts": 3})
-    )
+    files = {
+        "a.csv": text(rows, head="left,right,q.1,q.2"),
+        "labels.csv": "\ufefftrial,object,who\na,bear,me\n",
+        "skin.json": '{"rows": 2, "cols": 1, "threshold_counts": 3}',
+    }
+    put(folder, files)
     words = ["--rate", "10", "--joints", "q", "--degrees", "--scale", "10"]
     words += ["--taxels", "left,right"]
     status, recordings = imported(folder, *words)
@@ -226,17 +234,27 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
-            "2 columns are not 2 x 2 taxels",
-        ),
-        (
-            {"1.txt": "1 2\n"},
-            (*RATE, "--shape", "2x-1"),
-            "--shape must be ROWSxCOLS, such as 16x",
+            "2 values a frame are not 2 x 2 taxels; give --shape",
         ),
         (
             {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
             (*RATE, "--strict"),
             "2.txt: has 3 taxels, and ",
+        ),
+        (
+            {"1.csv": "p1,p2\n9,1,2\n9,3,4\n"},
+            RATE,
+            "1.csv: row 2 has 3 values, and the first row 2",
+        ),
+        (
+            {"1.csv": "s1,s2\n1,2\n"},
+            (*RATE, "--taxels", "s2-s1"),
+            "1.csv: has no column s2-s1; it has ['s1', 's2']",
+        ),
+        (
+            {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
+            ("--time", "1"),
+            "all.csv: column trial holds no values of a frame",
         ),
         ({}, (), "in: holds no file .csv"),
         (
@@ -285,15 +303,9 @@ RATE = ("--rate", "1")
     ],
 )
 def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, refusal):
-    for name, content in files.items():
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_bytes(
-            content if isinstance(content, bytes) else content.encode()
-        )
-    path = next(folder.glob("all.*"), folder)
-    assert sentence in refusal(
-        "import", "csv", path, "--out", folder.parent / "out", *words
-    )
+    path = put(folder, files)
+    out = folder.parent / "out"
+    assert sentence in refusal("import", "csv", path, "--out", out, *words)
 
 
 TABLES = int(os.environ.get("TABLES", "60"))
@@ -345,29 +357,22 @@ def test_generated_tables_arrive_as_an_independent_reader_has_them(
     assert recording.t == pytest.approx(0.02 * np.arange(rows))
 
 
+TRIAL = "t,p1\n0,1\n0.1,2\n"
+
+
 @pytest.mark.parametrize(
-    ("files", "label"),
-    [
-        ({"cup/trial_1/x.csv": 1}, "cup"),
-        ({"cup/1/x.csv": 1}, "cup"),
-        ({"cup/x_1.csv": 1}, "cup"),
-        ({"cup_1.csv": 1}, "cup"),
-    ],
+    "name", ["cup/trial_1/x.csv", "cup/1/x.csv", "cup/x_1.csv", "cup_1.csv"]
 )
-def test_a_label_is_no_folder_that_counts_trials(folder, files, label):
-    for name in files:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text("t,p1\n0,1\n0.1,2\n")
+def test_a_label_is_no_folder_that_counts_trials(folder, name):
+    put(folder, {name: TRIAL})
     _, recordings = imported(folder)
     (recording,) = recordings.values()
-    assert recording.labels == {"object": label}
+    assert recording.labels == {"object": "cup"}
 
 
 def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
-    for i in range(3):
-        (folder / f"cup_{i}.csv").write_text(f"t,p1\n0,1\n0.1,{i}\n")
-    (folder / "pen_1.csv").write_text("t,p1\n0,1\n0.1,x\n")
-    (folder / "pen_2.csv").write_text("t,s1\n0,1\n0.1,2\n")
+    bad = {"pen_1.csv": "t,p1\n0,1\n0.1,x\n", "pen_2.csv": "t,s1\n0,1\n0.1,2\n"}
+    put(folder, {f"cup_{i}.csv": f"t,p1\n0,1\n0.1,{i}\n" for i in range(3)} | bad)
     status, recordings = imported(folder)
     err = capsys.readouterr().err
     assert status == 1
@@ -377,9 +382,8 @@ def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
 
 
 def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
-    for name in ("r0", "r1"):
-        (folder / f"{name}.csv").write_text(f"t,p1\n0,{name[1]}\n0.1,2\n")
-    (folder / "labels.csv").write_text("trial,object\nr0,box\nR1,cup\n")
+    labels = "trial,object\nr0,box\nR1,cup\n"
+    put(folder, {"r0.csv": TRIAL, "r1.csv": TRIAL, "labels.csv": labels})
     status, recordings = imported(folder)
     err = capsys.readouterr().err
     assert status == 1
@@ -390,8 +394,7 @@ def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
 
 
 def test_trials_with_the_same_frames_are_named(folder, capsys):
-    for name in ("cup_1", "cup_2"):
-        (folder / f"{name}.csv").write_text("t,p1\n0,1\n0.1,2\n")
+    put(folder, {"cup_1.csv": TRIAL, "cup_2.csv": TRIAL})
     imported(folder)
     assert "2 trials have the frames of others" in capsys.readouterr().out
 
@@ -410,32 +413,44 @@ def test_signed_values_keep_all_digits_and_say_how(folder):
 
 
 def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
-    rows = "a,box,0,1,2\na,box,0.1,51,62\n"
-    (folder / "all.csv").write_text("trial,object,t,p1,p2\n" + rows)
+    put(folder, {"all.csv": "trial,object,t,p1,p2\na,box,0,1,2\na,box,0.1,51,62\n"})
     _, recordings = imported(folder, "--taxels", "4-5")
     assert recordings["a"].frames[-1].tolist() == [[51, 62]]
 
 
+def test_dates_that_run_within_a_trial_are_its_times(folder):
+    day = "2024-02-01T00:00"
+    rows = [("a", day, f"2024-03-01T10:00:00.{n}", n) for n in range(3)]
+    put(folder, {"all.csv": text(rows, head="trial,made,when,p1")})
+    _, recordings = imported(folder)
+    assert recordings["a"].t == pytest.approx([0.0, 0.1, 0.2])
+    assert recordings["a"].labels == {"made": day}
+
+
 @pytest.mark.parametrize(
-    ("rows", "sentence"),
+    ("table", "sentence"),
     [
-        ("a,0,1,5\na,0,1,6\n", "two values of taxel 1 at time 0"),
         (
-            "".join(f"a,{i},{i},1\n" for i in range(300)),
+            text([("a", 0, 1, 5), ("a", 0, 1, 6)], head="trial,t,taxel,value"),
+            "two values of taxel 1 at time 0",
+        ),
+        (
+            text([("a", i, i, 1) for i in range(300)], head="trial,t,taxel,value"),
             "the taxels need times in common",
+        ),
+        (
+            text([("a", 1, 1)], head="trial,taxel,value"),
+            "needs the columns value and a time beside taxel",
+        ),
+        (
+            text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
+            "object changes within trial a, from 'box' to 'cup'",
         ),
     ],
 )
-def test_a_long_table_of_values_must_be_a_table(folder, refusal, rows, sentence):
-    (folder / "all.csv").write_text("trial,t,taxel,value\n" + rows)
-    assert sentence in refusal(
-        "import", "csv", folder / "all.csv", "--out", folder.parent / "out"
-    )
-
-
-def test_a_label_that_changes_within_a_trial_is_refused(folder, refusal):
-    rows = "a,box,0,1\na,cup,0.1,2\n"
-    (folder / "all.csv").write_text("trial,object,t,p1\n" + rows)
-    assert "object changes within trial a, from 'box' to 'cup'" in refusal(
-        "import", "csv", folder / "all.csv", "--out", folder.parent / "out"
-    )
+def test_a_long_table_that_contradicts_itself_is_refused(
+    folder, refusal, table, sentence
+):
+    path = folder / "all.csv"
+    path.write_text(table)
+    assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out")

@@ -99,55 +99,55 @@ def test_three_axes_are_shear(tmp_path):
     assert (second.shear[..., 1] == counts // 4).all()
 
 
+def rewritten(**columns):
+    """The function that changes columns of the third episode of a data set."""
+
+    def write(chunk):
+        data = episode(2).assign(**columns)
+        data.to_parquet(chunk / "episode_000002.parquet")
+
+    return write
+
+
+RAGGED = [[1.0] * TAXELS] * (N - 1) + [[1.0, 2.0]]
+
+
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("change", "options", "sentence"),
     [
-        (("--taxels", "observation.skin"), "has no column observation.skin; it has"),
-        (("--taxels", "observation.tactile", "--shape", "5x5"), "has 6 values, not 5"),
-        (("--taxels", "observation.tactile", "--joints", "q"), "has no column q"),
-        (("--taxels", "observation.tactile", "--axes", "xyz"), "needs values of x, y"),
-        (("--taxels", "observation.state"), "are no counts"),
+        (None, ("--taxels", "observation.skin"), "has no column observation.skin; it"),
+        (None, ("--shape", "5x5"), "6 values a frame are not 5 x 5 taxels"),
+        (None, ("--joints", "q"), "has no column q; it has"),
+        (None, ("--axes", "xyz"), "needs values of x, y and z, not (6,)"),
+        (None, ("--taxels", "observation.state"), "are no counts"),
+        (
+            rewritten(**{"observation.tactile": RAGGED}),
+            (),
+            "episode 2: observation.tactile does not hold numbers of one shape",
+        ),
+        (
+            rewritten(**{"observation.tactile": [[1.0, 2.0]] * N}),
+            (),
+            "episode 2 has values (2,) a frame, but episode 0 (6,)",
+        ),
+        (
+            lambda chunk: episode(2).to_parquet(chunk / "again.parquet"),
+            (),
+            "episode 2 stands in two files",
+        ),
     ],
 )
-def test_what_does_not_suit_is_one_sentence(tmp_path, options, sentence, capsys):
+def test_what_does_not_suit_is_one_sentence(
+    tmp_path, refusal, change, options, sentence
+):
     folder = data_set(tmp_path / "set", "v2.1")
-    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
-    assert main([*words, *options]) == 2
-    assert sentence in capsys.readouterr().err
+    if change is not None:
+        change(folder / "data" / "chunk-000")
+    words = ("import", "lerobot", folder, "--out", tmp_path / "out")
+    taxels = ("--taxels", "observation.tactile")
+    assert sentence in refusal(*words, *taxels, *options)
 
 
-def test_a_folder_that_is_no_data_set_is_refused(tmp_path, capsys):
-    words = ["import", "lerobot", str(tmp_path), "--out", str(tmp_path / "out")]
-    assert main([*words, "--taxels", "x"]) == 2
-    assert "holds no meta/info.json" in capsys.readouterr().err
-
-
-def test_frames_of_several_lengths_are_named_with_their_episode(tmp_path, capsys):
-    folder = data_set(tmp_path / "set", "v2.1")
-    file = folder / "data" / "chunk-000" / "episode_000002.parquet"
-    data = episode(2)
-    data.at[5, "observation.tactile"] = [1.0, 2.0]
-    data.to_parquet(file)
-    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
-    assert main([*words, "--taxels", "observation.tactile"]) == 2
-    said = capsys.readouterr().err
-    assert "episode 2: observation.tactile does not hold numbers of one shape" in said
-
-
-def test_an_episode_in_two_files_is_refused(tmp_path, capsys):
-    folder = data_set(tmp_path / "set", "v2.1")
-    episode(2).to_parquet(folder / "data" / "chunk-000" / "again.parquet")
-    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
-    assert main([*words, "--taxels", "observation.tactile"]) == 2
-    assert "episode 2 stands in two files" in capsys.readouterr().err
-
-
-def test_episodes_of_several_skins_are_named(tmp_path, capsys):
-    folder = data_set(tmp_path / "set", "v2.1")
-    data = episode(2)
-    data["observation.tactile"] = [[1.0, 2.0]] * N
-    data.to_parquet(folder / "data" / "chunk-000" / "episode_000002.parquet")
-    words = ["import", "lerobot", str(folder), "--out", str(tmp_path / "out")]
-    assert main([*words, "--taxels", "observation.tactile"]) == 2
-    said = capsys.readouterr().err
-    assert "episode 2 has values (2,) a frame, but episode 0 (6,)" in said
+def test_a_folder_that_is_no_data_set_is_refused(tmp_path, refusal):
+    words = ("import", "lerobot", tmp_path, "--out", tmp_path / "out")
+    assert "holds no meta/info.json" in refusal(*words, "--taxels", "x")
