@@ -115,16 +115,21 @@ def write(
             without_threshold.append((path, recording))
     report = [set_thresholds(without_threshold)] if without_threshold else []
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
-    alike = [names for names in frames.values() if len(names) > 1]
-    if alike:
-        say(
-            f"warning: {sum(map(len, alike))} trials have the frames of others, such as "
-            f"{' and '.join(alike[0][:2])}; keep one of each, or accuracies are too high"
-        )
+    warn_of_copies(list(frames.values()))
     skipped = getattr(arguments, "skipped", [])
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)
     return 1 if skipped else 0
+
+
+def warn_of_copies(groups: Sequence[Sequence[str]]) -> None:
+    """Warn of trials with equal frames, given the names that share theirs."""
+    copies = [names for names in groups if len(names) > 1]
+    if copies:
+        say(
+            f"warning: {sum(map(len, copies))} trials have the frames of others, such as "
+            f"{' and '.join(copies[0][:2])}; keep one of each, or accuracies are too high"
+        )
 
 
 def _path(arguments: argparse.Namespace, name: str, paths: Set[Path]) -> Path:

@@ -156,15 +156,8 @@ def parted(table: Table, normal: str) -> Parted:
     Raises:
         InputError: the columns of the axes do not belong together.
     """
-    columns: dict[str, dict[str, str]] = defaultdict(dict)
-    for name in table.names:
-        if parts := lettered(name):
-            letter, taxel = parts
-            columns[taxel][letter] = name
-    shape = table.shape
-    if not columns:
-        columns = _three_by_three(table)
-        shape = ()
+    lettered_columns = _by_letters(table)
+    columns = lettered_columns or _three_by_three(table)
     odd = sorted(taxel for taxel, axes in columns.items() if len(axes) < 3)
     if odd:
         raise InputError(
@@ -182,8 +175,19 @@ def parted(table: Table, normal: str) -> Parted:
             f"{table.path}: {twice} names a column and a taxel of three axes; rename one "
             "of them"
         )
+    shape = table.shape if lettered_columns else ()
     part = replace(table, data=data, shape=shape, file_names=())
     return Parted(table, part, columns)
+
+
+def _by_letters(table: Table) -> dict[str, dict[str, str]]:
+    """{taxel: {letter: column}} of the columns whose names have a letter."""
+    columns: dict[str, dict[str, str]] = defaultdict(dict)
+    for name in table.names:
+        if parts := lettered(name):
+            letter, taxel = parts
+            columns[taxel][letter] = name
+    return columns
 
 
 def _three_by_three(table: Table) -> dict[str, dict[str, str]]:

@@ -38,6 +38,9 @@ DOUBTFUL_BELOW = 3.0
 LONGEST_STEPS = {"s": SECONDS_AT_MOST, "ms": 2e3, "us": 2e6, "ns": math.inf}
 """Longest median steps that are taken for these units."""
 
+_Number = tuple[int, int, str]
+"""The numbers in a name, the second 0 if it has one, and the name."""
+
 
 @dataclass(frozen=True)
 class Meaning:
@@ -116,15 +119,13 @@ def _term(table: Table, term: str) -> list[str]:
     if parts:
         return parts
     ends = term.split("-")
-    if len(ends) == 2 and set(ends) <= set(names):
-        low, high = map(names.index, ends)
-        if low <= high:
-            return names[low : high + 1]
-    if re.fullmatch(r"\d{1,9}(-\d{1,9})?", term):
-        first = int(ends[0])
-        last = int(ends[-1])
-        if 1 <= first <= last <= len(names):
-            return names[first - 1 : last]
+    numbers = [str(number) for number in range(1, len(names) + 1)]
+    for places in (names, numbers):
+        if len(ends) <= 2 and set(ends) <= set(places):
+            first = places.index(ends[0])
+            last = places.index(ends[-1])
+            if first <= last:
+                return names[first : last + 1]
     raise InputError(f"{table.path}: has no column {term[:40]}; it has {shown(names)}")
 
 
@@ -213,12 +214,8 @@ def _taxels(
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
-    stems: dict[tuple[str, bool], list[tuple[int, int, str]]] = defaultdict(list)
-    for name in rest:
-        if number := RUNNING.fullmatch(name):
-            place = int(number["first"]), int(number["second"] or 0), name
-            stems[number["stem"], number["second"] is None].append(place)
-    grids = {stem: sorted(group) for stem, group in stems.items() if _is_grid(group)}
+    stems = _numbered(rest)
+    grids = {stem: group for stem, group in stems.items() if _is_grid(group)}
     several = {stem: group for stem, group in grids.items() if len(group) > 1}
     groups = several or grids
     names = [[name for _, _, name in group] for group in groups.values()]
@@ -240,7 +237,18 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     return names[0], (rows, len(group) // rows)
 
 
-def _is_grid(group: Sequence[tuple[int, int, str]]) -> bool:
+def _numbered(names: Sequence[str]) -> dict[tuple[str, bool], list[_Number]]:
+    """{(stem, whether it has one number alone): the names with this stem, in the order
+    of their numbers}."""
+    stems = defaultdict(list)
+    for name in names:
+        if number := RUNNING.fullmatch(name):
+            stem = number["stem"], number["second"] is None
+            stems[stem].append((int(number["first"]), int(number["second"] or 0), name))
+    return {stem: sorted(group) for stem, group in stems.items()}
+
+
+def _is_grid(group: Sequence[_Number]) -> bool:
     """Whether numbers count up without a gap in each of their two dimensions, in the
     first from 0 or 1."""
     places = {place[:2] for place in group}

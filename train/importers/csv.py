@@ -213,28 +213,33 @@ def _labelled(
     Raises:
         InputError: it names none of the trials.
     """
+    trials = [each.source.name for each in measured]
+    rows = _label_rows(path, trials)
+    unknown = [row for row in rows if row not in trials]
+    options.skipped += [f"{path}: {row} names no file" for row in unknown]
+    labelled = []
+    for each in measured:
+        source = each.source
+        if source.name not in rows:
+            options.skipped.append(
+                f"{path}: has no row for {source.name}, which has no label"
+            )
+        labels = {**source.labels, options.task: "", **rows.get(source.name, {})}
+        labels = {task: label for task, label in labels.items() if label}
+        source = replace(source, labels=labels, label=LABELS)
+        labelled.append(replace(each, source=source))
+    return labelled
+
+
+def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
+    """{trial: {task: label}} of a labels.csv."""
     table = read_text(path)
     data = table.data.astype(str).where(table.data.notna(), "")
-    trials = [each.source.name for each in measured]
     if "trial" not in data or not data["trial"].isin(trials).any():
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    rows = {row.pop("trial"): row for row in data.to_dict("records")}
-    unknown = [row for row in rows if row not in trials]
-    unlabelled = [trial for trial in trials if trial not in rows]
-    options.skipped += [f"{path}: {row} names no file" for row in unknown]
-    options.skipped += [
-        f"{path}: has no row for {trial}, which has no label" for trial in unlabelled
-    ]
-    labelled = []
-    for each in measured:
-        labels = {**each.source.labels, options.task: ""}
-        labels |= rows.get(each.source.name, {})
-        labels = {task: label for task, label in labels.items() if label}
-        source = replace(each.source, labels=labels, label=LABELS)
-        labelled.append(replace(each, source=source))
-    return labelled
+    return {row.pop("trial"): row for row in data.to_dict("records")}
 
 
 def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
