@@ -190,7 +190,7 @@ def logs():
 
 def bags():
     """A ROS 1 bag of arrays."""
-    topic = skin([array(frame, version=1) for frame in FRAMES])
+    topic = skin([array(frame, version=1, dims=frame.shape) for frame in FRAMES])
     return [made(lambda path: write_bag(path.with_suffix(".bag"), topic, version=1))]
 
 

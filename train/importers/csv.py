@@ -118,14 +118,20 @@ class Measured:
     """A trial whose columns are understood.
 
     Attributes:
-        source: where it comes from, without the values.
+        name: of the trial.
+        labels: {task: label}.
+        label: where the label comes from.
+        form: how its file was read, where that is worth saying.
         meaning: of the columns.
-        trial: its numbers.
+        numbers: of the trial.
     """
 
-    source: Source
+    name: str
+    labels: dict[str, str]
+    label: str
+    form: tuple[str, ...]
     meaning: Meaning
-    trial: Trial
+    numbers: Trial
 
 
 def trials(
@@ -149,20 +155,23 @@ def trials(
     file = folder / "skin.json"
     skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
     shape = _announced(measured[0], skin, axes, options)
-    rest = rest_of([each.trial for each in measured], options)
+    rest = rest_of([trial.numbers for trial in measured], options)
     missing = 0
     imported = 0
-    for each in measured:
-        name = each.source.name
-        meta: dict[str, Any] = {"skin": skin.raw, "labels": each.source.labels}
-        meta |= {"source": path.name, "trial": name}
-        if each.trial.joints is not None:
+    for trial in measured:
+        meta: dict[str, Any] = {
+            "skin": skin.raw,
+            "labels": trial.labels,
+            "source": path.name,
+            "trial": trial.name,
+        }
+        if trial.numbers.joints is not None:
             meta["arm"] = None if arm is None else arm.to_dict()
         with _skipping(options):
-            recording = rest.recording(each.trial, shape, meta)
+            recording = rest.recording(trial.numbers, shape, meta)
             imported += 1
-            missing += int(each.trial.missing.sum())
-            yield name, recording
+            missing += int(trial.numbers.missing.sum())
+            yield trial.name, recording
     if not imported:
         raise _nothing(path, options)
     if missing:
@@ -197,9 +206,9 @@ def _announced(
     taxels = len(first.meaning.taxels)
     told = first.meaning.shape
     told = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = skin_shape(first.trial, told, options)
-    text = first.meaning.text(first.source.label, shape)
-    say("; ".join([text, *first.source.table.form]))
+    shape = skin_shape(first.numbers, told, options)
+    text = first.meaning.text(first.label, shape)
+    say("; ".join([text, *first.form]))
     if axes is not None:
         say(axes.text)
     return shape
@@ -213,21 +222,20 @@ def _labelled(
     Raises:
         InputError: it names none of the trials.
     """
-    trials = [each.source.name for each in measured]
+    trials = [trial.name for trial in measured]
     rows = _label_rows(path, trials)
     unknown = [row for row in rows if row not in trials]
     options.skipped += [f"{path}: {row} names no file" for row in unknown]
     labelled = []
-    for each in measured:
-        source = each.source
-        if source.name not in rows:
+    for trial in measured:
+        if trial.name not in rows:
             options.skipped.append(
-                f"{path}: has no row for {source.name}, which has no label"
+                f"{path}: has no row for {trial.name}, which has no label"
             )
-        labels = {**source.labels, options.task: "", **rows.get(source.name, {})}
-        labels = {task: label for task, label in labels.items() if label}
-        source = replace(source, labels=labels, label=LABELS)
-        labelled.append(replace(each, source=source))
+        labels = {**trial.labels}
+        labels.pop(options.task, None)
+        labels |= rows.get(trial.name, {})
+        labelled.append(replace(trial, labels=labels, label=LABELS))
     return labelled
 
 
@@ -239,7 +247,11 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    return {row.pop("trial"): row for row in data.to_dict("records")}
+    labels = {}
+    for row in data.to_dict("records"):
+        trial = row.pop("trial")
+        labels[trial] = {task: label for task, label in row.items() if label}
+    return labels
 
 
 def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
@@ -413,8 +425,8 @@ def _measured(
 
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
-    path = trial.source.table.path
-    first_path = first.source.table.path
+    path = trial.numbers.where
+    first_path = first.numbers.where
     taxels = list(trial.meaning.taxels)
     first_taxels = list(first.meaning.taxels)
     if len(taxels) != len(first_taxels):
@@ -454,11 +466,17 @@ def _understood(
         unit = np.pi / 180.0 if options.degrees else 1.0
         joints = unit * _columns(table, sense.joints)
     t = times_of(table, sense, options)
-    trial = Trial.of(str(table.path), t, values, axes, joints)
-    if np.isnan(trial.values).all():
+    numbers = Trial.of(str(table.path), t, values, axes, joints)
+    if np.isnan(numbers.values).all():
         raise InputError(f"{table.path}: none of its values is a finite number")
-    source = replace(source, table=replace(table, data=table.data.iloc[:0]))
-    return Measured(source, sense, trial.in_order("row"))
+    return Measured(
+        name=source.name,
+        labels=source.labels,
+        label=source.label,
+        form=table.form,
+        meaning=sense,
+        numbers=numbers.in_order("row"),
+    )
 
 
 def _columns(table: Table, names: Iterable[str]) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ times of their own. Source: https://github.com/peter-kiechle/tactile-sensors,
 import bz2
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -84,48 +84,59 @@ def grasp(file: Path) -> Recording:
 
 
 def _recording(root: ElementTree.Element, file: Path) -> Recording:
-    alive, places, cells, pitch_m = _pads(root)
+    pads = _pads(root)
     stamps = []
     frames = []
     for frame in root.iterfind("./data/frame"):
         stamps.append(_number(frame, "time_stamp"))
-        frames.append(_unpacked(frame.findtext("frame_data") or "", cells))
+        frames.append(_unpacked(frame.findtext("frame_data") or "", pads.cells))
     if not frames:
         raise ValueError("it has no frame")
-    left, right = (np.array(frames)[:, place] for place in places)
-    side_by_side = np.concatenate([left, 0 * left[:, :, :1], right], axis=2)
     t = (np.array(stamps) - stamps[0]) / 1000.0
-    rows = clock.order(t, file).kept
-    t = t[rows]
-    side_by_side = side_by_side[rows]
+    kept = clock.order(t, file).kept
+    t = t[kept]
+    with_zero = np.pad(frames, ((0, 0), (0, 1)))
+    rows, cols = pads.alive.shape
     layout = SkinLayout(
-        rows=alive.shape[0],
-        cols=alive.shape[1],
+        rows=rows,
+        cols=cols,
         wraps=False,
-        pitch_m=pitch_m,
+        pitch_m=pads.pitch_m,
         threshold_counts=THRESHOLD_COUNTS,
         onset_counts=ONSET_COUNTS,
-        dead=tuple(np.flatnonzero(~alive).tolist()),
+        dead=tuple(np.flatnonzero(~pads.alive).tolist()),
     )
-    meta: dict[str, Any] = {"labels": {"object": file.parent.name}, "arm": None}
-    meta |= {
+    meta = {
+        "labels": {"object": file.parent.name},
+        "arm": None,
         "skin": layout.to_dict(),
         "source": f"SDH-2 grasp {file.name}",
         "trial": file.stem,
     }
-    return Recording(t, side_by_side, _joints(root, t, stamps[0], file), alive, meta)
+    joints = _joints(root, t, stamps[0], file)
+    return Recording(t, with_zero[kept][:, pads.places], joints, pads.alive, meta)
 
 
-def _pads(
-    root: ElementTree.Element,
-) -> tuple[NDArray[np.bool_], list[NDArray[np.int64]], int, float]:
-    """The geometry of the pads.
+@dataclass(frozen=True)
+class Pads:
+    """The pads side by side, with a column between them.
 
-    Returns:
-        Which taxels of the pads side by side work; the indices of each pad's cells in a
-        frame of all matrices; the number of cells in such a frame; the distance between
-        texels in metres.
+    Attributes:
+        places: (rows, cols) of each taxel in a frame of all matrices; the number of
+            its cells for those between the pads.
+        alive: (rows, cols) which taxels work.
+        cells: number of cells in a frame of all matrices.
+        pitch_m: distance between texels in metres.
     """
+
+    places: NDArray[np.int64]
+    alive: NDArray[np.bool_]
+    cells: int
+    pitch_m: float
+
+
+def _pads(root: ElementTree.Element) -> Pads:
+    """The geometry of the pads."""
     cells = 0
     places = {}
     alive = {}
@@ -146,13 +157,10 @@ def _pads(
     left, right = (places[pad] for pad in PADS)
     if left.shape != right.shape:
         raise ValueError(f"its pads differ: {left.shape} and {right.shape} texels")
-    between = np.zeros((len(left), 1), dtype=bool)
-    return (
-        np.hstack([alive[PADS[0]], between, alive[PADS[1]]]),
-        [left, right],
-        cells,
-        pitch_m,
-    )
+    between = np.full((len(left), 1), cells)
+    side_by_side = np.hstack([left, between, right])
+    working = np.hstack([alive[PADS[0]], between < cells, alive[PADS[1]]])
+    return Pads(side_by_side, working, cells, pitch_m)
 
 
 def _mask(
@@ -177,9 +185,8 @@ def _unpacked(text: str, cells: int) -> NDArray[np.uint16]:
     lengths = np.where(values < 0.0, -values, 1.0)
     if lengths.sum() != cells or values.max(initial=0.0) > 65535.0:
         raise ValueError(f"a frame does not unpack to {cells} counts of 0 to 65535")
-    return np.repeat(np.maximum(values, 0.0), lengths.astype(np.int64)).astype(
-        np.uint16
-    )
+    counts = np.maximum(values, 0.0).astype(np.uint16)
+    return np.repeat(counts, lengths.astype(np.int64))
 
 
 def _joints(
@@ -191,10 +198,9 @@ def _joints(
     angles = []
     for angle in root.iterfind("./joint_angles/angle"):
         stamps.append(_number(angle, "time_stamp"))
-        angles.append(
-            [float(v) for v in (angle.findtext("angle_data") or "").split(",")]
-        )
-        if len(angles[-1]) != JOINTS or not np.isfinite(angles[-1]).all():
+        degrees = (angle.findtext("angle_data") or "").split(",")
+        angles.append(np.array(degrees, dtype=np.float64))
+        if len(degrees) != JOINTS or not np.isfinite(angles[-1]).all():
             raise ValueError(
                 f"a line of joint angles does not hold {JOINTS} finite numbers"
             )
