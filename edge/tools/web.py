@@ -63,7 +63,6 @@ SWITCH_S = 0.0005
 PIECE = 1 << 18
 """Bytes that a browser has to take within `SLOW_S`."""
 TEXT = "text/plain; charset=utf-8"
-JSON = "application/json"
 
 
 class RestingSelector(selectors.DefaultSelector):
@@ -167,8 +166,8 @@ class WebServer:
         """
         peer = writer.get_extra_info("peername") or [""]  # it may have gone already
         address = str(peer[0])
-        many = len(self._browsers) >= MOST_CONNECTIONS
-        if many or self._browsers.count(address) >= MOST_OF_ONE:
+        full = len(self._browsers) >= MOST_CONNECTIONS
+        if full or self._browsers.count(address) >= MOST_OF_ONE:
             writer.transport.abort()
             return
         self._browsers.append(address)
@@ -247,7 +246,7 @@ class WebServer:
         if outcome is None:
             return _answer(HTTPStatus.NO_CONTENT)
         contents = json.dumps(outcome, allow_nan=False).encode()
-        return _answer(HTTPStatus.OK, contents, JSON)
+        return _answer(HTTPStatus.OK, contents, "application/json")
 
     async def _stream(self, reader: StreamReader, writer: StreamWriter) -> None:
         """Send a browser every new picture until it goes."""

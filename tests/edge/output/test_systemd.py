@@ -14,6 +14,17 @@ def clock():
     return VirtualClock(start=100.0)
 
 
+@pytest.fixture
+def notifier(manager, clock):
+    """Make a notifier that has the manager's socket."""
+
+    def make(**environment):
+        environment = {"NOTIFY_SOCKET": manager.getsockname(), **environment}
+        return Notifier(environment, now=clock.now)
+
+    return make
+
+
 def said(listener):
     listener.setblocking(False)
     lines = []
@@ -24,22 +35,20 @@ def said(listener):
             return lines
 
 
-def test_ready_and_stopping_are_one_datagram_each(manager, clock):
-    notifier = Notifier({"NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
-    notifier.ready("reading skin.toml")
-    notifier.stopping()
+def test_ready_and_stopping_are_one_datagram_each(manager, notifier):
+    service = notifier()
+    service.ready("reading skin.toml")
+    service.stopping()
     assert said(manager) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
 
 
 def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
-    manager, clock
+    manager, clock, notifier
 ):
-    environment = {"NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "10000000"}
-    environment["WATCHDOG_PID"] = str(os.getpid())
-    notifier = Notifier(environment, now=clock.now)
+    service = notifier(WATCHDOG_USEC="10000000", WATCHDOG_PID=str(os.getpid()))
     for tick in range(2001):  # 20 s at 100 Hz
         clock.sleep_until(100.0 + tick / 100)
-        notifier.alive()
+        service.alive()
     assert said(manager) == ["WATCHDOG=1"] * 5
 
 
@@ -60,44 +69,41 @@ def test_a_name_in_the_abstract_namespace(clock):
         {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"},
     ],
 )
-def test_nobody_watches(manager, clock, environment):
-    notifier = Notifier(
-        {**environment, "NOTIFY_SOCKET": manager.getsockname()}, now=clock.now
-    )
-    notifier.alive()
+def test_nobody_watches(manager, clock, notifier, environment):
+    service = notifier(**environment)
+    service.alive()
     clock.sleep_until(1100.0)
-    notifier.alive()
+    service.alive()
     assert said(manager) == []
 
 
 @pytest.mark.parametrize("address", ["", "relative"])
-def test_without_a_manager_no_socket_is_opened(clock, address, monkeypatch):
+def test_without_a_manager_no_socket_is_opened(notifier, address, monkeypatch):
+    service = notifier(NOTIFY_SOCKET=address, WATCHDOG_USEC="1")
     opened = []
     monkeypatch.setattr(socket, "socket", lambda *kind: opened.append(kind))
-    notifier = Notifier({"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "1"}, now=clock.now)
-    notifier.ready()
-    notifier.alive()
-    notifier.stopping()
+    service.ready()
+    service.alive()
+    service.stopping()
     assert opened == []
 
 
 def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
-    tmp_path, clock
+    tmp_path, clock, notifier
 ):
-    address = str(tmp_path / "notify")
-    environment = {"NOTIFY_SOCKET": address, "WATCHDOG_USEC": "2000000"}
-    notifier = Notifier(environment, now=clock.now)
+    address = str(tmp_path / "later")
+    service = notifier(NOTIFY_SOCKET=address, WATCHDOG_USEC="2000000")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-        notifier.ready()
-        notifier.alive()
+        service.ready()
+        service.alive()
         listener.bind(address)
         clock.sleep_until(101.0)
-        notifier.alive()
+        service.alive()
         assert said(listener) == ["WATCHDOG=1"]
 
 
-def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, clock):
-    notifier = Notifier({"NOTIFY_SOCKET": manager.getsockname()}, now=clock.now)
+def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, notifier):
+    service = notifier()
     for _ in range(10_000):  # far more than a socket's queue takes
-        notifier.stopping()
+        service.stopping()
     assert 1 <= len(said(manager)) < 10_000

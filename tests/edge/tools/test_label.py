@@ -9,6 +9,7 @@ import pytest
 from edge.recording import load
 from edge.saving import find, save
 from edge.tools import label
+from tests.edge.tools.kept import kept_meta
 
 
 @pytest.fixture
@@ -119,28 +120,19 @@ def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
     assert list(tmp_path.glob(".*")) == []
 
 
-def decided(**answers):
-    """Decisions of a kept touch: task=(label, confidence)."""
-    return {
-        task: {"label": label, "confidence": sure, "flags": []}
-        for task, (label, sure) in answers.items()
-    }
-
-
 @pytest.fixture
 def kept(make_touch, tmp_path):
     """Kept touches: a sure one, an unsure one, a wrong one, and one that is unknown."""
     touch = make_touch()
     cases = {
-        "sure": decided(softness=("soft", 0.95)),
-        "unsure": decided(softness=("hard", 0.6)),
-        "wrong": decided(softness=("hard", 0.9)),
-        "unknown": decided(object=("unknown", None), softness=("soft", 0.9)),
+        "sure": kept_meta({}, softness=("soft", 0.95)),
+        "unsure": kept_meta({}, softness=("hard", 0.6)),
+        "wrong": kept_meta({"softness": "soft"}, softness=("hard", 0.9)),
+        "unknown": kept_meta({}, object=("unknown", None), softness=("soft", 0.9)),
     }
-    for name, answers in cases.items():
-        labels = {"softness": "soft"} if name == "wrong" else {}
-        meta = {**touch.meta, "labels": labels, "decided": answers}
-        save(tmp_path / "kept" / f"{name}.npz", replace(touch, meta=meta))
+    for name, meta in cases.items():
+        path = tmp_path / "kept" / f"{name}.npz"
+        save(path, replace(touch, meta={**touch.meta, **meta}))
     return tmp_path / "kept"
 
 

@@ -17,6 +17,7 @@ from edge.tools.page import Page
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from tests.browser import chromium, violations
+from tests.edge.tools.kept import kept_meta
 
 LAYOUT = SkinLayout(
     rows=4, cols=6, threshold_counts=100, dead=(5,), counts_per_newton=1000.0
@@ -213,8 +214,7 @@ def test_what_cannot_be_deleted_is_one_sentence(folder_page, monkeypatch):
 @pytest.fixture
 def kept(tmp_path):
     """A folder with a touch that was kept because its decision was unsure."""
-    answer = {"label": "hard", "confidence": 0.55, "flags": ["short"]}
-    meta = {**TOUCH.meta, "labels": {}, "decided": {"softness": answer}}
+    meta = {**TOUCH.meta, **kept_meta({}, softness=("hard", 0.55, "short"))}
     edge.save(tmp_path / "kept-1.npz", replace(TOUCH, meta=meta))
     return tmp_path
 

@@ -7,28 +7,20 @@ import numpy as np
 import pytest
 
 from edge.tools import review
-
-
-def meta(labels, **answers):
-    """Metadata with decisions, task=(label, confidence, flags)."""
-    decided = {
-        task: {"label": label, "confidence": sure, "flags": list(flags)}
-        for task, (label, sure, *flags) in answers.items()
-    }
-    return {"labels": labels, "decided": decided}
+from tests.edge.tools.kept import kept_meta
 
 
 @pytest.mark.parametrize(
     ("given", "kinds"),
     [
-        (meta({"a": "x"}, a=("x", 0.9)), []),
-        (meta({"a": "x"}, a=("x", 0.8)), []),
-        (meta({"a": "x"}, a=("x", 0.79)), ["unsure"]),
-        (meta({"a": "x"}, a=("x", None)), ["unsure"]),
-        (meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
-        (meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
-        (meta({}, a=("x", 0.9)), ["unlabelled"]),
-        (meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),
+        (kept_meta({"a": "x"}, a=("x", 0.9)), []),
+        (kept_meta({"a": "x"}, a=("x", 0.8)), []),
+        (kept_meta({"a": "x"}, a=("x", 0.79)), ["unsure"]),
+        (kept_meta({"a": "x"}, a=("x", None)), ["unsure"]),
+        (kept_meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
+        (kept_meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
+        (kept_meta({}, a=("x", 0.9)), ["unlabelled"]),
+        (kept_meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),
         ({"labels": {}}, ["unlabelled"]),
         ({"labels": {"a": "x"}}, []),
         ({"labels": {"a": "x"}, "decided": 5}, []),
@@ -40,12 +32,12 @@ def test_a_touch_is_unsure_wrong_or_unlabelled(given, kinds):
 
 
 def test_what_is_unknown_or_out_of_range_is_not_accepted():
-    given = meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
+    given = kept_meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
     assert review.accepted(given) == {"a": "x"}
 
 
 def test_a_recording_is_selected_by_all_words():
-    given = meta({"b": "z"}, a=("x", 0.5))
+    given = kept_meta({"b": "z"}, a=("x", 0.5))
     assert review.selected(given, [])
     assert review.selected(given, ["unsure", "a", "b"])
     assert not review.selected(given, ["unsure", "c"])
