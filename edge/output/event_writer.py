@@ -181,12 +181,10 @@ class Lines:
         if self._socket is not None:
             self._socket.close()
         for writer in self._writers:
-            left_early = writer is self._out and writer.problem == os.strerror(
-                errno.EPIPE
-            )
-            if writer.lost and not left_early:
-                lost = f"{writer.lost} lines could not be sent to {writer.name}: {writer.problem}"
-                print(f"edge-classify: {lost}", file=sys.stderr)
+            broken_pipe = writer.problem == os.strerror(errno.EPIPE)
+            if writer.lost and not (broken_pipe and writer is self._out):
+                lost = f"{writer.lost} lines could not be sent to {writer.name}"
+                print(f"edge-classify: {lost}: {writer.problem}", file=sys.stderr)
 
 
 def _line_by_line(out: TextIO) -> Callable[[bytes], None]:

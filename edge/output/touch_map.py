@@ -85,7 +85,6 @@ def _check_head(line: bytes, head: Mapping[str, str], name: str) -> None:
         raise InputError(f"{name}: {NOT_A_MAP}") from None
     if not same:
         raise InputError(
-            f"{name}: is in the frame {former['frame']} ({former['unit']}), this run "
-            "in the frame "
-            f"{head['frame']} ({head['unit']}); keep a map for each"
+            f"{name}: is in the frame {former['frame']} ({former['unit']}), this run in "
+            f"the frame {head['frame']} ({head['unit']}); keep a map for each"
         )

@@ -126,9 +126,8 @@ def _replay(
             continue
         labels = recording.labels
         if not output.as_json:
-            output.text(
-                f"{path}" + "".join(f", {k}: {v}" for k, v in sorted(labels.items()))
-            )
+            named = [f"{task}: {label}" for task, label in sorted(labels.items())]
+            output.text(", ".join([str(path), *named]))
         for event in events:
             line = {"source": str(path), **event}
             if event["event"] == "decision" and event["task"] in labels:
@@ -208,15 +207,14 @@ class Summary:
         paragraphs = [recordings]
         if self.as_trained:
             paragraphs.append(
-                f"{self.as_trained} of {recordings} match a training "
-                "trial to the last bit, so they are most likely training data, and the "
-                "accuracy "
-                "below does not apply to new touches. The nested accuracy, which `make "
-                "export` "
-                "and `edge-classify info` print, does."
+                f"{self.as_trained} of {recordings} match a training trial to the last "
+                "bit, so they are most likely training data, and the accuracy below "
+                "does not apply to new touches. The nested accuracy, which `make "
+                "export` and `edge-classify info` print, does."
             )
         for task, pairs in self._pairs.items():
-            name, (right, total) = printable(task), self.right(task)
+            name = printable(task)
+            right, total = self.right(task)
             if total == 0:
                 paragraphs.append(f"{name}: no recording has a label")
                 continue
