@@ -23,7 +23,8 @@ def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
     export(tmp_path, "--data", recordings, "--quick")
     out = capsys.readouterr()
     lines = out.err.splitlines()
-    rows = lines[1 : lines.index("") - 1]
+    sets = ("paper ", "contact joints ", "moments ")
+    rows = [line for line in lines if line.startswith(sets)]
     names = ["paper pca", "contact joints lda", "moments joints lda"]
     assert [" ".join(row[:21].split()) for row in rows] == names
     assert sum(row.count("*") for row in rows) == 2  # one a task
