@@ -13,6 +13,7 @@ from edge.model.agreement import product_label
 from edge.model.info import ModelInfo
 from edge.model.model import Decision, Model
 from edge.model.novelty import UNKNOWN, check_rate
+from edge.model.refusal import refusal
 from edge.model.stopping import StoppingRule
 
 LOG = logging.getLogger(__name__)
@@ -178,7 +179,7 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
     }
     if not any(rules.values()):
         reasons = (
-            f"{task}: {s.refusal(error)}" for task, s in model.info.stopping.items()
+            f"{task}: {refusal(s, error)}" for task, s in model.info.stopping.items()
         )
         raise InputError(
             f"{model.path}: an error of {error:g} cannot be certified; "
@@ -197,7 +198,7 @@ def log_rules(model: Model, error: float) -> None:
         if rule is None:
             LOG.warning(
                 f"{task}: decided at the end of the window, as an error of {error:g} "
-                f"cannot be certified: {model.info.stopping[task].refusal(error)}"
+                f"cannot be certified: {refusal(model.info.stopping[task], error)}"
             )
             continue
         if rule.fixed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -13,38 +13,16 @@ from edge.files import parsing
 from edge.interrupt import delayed
 from edge.model.onnx_file import Contents
 
+if TYPE_CHECKING:
+    from edge.model.graph import Graph
+
 LOG = logging.getLogger("edge.model")
 ENGINES = ("onnxruntime", "numpy")
-Kind = tuple[str, list[int]]
-"""Type and shape of a value for one vector, as ONNX Runtime names them."""
 
 
-class Engine(Protocol):
-    """A program that runs the graph of a model.
-
-    Attributes:
-        name: one of `ENGINES`.
-    """
-
-    name: str
-
-    def run(
-        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
-    ) -> list[NDArray[Any]]:
-        """The named outputs of the graph.
-
-        Raises:
-            InputError: the graph cannot be computed.
-        """
-
-    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{input: its type and shape}; a size that is not known is no number."""
-
-    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{output: its type and shape}."""
-
-
-def open_engine(path: str, contents: Contents, engine: str | None) -> Engine:
+def open_engine(
+    path: str, contents: Contents, engine: str | None
+) -> OnnxRuntime | Graph:
     """The engine of a model.
 
     Args:
@@ -80,7 +58,11 @@ def open_engine(path: str, contents: Contents, engine: str | None) -> Engine:
 
 
 class OnnxRuntime:
-    """ONNX Runtime with one thread."""
+    """ONNX Runtime with one thread; `edge.model.graph.Graph` has the same methods.
+
+    Attributes:
+        name: one of `ENGINES`.
+    """
 
     name = "onnxruntime"
 
@@ -114,7 +96,11 @@ class OnnxRuntime:
     def run(
         self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
     ) -> list[NDArray[Any]]:
-        """The named outputs of the graph."""
+        """The named outputs of the graph.
+
+        Raises:
+            InputError: the graph cannot be computed.
+        """
         try:
             values: list[NDArray[Any]] = self._session.run(list(names), dict(inputs))
         # An index past its tensor, or shapes that do not match.
@@ -123,7 +109,7 @@ class OnnxRuntime:
         return values
 
     def inputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{input: its type and shape}."""
+        """{input: its type and shape}; a size that is not known is no number."""
         session = self._session
         values = [*session.get_inputs(), *session.get_overridable_initializers()]
         return {value.name: (value.type, value.shape) for value in values}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
-from edge.model.novelty import Novelty, unusual
+from edge.model.novelty import Novelty
 from edge.touch import measurer
 from edge.touch.contact import FeatureSeries
 from edge.touch.feature import KERNELS
@@ -131,6 +131,8 @@ class ModelInfo:
         phrase."""
         if not self.usual:
             return None
+        from edge.model.unusual import unusual  # few contacts are unknown
+
         ends = np.cumsum(self.widths)[:-1]
         means = [float(part.mean()) for part in np.split(vector, ends)]
         return unusual(means, self.usual)

@@ -124,28 +124,6 @@ class Stopping:
         able = [rule for rule in self.rules if rule.error <= error]
         return able[-1] if able else None
 
-    def refusal(self, error: float) -> str:
-        """A sentence that says why an error rate cannot be certified, and how many
-        trials could."""
-        share = self.wrong / self.trials
-        sentence = (
-            f"the smallest error that {self.trials} calibration trials certify is "
-            f"{self.smallest_error:.3f}"
-        )
-        if share >= error:
-            return (
-                f"{sentence}, and {share:.1%} of them are decided wrongly even at the "
-                "full window: "
-                "more trials alone will not do"
-            )
-        # Chernoff: this many trials with the same share of errors are enough.
-        divergence = (1.0 - share) * (math.log1p(-share) - math.log1p(-error))
-        if share > 0.0:
-            divergence += share * math.log(share / error)
-        level = TEST_SHARE * self.risk
-        trials = max(math.ceil(-math.log(level) / divergence), self.trials + 1)
-        return f"{sentence}; {error:g} needs about {trials} trials"
-
     @classmethod
     def from_table(cls, table: ConfigTable, points: int) -> Stopping:
         """Read the table from the metadata of a model with this number of decision

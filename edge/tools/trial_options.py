@@ -50,9 +50,9 @@ def open_arm(arguments: argparse.Namespace) -> Chain | None:
             not suit it.
     """
     if arguments.arm is not None:
-        from edge.touch.arm import Chain
+        from edge.touch.arm_file import read_arm
 
-        return Chain.from_file(arguments.arm, arguments.base, arguments.tip)
+        return read_arm(arguments.arm, arguments.base, arguments.tip)
     if arguments.base is not None or arguments.tip is not None:
         raise InputError("--base and --tip need --arm arm.urdf")
     return None

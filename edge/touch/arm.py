@@ -215,31 +215,6 @@ class Chain:
         return cls.from_toml(Path(__file__).parents[1] / "arms" / "cody.toml")
 
     @classmethod
-    def from_file(
-        cls,
-        path: str | os.PathLike[str],
-        base: str | None = None,
-        tip: str | None = None,
-    ) -> Self:
-        """The chain of a TOML file, or of a URDF file between two of its links.
-
-        Raises:
-            InputError: as `from_toml` and `from_urdf`; or links are given for a TOML
-                file, or a link is missing for a URDF.
-        """
-        if Path(path).suffix.lower() in (".urdf", ".xml"):
-            if base is None or tip is None:
-                raise InputError(
-                    f"{path}: a URDF needs --base and --tip, the arm's first link and "
-                    "the link "
-                    "that carries the skin"
-                )
-            return cls.from_urdf(path, base, tip)
-        if base is not None or tip is not None:
-            raise InputError(f"{path}: --base and --tip are for a .urdf file")
-        return cls.from_toml(path)
-
-    @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str) -> Self:
         """The chain between two links of a URDF file.
 
@@ -252,25 +227,6 @@ class Chain:
         return cls.from_dict(
             {"base": base, "tip": tip, "joint": joints}, where=os.fspath(path)
         )
-
-
-def joint_columns(given: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """The index of each wanted joint among the given ones.
-
-    >>> joint_columns(["wheel", "elbow", "shoulder"], ["shoulder", "elbow"])
-    [2, 1]
-
-    Raises:
-        InputError: a joint is missing; the sentence names it and the given joints.
-    """
-    index = {name: i for i, name in enumerate(given)}
-    missing = [name for name in wanted if name not in index]
-    if missing:
-        raise InputError(
-            f"no angle of the arm's joint{'s' if len(missing) > 1 else ''} "
-            f"{', '.join(missing)}; there are {', '.join(given) or 'none'}"
-        )
-    return [index[name] for name in wanted]
 
 
 def _check_joint(joint: Joint) -> None:

@@ -162,7 +162,9 @@ class ContactTracker:
     def _shares(self, regions: list[Region]) -> dict[int, int]:
         """{contact: the region that continues it}, as indices."""
         if self._max_contacts > 1:
-            return _shared(self._contacts, regions)
+            from edge.touch.several import shared  # few follow more than one
+
+            return shared([contact.region for contact in self._contacts], regions)
         # The one contact is the largest region, wherever it lies.
         return dict.fromkeys(range(len(self._contacts)), 0) if regions else {}
 
@@ -213,20 +215,6 @@ class ContactTracker:
         if frame.t < self._t:
             raise InputError(f"time goes back from {self._t} to {frame.t} s")
         self._t = frame.t
-
-
-def _shared(contacts: list[Contact], regions: list[Region]) -> dict[int, int]:
-    """{contact: region} by most taxels in common, then the older, then the larger."""
-    pairs = []
-    for i, contact in enumerate(contacts):
-        for j, region in enumerate(regions):
-            if contact.region.touches(region):
-                pairs.append((-(contact.region.bits & region.bits).bit_count(), i, j))
-    shares: dict[int, int] = {}
-    for _, i, j in sorted(pairs):
-        if i not in shares and j not in shares.values():
-            shares[i] = j
-    return shares
 
 
 def first_contact(

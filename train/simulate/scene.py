@@ -13,6 +13,7 @@ from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
 from edge.skin.file import shipped
 from edge.touch.arm import Chain
+from edge.touch.arm_file import read_arm
 from train.simulate import schema
 from train.simulate.contact import GRAVITY
 from train.simulate.plan import check_supported
@@ -156,7 +157,7 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     name = table.text("chain", "cody")
     path = Path(table.where).parent / name
     links = {key: table.text(key) for key in ("base", "tip") if path.suffix == ".urdf"}
-    chain = Chain.cody() if name == "cody" else Chain.from_file(path, **links)
+    chain = Chain.cody() if name == "cody" else read_arm(path, **links)
     for joint in chain.joints:
         if joint.kind == "prismatic":
             raise InputError(

@@ -8,8 +8,10 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.novelty import Novelty, check_rate, unusual
+from edge.model.novelty import Novelty, check_rate
+from edge.model.refusal import refusal
 from edge.model.stopping import TEST_SHARE, Stopping, StoppingRule, margin
+from edge.model.unusual import unusual
 
 
 class TestMargin:
@@ -80,7 +82,7 @@ def test_novelty_lowers_the_log_odds_by_the_doubt(point, odds):
 
 
 def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
-    text = stopping().refusal(0.08)
+    text = refusal(stopping(), 0.08)
     assert "the smallest error that 140 calibration trials certify is 0.100" in text
     needed = int(text.split("about ")[1].split()[0])
     # So many trials with the same share of errors pass the exact binomial test.
@@ -97,22 +99,19 @@ def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
 def test_a_refusal_asks_for_more_trials_than_there_were():
     """However many there were: a rule may have failed that so many could have
     certified."""
-    assert (
-        stopping(trials=10_000, wrong=0)
-        .refusal(0.09)
-        .endswith("0.09 needs about 10001 trials")
-    )
+    text = refusal(stopping(trials=10_000, wrong=0), 0.09)
+    assert text.endswith("0.09 needs about 10001 trials")
 
 
 def test_an_error_rate_below_the_resolution_of_1_still_has_a_number_of_trials():
     task = stopping(wrong=0)
-    needed = float(task.refusal(1e-17).split()[-2])
+    needed = float(refusal(task, 1e-17).split()[-2])
     assert needed == pytest.approx(-math.log(TEST_SHARE * task.risk) / 1e-17, rel=1e-6)
 
 
 def test_where_the_full_window_errs_more_often_trials_do_not_help():
-    assert "more trials alone will not do" in stopping(wrong=28).refusal(0.15)
-    assert "needs about" in stopping(wrong=0).refusal(0.01)
+    assert "more trials alone will not do" in refusal(stopping(wrong=28), 0.15)
+    assert "needs about" in refusal(stopping(wrong=0), 0.01)
 
 
 def table(stored):
