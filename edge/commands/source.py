@@ -229,16 +229,9 @@ def reading(
         opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
-        joints: JointSource | None = opened.playback if opened.dof else None
-        if arguments.joints is not None:
-            from edge.touch.joint_stream import open_joints  # few arms send angles
-
-            names = None if arm is None else arm.names
-            now = opened.skin.clock.real
-            angles = open_joints(arguments.joints, dof, names, now)
-            joints = stack.enter_context(angles)
-        elif model is not None and needs_joints:
+        if model is not None and needs_joints and arguments.joints is None:
             model.require_joints(opened.dof, opened.source)
+        joints = stack.enter_context(_joints(arguments.joints, opened, arm, dof))
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
@@ -248,3 +241,18 @@ def reading(
             shown = open_page(arguments.web, layout, title=opened.source, **page)
             live = stack.enter_context(shown)
         yield Reading(opened, loop, stop, live, Output.of(arguments))
+
+
+@contextmanager
+def _joints(
+    option: str | None, opened: Opened, arm: Chain | None, dof: int | None
+) -> Iterator[JointSource | None]:
+    """The joint angles that another program sends, or those of a played recording."""
+    if option is None:
+        yield opened.playback if opened.dof else None
+        return
+    from edge.touch.joint_stream import open_joints  # few arms send angles
+
+    names = None if arm is None else arm.names
+    with open_joints(option, dof, names, opened.skin.clock.real) as joints:
+        yield joints
