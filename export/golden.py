@@ -64,14 +64,7 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
             recordings.append(recording)
             onsets_s.append(first[0])
             series.append(first[1])
-    arrays = {"start": _starts(recording.t for recording in recordings)}
-    keys = ["t", "frames", "valid"]
-    if info.dof is not None:
-        keys.append("joints")
-    if info.layout.axes:
-        keys.append("shear")
-    for key in keys:
-        arrays[key] = np.concatenate([vars(recording)[key] for recording in recordings])
+    arrays = _frames(model, recordings)
     arrays["onset_s"] = np.array(onsets_s)
     arrays["series_start"] = _starts(course.t for course in series)
     arrays["series_t"] = np.concatenate([course.t for course in series])
@@ -85,6 +78,20 @@ def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) ->
         "model": info.data_digest,
     }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)
+
+
+def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, NDArray[Any]]:
+    """The frames of recordings, end to end, with the angles and the shear that the
+    model needs."""
+    keys = ["t", "frames", "valid"]
+    if model.info.dof is not None:
+        keys.append("joints")
+    if model.info.layout.axes:
+        keys.append("shear")
+    arrays = {"start": _starts(recording.t for recording in recordings)}
+    for key in keys:
+        arrays[key] = np.concatenate([vars(recording)[key] for recording in recordings])
+    return arrays
 
 
 def _starts(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:

@@ -109,7 +109,8 @@ class Rub:
         self.pads = [
             i for i in range(model.nbody) if model.body(i).name.startswith("pad")
         ]
-        self.arm, self.thing = model.body_parentid[self.pads[0]], model.body("thing").id
+        self.arm = model.body_parentid[self.pads[0]]
+        self.thing = model.body("thing").id
 
     def hold(self, data, loads):
         """Set the pull of this step on arm and thing, from the pads' loads (n,)."""

@@ -7,6 +7,19 @@ from edge.cli import dispatch
 from edge.commands.options import within
 
 
+def kind_of(default):
+    """How argparse takes an option."""
+    if default is list:
+        return {"nargs": "+", "required": True}
+    if isinstance(default, type):
+        return {"type": default, "required": True}
+    if isinstance(default, bool):
+        return {"action": "store_true"}
+    if isinstance(default, int):
+        return {"type": within(int, min(default, 1), 1e6), "default": default}
+    return {"type": type(default), "default": default}
+
+
 def start(measure, description, *options):
     """Run a program, and exit with the status that it returns.
 
@@ -16,20 +29,12 @@ def start(measure, description, *options):
         options: (name, default, help) of each. One that must be given has its type in
             place of the default; a list takes several words.
     """
-    top = argparse.ArgumentParser(description=description.partition("\n\n")[0])
+    top = argparse.ArgumentParser(
+        description=description.partition("\n\n")[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
     for name, default, text in options:
-        given = isinstance(default, type)
-        kind = default if given else type(default)
-        more = {"type": kind, "required": True} if given else {"default": default}
-        if kind is bool:
-            more = {"action": "store_true"}
-        elif kind is list:
-            more = {"nargs": "+", "required": True}
-        elif kind is int:
-            more["type"] = within(int, min(default, 1), 1e6)
-        elif not given:
-            more["type"] = kind
-        top.add_argument(name, help=text if given else f"{text} (%(default)s)", **more)
+        top.add_argument(name, help=text, **kind_of(default))
 
     def run(arguments):
         words = {name: v for name, v in vars(arguments).items() if name != "run"}

@@ -94,7 +94,8 @@ class Rig:
         shutil.copy(SKINS / f"{name}.toml", self.path)
         file = skinfile.load(self.path)
         save_calibration(self.path, calibrated(file).calibration)
-        self.layout, self.adapter = file.layout, Adapter(file)
+        self.layout = file.layout
+        self.adapter = Adapter(file)
         rows, cols = file.layout.shape
         self.touch = np.zeros((30, rows, cols), np.uint16)
         # The last frames are equal, as Ctrl-C may come a frame earlier or later. The

@@ -112,7 +112,8 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
 
 
 def test_the_demo_prints_the_same_lines(python, tmp_path):
-    emulated, native = demo(python, tmp_path), demo([sys.executable], CHECKOUT)
+    emulated = demo(python, tmp_path)
+    native = demo([sys.executable], CHECKOUT)
     assert emulated
     assert emulated == native
 

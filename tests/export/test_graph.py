@@ -99,7 +99,9 @@ def hard_set(kind, draw):
         X = X[draw.integers(0, max(n // 3, 1), n)]
         queries = X[:4] * (1.0 + 1e-7 * draw.normal(size=(min(n, 4), 24)))
     elif kind == "offset":
-        X, queries = X + 1e9 * np.abs(X).max(), queries + 1e9 * np.abs(X).max()
+        offset = 1e9 * np.abs(X).max()
+        X += offset
+        queries += offset
     elif kind == "outlier":
         X[0] *= 1e5
     elif kind == "far":

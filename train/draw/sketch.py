@@ -108,7 +108,8 @@ def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
     first_m = layout.row0_z_m
     length_m = layout.pitch[0] * (layout.rows - 1)
     ends = pose[:3, 3] + np.outer([first_m, first_m - length_m], pose[:3, 2])
-    (x, z), radius = ends[0, [0, 2]] - ends[1, [0, 2]], layout.radius_m or 0.0
+    x, z = ends[0, [0, 2]] - ends[1, [0, 2]]
+    radius = layout.radius_m or 0.0
     across = np.array([z, -x]) * radius / max(math.hypot(x, z), 1e-9)
     first, last = ends[:, [0, 2]]
     return np.array([first - across, first + across, last + across, last - across])

@@ -46,7 +46,9 @@ def pooled_layout(layout: SkinLayout) -> SkinLayout:
     last row or column stays as it is. The threshold stays the same, because it is a
     force.
     """
-    (rows, cols), (along, around), angles = pool(layout.alive).shape, layout.pitch, None
+    rows, cols = pool(layout.alive).shape
+    along, around = layout.pitch
+    angles = None
     if layout.radius_m is not None:
         middles = (min(2 * col + 0.5, layout.cols - 1.0) for col in range(cols))
         places = (layout.position(0, middle) for middle in middles)

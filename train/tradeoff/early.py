@@ -209,7 +209,8 @@ def _certified(
     waiting, _ = candidates(len(seconds))
     rows = []
     for course, rule in folds:
-        (at, wrong), (_, late) = course.under(rule), course.under(waiting)
+        at, wrong = course.under(rule)
+        _, late = course.under(waiting)
         unknown = course.unknown[at, np.arange(len(at))] & course.withheld
         rows.append([~wrong, ~late, unknown, at < len(seconds) - 1, seconds[at]])
     decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
