@@ -78,8 +78,9 @@ def _active(
         )
     if valid is not None and (valid.shape != shape or valid.dtype != np.bool_):
         raise InputError(f"valid must be bool {shape}, not {valid.dtype} {valid.shape}")
-    if np.shape(threshold) not in ((), shape):
+    try:
+        return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps)
+    except ValueError:
         raise InputError(
             f"threshold must be one number or {shape}, not {np.shape(threshold)}"
-        )
-    return ActiveTaxels(counts, threshold, valid=valid, wraps=wraps)
+        ) from None
