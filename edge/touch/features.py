@@ -204,13 +204,15 @@ class _Course:
         of_region = {
             ("contact", "motion"): series.motion,
             ("contact", "force_motion"): series.force_motion,
-            ("contact", "max_force"): series.peak / self._scale,
             ("contact", "area"): series.area,
             ("skin", "taxel_force"): series.taxels,
             ("arm", "joint_angle"): series.joints,
             ("arm", "joint_change"): series.joints,
         }
         place = feature.zone, feature.quantity
+        if place == ("contact", "max_force"):
+            return series.peak / self._scale
+        values: NDArray[Any] | None
         if place in of_region:
             values = of_region[place]
         else:
