@@ -119,7 +119,7 @@ def duration(scene: Scene) -> str:
     steps = round(seconds / min(spec.step_s for spec in specs))
     if steps <= MANY_STEPS:
         return ""
-    frame_s = 1.0 / scene.trials["rate_hz"]
+    frame_s = 1.0 / scene.rate_hz
     batch = tuple(replace(spec, step_s=frame_s) for spec in specs[:MOST_TRIALS])
     brief = replace(scene, trials={**scene.trials, "after_s": TIMED_FRAMES * frame_s})
     begun = time.perf_counter()

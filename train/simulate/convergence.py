@@ -14,7 +14,7 @@ from train.simulate.arm import Array
 from train.simulate.contact import total
 from train.simulate.engine import begin, run_physics
 from train.simulate.plan import ALL, PACE, make_plan, required_effects
-from train.simulate.scene_model import Scene, TrialSpec, Value
+from train.simulate.scene_model import Scene, SceneObject, TrialSpec, Value
 
 Kind = tuple[str, ...]
 """The effects that trials call for, which name a kind of trials."""
@@ -75,21 +75,15 @@ def kinds(
     it is empty.
     """
     out: dict[Kind, list[TrialSpec]] = {}
-    for item in scene.objects:
-        for condition in item.conditions:
-            effects = tuple(required_effects(scene, item, condition))
-            steps = [
-                scene.step_s[name]
-                for name in ("base", *effects)
-                if name in scene.step_s
-            ]
-            step_s = min(steps, default=1.0 / scene.trials["rate_hz"])
-            if convergences and effects in convergences:
-                step_s = convergences[effects].step_s
-            trials = out.setdefault(effects, [])
-            trials += [
-                TrialSpec(item, condition, k, step_s) for k in range(scene.count)
-            ]
+    for item, condition in scene.kinds:
+        effects = tuple(required_effects(scene, item, condition))
+        steps = [scene.step_s.get(name, math.inf) for name in ("base", *effects)]
+        step_s = min(steps) if scene.step_s else 1.0 / scene.rate_hz
+        if convergences and effects in convergences:
+            step_s = convergences[effects].step_s
+        out.setdefault(effects, []).extend(
+            TrialSpec(item, condition, k, step_s) for k in range(scene.count)
+        )
     return out
 
 
@@ -109,19 +103,9 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
     )
 
 
-def at_middle(scene: Scene) -> Scene:
-    """The scene with the value in the middle of every range, without spread."""
-
-    def middle(value: Value) -> Value:
-        return Value(value.middle, value.middle)
-
-    objects = tuple(
-        replace(item, values={key: middle(value) for key, value in item.values.items()})
-        for item in scene.objects
-    )
-    lead = middle(scene.lead)
-    taxel = middle(scene.taxel_n_m)
-    return replace(scene, spread={}, objects=objects, lead=lead, taxel_n_m=taxel)
+def _middle(value: Value) -> Value:
+    """The value halfway between the limits, without a range."""
+    return Value(value.middle, value.middle)
 
 
 @dataclass
@@ -151,19 +135,16 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     the swing. Trials end with the window in which labels are judged.
     """
     after_s = min(scene.trials["after_s"], scene.labels["window_s"])
-    scene = at_middle(replace(scene, trials={**scene.trials, "after_s": after_s}))
+    scene = replace(
+        scene,
+        trials={**scene.trials, "after_s": after_s},
+        spread={},
+        lead=_middle(scene.lead),
+        taxel_n_m=_middle(scene.taxel_n_m),
+    )
     tolerance = scene.trials["tolerance"]
-    frame_s = 1.0 / scene.trials["rate_hz"]
-    objects = {item.slug: item for item in scene.objects}
-    kinds = [
-        _Kind(
-            [
-                replace(spec, object=objects[spec.object.slug])
-                for spec in _spread_out(specs)
-            ]
-        )
-        for specs in groups
-    ]
+    frame_s = 1.0 / scene.rate_hz
+    kinds = [_Kind(_spread_out(specs)) for specs in groups]
     first = [
         (kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)
     ]
@@ -180,9 +161,16 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
 
 
 def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
-    """One trial of each object and condition, at most `MOST_OBJECTS`."""
+    """One trial of each object and condition, at most `MOST_OBJECTS`, with the value in
+    the middle of every range."""
     first = list({spec.key: spec for spec in reversed(specs)}.values())
-    return first[:: -(-len(first) // MOST_OBJECTS)]
+    chosen = first[:: -(-len(first) // MOST_OBJECTS)]
+    return [replace(spec, object=_at_middle(spec.object)) for spec in chosen]
+
+
+def _at_middle(item: SceneObject) -> SceneObject:
+    values = {key: _middle(value) for key, value in item.values.items()}
+    return replace(item, values=values)
 
 
 def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:

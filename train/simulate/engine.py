@@ -100,9 +100,7 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
 def frame_count(scene: Scene) -> int:
     """Number of frames of a trial: the longest lead, the time after it, and the frame
     at t = 0."""
-    return (
-        round((scene.lead.high + scene.trials["after_s"]) * scene.trials["rate_hz"]) + 1
-    )
+    return round((scene.lead.high + scene.trials["after_s"]) * scene.rate_hz) + 1
 
 
 def begin(
@@ -202,7 +200,7 @@ def run_physics(
             f"{np.count_nonzero(t.lost)} trials; give skin.taxel_n_m, the object's "
             "stiffness or [step_s] less extreme values"
         )
-    times = np.arange(frames) / scene.trials["rate_hz"]
+    times = np.arange(frames) / scene.rate_hz
     check_energy(t, log.joints, times)
     return PhysicsRun(
         times, log.joints, log.force, log.traces, log.window, log.images, t

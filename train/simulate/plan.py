@@ -119,13 +119,11 @@ def module_of(effect: str) -> Any:
 
 def make_plan(scene: Scene, specs: tuple[TrialSpec, ...]) -> Plan:
     """The plan of a scene's trials."""
-    by_kind: dict[str, tuple[str, ...]] = {}
-    for spec in specs:
-        if spec.key not in by_kind:
-            by_kind[spec.key] = tuple(
-                required_effects(scene, spec.object, spec.condition)
-            )
-    return plan_of(tuple(by_kind[spec.key] for spec in specs))
+    kinds = {
+        spec.key: tuple(required_effects(scene, spec.object, spec.condition))
+        for spec in {spec.key: spec for spec in specs}.values()
+    }
+    return plan_of(tuple(kinds[spec.key] for spec in specs))
 
 
 def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
@@ -159,26 +157,17 @@ def _hooks(stage: str, owners: Sequence[tuple[str, Any, Mask]]) -> list[Call]:
 def required_effects(scene: Scene, item: SceneObject, condition: str) -> dict[str, str]:
     """{effect: the reason for it} of an object in a condition, in the order of
     `EFFECTS`."""
-    required = dict.fromkeys(FAMILIES[item.family].effects, f"family {item.family}")
-    for name in EFFECTS:
+    required: dict[str, str] = {}
+    for name, info in EFFECTS.items():
         reason = _reason(scene, item, condition, name)
-        if reason and not (reason == ADDED and name in required):
+        # An effect stands behind those that it needs.
+        if reason and name not in scene.leave_out and required.keys() >= {*info.needs}:
             required[name] = reason
-    for name in scene.leave_out:
-        required.pop(name, None)
-    while gone := [n for n in required if not required.keys() >= {*EFFECTS[n].needs}]:
-        for name in gone:
-            del required[name]
-    return {name: required[name] for name in EFFECTS if name in required}
-
-
-ADDED = "effects.add"
-"""The reason for an effect that the scene adds."""
+    return required
 
 
 def _reason(scene: Scene, item: SceneObject, condition: str, name: str) -> str:
-    """Why an object in a condition calls for an effect, besides its family; "" if it
-    does not."""
+    """Why an object in a condition calls for an effect; "" if it does not."""
     info = EFFECTS[name]
     if info.condition == condition:
         return condition
@@ -186,8 +175,10 @@ def _reason(scene: Scene, item: SceneObject, condition: str, name: str) -> str:
         return f"skin.axes = {info.axes}" if info.axes == scene.skin.axes else ""
     if info.keys and item.given.issuperset(info.keys):
         return " and ".join(info.keys)
+    if name in FAMILIES[item.family].effects:
+        return f"family {item.family}"
     added = name in scene.add and _supports(item, condition, name)
-    return ADDED if added else ""
+    return "effects.add" if added else ""
 
 
 def _supports(item: SceneObject, condition: str, name: str) -> bool:
@@ -208,10 +199,11 @@ def check_supported(scene: Scene, where: str) -> None:
     """
     _check_left_out(scene, where)
     check_heeded(scene, where)
-    required: set[str] = set()
-    for item in scene.objects:
-        for condition in item.conditions:
-            required.update(required_effects(scene, item, condition))
+    required = {
+        effect
+        for item, condition in scene.kinds
+        for effect in required_effects(scene, item, condition)
+    }
     if not scene.inertia and "inertia" in required:
         raise InputError(
             f"{where}: arm.inertia_kg_m2 is missing: the effect inertia needs one "
@@ -289,11 +281,10 @@ def summary(scene: Scene) -> list[str]:
     much of the effects' work that leaves out, and steps that are not measured."""
     counts = dict.fromkeys(EFFECTS, 0)
     trials = 0
-    for item in scene.objects:
-        for condition in item.conditions:
-            trials += scene.count
-            for effect in required_effects(scene, item, condition):
-                counts[effect] += scene.count
+    for item, condition in scene.kinds:
+        trials += scene.count
+        for effect in required_effects(scene, item, condition):
+            counts[effect] += scene.count
     called = [f"{name} ({n})" for name, n in counts.items() if n]
     unused = [name for name, n in counts.items() if not n]
     pairs = sum(counts.values())

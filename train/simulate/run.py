@@ -204,4 +204,4 @@ def _simulate_batch(
 
 def total_trials(scene: Scene) -> int:
     """The number of a scene's trials."""
-    return scene.count * sum(len(item.conditions) for item in scene.objects)
+    return scene.count * len(scene.kinds)

@@ -307,6 +307,18 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
         for key, needed in schema.SPREAD_OF_MOVABLE.items()
         if spread[key] > 0.0 and movable and table.has(needed)
     }
+    values = _object_values(table, family, differs)
+    _check_needs(table, movable)
+    _check_friction(table, values)
+    table.done()
+    keys = differs.union(filter(table.has, OBJECT))
+    return SceneObject(name, family, conditions, values, frozenset(keys))
+
+
+def _object_values(
+    table: SceneTable, family: str, differs: set[str]
+) -> dict[str, Value]:
+    """An object's values, which begin at 0 where they differ by a spread alone."""
     values: dict[str, Value] = {}
     for key, default in schema.keys_of(family).items():
         default = 0.0 if key in differs else default
@@ -314,11 +326,7 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
             if OBJECT[key].integer:  # a family has drawn from its range by now
                 table.field(key, OBJECT[key])
             values[key] = table.value(key, OBJECT[key], default)
-    _check_needs(table, movable)
-    _check_friction(table, values)
-    table.done()
-    keys = differs.union(filter(table.has, OBJECT))
-    return SceneObject(name, family, conditions, values, frozenset(keys))
+    return values
 
 
 def _check_needs(table: SceneTable, movable: bool) -> None:
@@ -377,23 +385,10 @@ def draw_family(
     count = table.whole("count", allowed=range(1, 1001))
     part = table.value("kinetic_part", PART, [0.8, 0.95])
     push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
-    drawn_keys = [
-        key
-        for key in schema.keys_of(family)
-        if key != "friction_kinetic" and table.has(key)
-    ]
-    table.done()
-    # The draws follow the order of the keys in the file.
-    ranges = {
-        key: table.value(key, OBJECT[key]) for key in table.raw if key in drawn_keys
-    }
+    ranges = _ranges(table, family)
+    defaults = schema.keys_of(family).items()
+    usual = {key: default for key, default in defaults if default is not None}
     movable = "movable" in conditions
-    shared = {"family": family, "conditions": list(conditions)}
-    usual = {
-        key: default
-        for key, default in schema.keys_of(family).items()
-        if default is not None
-    }
     generator = stream(seed, "family", name)
     for number in range(count):
         for _ in range(DRAWS):
@@ -403,7 +398,19 @@ def draw_family(
         else:
             enough = f"low enough that {push_n:g} N (labels.push_n) move it at its friction_static"
             raise table.fail("mass_kg", enough)
-        yield {**shared, "name": f"{name} {number + 1:02d}", **_counted(values)}
+        yield {
+            "family": family,
+            "conditions": list(conditions),
+            "name": f"{name} {number + 1:02d}",
+            **_counted(values),
+        }
+
+
+def _ranges(table: SceneTable, family: str) -> dict[str, Value]:
+    """The ranges of a family, in the order of the file, which the draws follow."""
+    keys = set(filter(table.has, schema.keys_of(family))) - {"friction_kinetic"}
+    table.done()
+    return {key: table.value(key, OBJECT[key]) for key in table.raw if key in keys}
 
 
 def _counted(values: Mapping[str, float]) -> dict[str, Any]:

@@ -160,6 +160,16 @@ class Scene:
         return Kinematics(self.arm)
 
     @property
+    def kinds(self) -> list[tuple[SceneObject, str]]:
+        """Each object in each of its conditions."""
+        return [(item, c) for item in self.objects for c in item.conditions]
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second."""
+        return self.trials["rate_hz"]
+
+    @property
     def count(self) -> int:
         """Number of trials of each object in each condition."""
         return int(self.trials["count"])
