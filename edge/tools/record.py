@@ -395,17 +395,19 @@ class Recorder:
             self.recording = self.page.recording
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
-        """Save the frames of a trial, if there is one and it is to be saved, under the
-        next free name."""
+        """Save the frames of a trial, if there is one and it is to be saved."""
         if frames is None:
             return
-        if not self.recording:
-            if self.page is not None and self.page.recording:
-                LOG.warning(
-                    "recording was switched on during the touch, whose onset is "
-                    "missing: it is not saved"
-                )
-            return
+        if self.recording:
+            self._save(frames, complete)
+        elif self.page is not None and self.page.recording:
+            LOG.warning(
+                "recording was switched on during the touch, whose onset is missing: "
+                "it is not saved"
+            )
+
+    def _save(self, frames: list[Frame], complete: bool) -> None:
+        """Save the frames of a trial under the next free name."""
         unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.labels, "complete": complete}
         if self.names is not None and unposed < len(frames):
