@@ -408,9 +408,13 @@ def draw_family(
 
 def _ranges(table: SceneTable, family: str) -> dict[str, Value]:
     """The ranges of a family, in the order of the file, which the draws follow."""
-    keys = set(filter(table.has, schema.keys_of(family))) - {"friction_kinetic"}
+    keys = schema.keys_of(family)
+    del keys["friction_kinetic"]  # which kinetic_part gives
+    keys_in_file = set(filter(table.has, keys))
     table.done()
-    return {key: table.value(key, OBJECT[key]) for key in table.raw if key in keys}
+    return {
+        key: table.value(key, OBJECT[key]) for key in table.raw if key in keys_in_file
+    }
 
 
 def _counted(values: Mapping[str, float]) -> dict[str, Any]:
