@@ -184,14 +184,7 @@ def _frames(
 
         frames = as_counts(frames, scale)
     if frames.ndim == 2:
-        rows: Any = skin.get("rows")
-        cols: Any = skin.get("cols")
-        whole = type(rows) is int and type(cols) is int
-        if not (whole and rows > 0 and rows * cols == frames.shape[1]):
-            raise InputError(
-                'frames are flat; give their "rows" and "cols" in meta.skin'
-            )
-        frames = frames.reshape(len(frames), rows, cols)
+        frames = _in_rows(frames, skin.get("rows"), skin.get("cols"))
     if frames.dtype != np.uint16 or frames.ndim != 3:
         raise InputError(
             f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} "
@@ -200,6 +193,14 @@ def _frames(
     if 0 in frames.shape:
         raise InputError(f"frames are empty {frames.shape}; record at least one frame")
     return frames
+
+
+def _in_rows(frames: NDArray[Any], rows: Any, cols: Any) -> NDArray[Any]:
+    """Flat frames (n, rows * cols) as (n, rows, cols)."""
+    whole = type(rows) is int and type(cols) is int
+    if not (whole and rows > 0 and rows * cols == frames.shape[1]):
+        raise InputError('frames are flat; give their "rows" and "cols" in meta.skin')
+    return frames.reshape(len(frames), rows, cols)
 
 
 def _times(values: Any, frames: int) -> NDArray[np.float64]:

@@ -149,6 +149,76 @@ class Chosen:
     known_by_fold: tuple[Choice, ...] = ()
 
 
+@dataclass(frozen=True)
+class _Groups:
+    """Trials that are left out together.
+
+    Attributes:
+        name: of the label that tells the groups.
+        members: (n,) the group of each trial.
+        tasks: those for which entire groups are left out.
+        folds: (n,) of entire groups.
+    """
+
+    name: str
+    members: NDArray[np.str_]
+    tasks: frozenset[str]
+    folds: NDArray[np.int64]
+
+    def count(self, labels: NDArray[np.str_]) -> int:
+        """Number of groups among the trials that have a label (n,)."""
+        return len(set(self.members[labels != ""].tolist()))
+
+    def unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
+        """The candidates for groups that are left out: with more shrinkage, and without
+        discriminants of these groups."""
+        unseen = []
+        for grid in grids:
+            if self.name not in grid.targets:
+                enough = [s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE]
+                unseen.append(replace(grid, shrinkages=tuple(enough)))
+        return unseen
+
+    def labels(self, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
+        """The labels that answers to left-out groups need: of all tasks where a grid
+        has targets, else of those with groups and of the tasks that agree with them."""
+        if any(grid.targets for grid in grids):
+            return y
+        together = [family for family in families(y) if self.tasks & {*family}]
+        tasks = self.tasks.union(*together)
+        return {task: y[task] for task in y if task in tasks}
+
+
+def _groups_of(
+    dataset: DataSet, y: Labels, leave_out: str, quick: bool
+) -> _Groups | None:
+    """The kinds of things, or else the groups of a label, where some task has enough of
+    them."""
+    if leave_out == TRIAL:
+        return None
+    members_of = {leave_out: dataset.groups(leave_out)}
+    if leave_out == LEAVE_OUT:
+        kinds = kinds_of([trial.recording for trial in dataset.trials])
+        members_of = {KIND: kinds, **members_of}
+    for name, members in members_of.items():
+        if members is None:
+            continue
+        tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
+        if tasks:
+            few = len(members) <= FEW and not quick
+            count = GROUP_FOLDS if few else fold_count(len(members), quick)
+            folds = group_folds(members, count)
+            return _Groups(name, members, frozenset(tasks), folds)
+    return None
+
+
+def _divisions(labels: NDArray[np.str_], quick: bool) -> list[NDArray[np.int64]]:
+    """(n,) folds of the trials; several divisions where there are few trials."""
+    count = fold_count(len(labels), quick)
+    repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
+    return [stratified_folds(labels, count, SEED + i) for i in range(repeats)]
+
+
 class Choosing:
     """Chooses the window, and each task's settings, among candidates.
 
@@ -184,31 +254,13 @@ class Choosing:
         self._samples = samples
         self._jobs = jobs
         self._progress = progress
-        self._leave_out = leave_out
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        labels = y[finest(y)]
-        count = fold_count(len(labels), quick)
-        self._folds = stratified_folds(labels, count)
-        repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
-        self._other_folds = [
-            stratified_folds(labels, count, SEED + repeat)
-            for repeat in range(1, repeats)
-        ]
-        kinds = (
-            kinds_of([t.recording for t in dataset.trials])
-            if leave_out == LEAVE_OUT
-            else None
-        )
-        self._grouped: set[str] = set()
-        for name, groups in ((KIND, kinds), (leave_out, dataset.groups(leave_out))):
-            if groups is None or name == TRIAL or self._grouped:
-                continue
-            self._leave_out = name
-            self._groups = groups
-            self._grouped = {t for t in y if t != leave_out and groupable(y[t], groups)}
-            few = len(groups) <= FEW and not quick
-            count = GROUP_FOLDS if few else fold_count(len(groups), quick)
-            self._group_folds = group_folds(groups, count)
+        self._folds, *self._other_folds = _divisions(y[finest(y)], quick)
+        self._groups: _Groups | None = _groups_of(dataset, y, leave_out, quick)
+
+    def _is_grouped(self, task: str) -> bool:
+        """Whether entire groups are left out for a task."""
+        return self._groups is not None and task in self._groups.tasks
 
     def _features(self, window_s: float) -> NDArray[np.float64]:
         """(n, p) of every candidate."""
@@ -238,8 +290,8 @@ class Choosing:
         answers = partial(evaluate, jobs=self._jobs)
         total = fits(self._folds, nested)
         total += sum(fits(folds, False) for folds in other_folds)
-        if self._grouped:
-            total += fits(self._group_folds, nested)
+        if self._groups is not None:
+            total += fits(self._groups.folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
         with bar(
             total=total, desc=what, unit=" fits", disable=not self._progress
@@ -250,31 +302,12 @@ class Choosing:
                 answers(vectors, folds, grids, nested=False) for folds in other_folds
             ]
             trials = replace(trials, repeated=tuple(others))
-            if not self._grouped:
+            if self._groups is None:
                 return trials, trials
-            vectors = replace(vectors, y=self._of_groups(grids))
-            unseen = self._unseen(grids)
-            groups = answers(vectors, self._group_folds, unseen, nested=nested)
+            vectors = replace(vectors, y=self._groups.labels(self._y, grids))
+            unseen = self._groups.unseen(grids)
+            groups = answers(vectors, self._groups.folds, unseen, nested=nested)
         return trials, groups
-
-    def _unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
-        """The candidates for groups that are left out: with more shrinkage, and without
-        discriminants of these groups."""
-        unseen = []
-        for grid in grids:
-            if self._leave_out not in grid.targets:
-                enough = [s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE]
-                unseen.append(replace(grid, shrinkages=tuple(enough)))
-        return unseen
-
-    def _of_groups(self, grids: Sequence[SearchGrid]) -> Labels:
-        """The labels that answers to left-out groups need: of all tasks where a grid
-        has targets, else of those with groups and of the tasks that agree with them."""
-        if any(grid.targets for grid in grids):
-            return self._y
-        together = [family for family in families(self._y) if self._grouped & {*family}]
-        tasks = self._grouped.union(*together)
-        return {task: self._y[task] for task in self._y if task in tasks}
 
     def _right(self, window_s: float) -> dict[str, NDArray[np.float64]]:
         """{task: the shares of right answers to each trial, of the candidate that is
@@ -284,7 +317,7 @@ class Choosing:
         trials, groups = self._tables(vectors, self.tried, what, nested=False)
         right: dict[str, NDArray[np.float64]] = {}
         for task in self._y:
-            table = groups if task in self._grouped else trials
+            table = groups if self._is_grouped(task) else trials
             answers = table.held_out(task)[:, table.tested[task]]
             right[task] = answers[choose(answers)]
         return right
@@ -357,10 +390,9 @@ class Choosing:
                 if settings.without_groups
             },
         )
-        plans = {
-            self._leave_out: (groups.folds, without_groups),
-            TRIAL: (trials.folds, without),
-        }
+        plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
+        if self._groups is not None:
+            plans[self._groups.name] = groups.folds, without_groups
         together = decided_together(chosen, vectors, plans, self._jobs)
         return together, trials.folds, without
 
@@ -380,7 +412,7 @@ class Choosing:
             k = chosen[task].choice.k
             known[task] = self._settle_early(task, trials, k, 0.0)
             usual[task] = known[task]
-            if task in self._grouped:
+            if self._is_grouped(task):
                 usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
         return EarlySettings(_early(window_s, usual), _early(window_s, known))
 
@@ -420,9 +452,9 @@ class Choosing:
     def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
         """A task's settings, by the answers to left-out trials and to left-out
         groups."""
-        grouped = task in self._grouped
-        table = groups if grouped else trials
-        margin = UNSEEN_MARGIN if grouped else 0.0
+        left_out = self._groups if self._is_grouped(task) else None
+        table = trials if left_out is None else groups
+        margin = 0.0 if left_out is None else UNSEEN_MARGIN
         choices = table.choices[task]
         prices = costs(choices, self._widths)
         places = [places_of(candidate, choices) for candidate in self.tried]
@@ -436,21 +468,19 @@ class Choosing:
         picked = [trials.choices[task].index(choice) for choice in without]
         nested = table.by_fold(task, prices, margin=margin)
         untouched = self._dataset.untouched_labels(task)
-        count = 0
-        if grouped:
-            count = len(set(self._groups[self._y[task] != ""].tolist()))
+        count = 0 if left_out is None else left_out.count(self._y[task])
         by_candidate = [table.nested(task, prices, allowed) for allowed in places]
         picks = [table.chosen(task, prices, allowed) for allowed in places]
         chosen = Chosen(
             choice=choices[table.chosen(task, prices, margin=margin)],
             accuracy=promised(table.answered(task, nested), untouched, count),
             by_trial=promised(trials.answered(task, picked), untouched),
-            left_out=self._leave_out if grouped else TRIAL,
+            left_out=TRIAL if left_out is None else left_out.name,
             candidates=tuple(promised(r, untouched, count) for r in by_candidate),
             picks=tuple(choices[place] for place in picks),
             folds=table.folds,
         )
-        if grouped:
+        if left_out is not None:
             chosen = self._with_known(chosen, task, trials)
         return _Settled(chosen, without, without_groups)
 

@@ -321,6 +321,17 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
         output.text(f"probably a slip: {sentence}")
 
 
+def _check_names(
+    name: str, labels: Mapping[str, str], names: Mapping[str, str]
+) -> None:
+    """Refuse a task's new name that another label of the recording has."""
+    for old, new in names.items():
+        if old in labels and new in labels:
+            raise InputError(
+                f"{name}: has a label for {new} already; {old} cannot take its name"
+            )
+
+
 def changed(
     name: str,
     meta: Mapping[str, Any],
@@ -344,11 +355,7 @@ def changed(
     """
     current = meta.get("labels", {})
     names = names or {}
-    for old, new in names.items():
-        if old in current and new in current:
-            raise InputError(
-                f"{name}: has a label for {new} already; {old} cannot take its name"
-            )
+    _check_names(name, current, names)
     if meta.get("contacts") and (names or labels or without):
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` "

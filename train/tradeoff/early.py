@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.model.stopping import StoppingRule
+from edge.model.stopping import Stopping, StoppingRule
 from train.choose import TRIAL, groupable
 from train.dataset import DataSet
 from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
@@ -120,15 +120,13 @@ def compare_stopping(
         jobs: processes.
     """
     y = {task: dataset.labels(task) for task in dataset.tasks}
-    if leave_out == TRIAL:
-        folds = stratified_folds(y[finest(y)], FOLDS)
-    else:
+    folds = stratified_folds(y[finest(y)], FOLDS)
+    if leave_out != TRIAL:
         groups = dataset.groups(leave_out)
         if groups is None:
             return {}
-        y.pop(leave_out, None)
-        y = {task: labels for task, labels in y.items() if groupable(labels, groups)}
         folds = group_folds(groups, FOLDS)
+        y = {t: y[t] for t in y if t != leave_out and groupable(y[t], groups)}
     if not y:
         return {}
     tests = [folds == k for k in range(FOLDS)]
@@ -141,40 +139,31 @@ def compare_stopping(
     }
     cases = [(dataset, test, options) for test in tests]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
-    shape = len(decision_points_s), len(dataset.trials)
-    comparisons = {}
-    for task in y:
-        right = np.empty(shape, dtype=bool)
-        confidence = np.empty(shape)
-        for test, (_, hits, sure, _) in zip(tests, held_out, strict=True):
-            right[:, test] = hits[task]
-            confidence[:, test] = sure[task]
-        courses = [courses[task] for *_, courses in held_out]
-        rules = list(
-            zip(courses, (model.stopping_[task] for model, *_ in held_out), strict=True)
-        )
-        certified = [
-            _certified(error, allowed, decision_points_s)
-            for error in ERRORS
-            if (
-                allowed := [
-                    (c, rule) for c, stopping in rules if (rule := stopping.rule(error))
-                ]
-            )
-        ]
-        comparisons[task] = StoppingComparison(
-            tuple(decision_points_s), right, confidence, _joined(courses), certified
-        )
-    return comparisons
+    return {task: _compared(task, held_out, decision_points_s) for task in y}
+
+
+@dataclass(frozen=True)
+class _HeldOut:
+    """A fold's trials, decided by a model that was fitted without them.
+
+    Attributes:
+        test: (n,) which trials they are.
+        stopping: {task: the model's rules}.
+        right, confidence: {task: (decision points, m)}.
+        courses: {task: of the fold's trials}.
+    """
+
+    test: NDArray[np.bool_]
+    stopping: Mapping[str, Stopping]
+    right: Mapping[str, NDArray[np.bool_]]
+    confidence: Mapping[str, NDArray[np.float64]]
+    courses: Mapping[str, Course]
 
 
 def _held_out(
-    dataset: DataSet,
-    test: NDArray[np.bool_],
-    options: Mapping[str, Any],
-) -> tuple[Any, ...]:
-    """The model that was fitted without a fold, and its answers to the fold's trials
-    (`judged`)."""
+    dataset: DataSet, test: NDArray[np.bool_], options: Mapping[str, Any]
+) -> _HeldOut:
+    """A fold's trials, decided by a model that was fitted without them (`judged`)."""
     fitted = fit(dataset.part(~test), **options)
     model = fitted.sequential
     test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
@@ -186,7 +175,31 @@ def _held_out(
         ]
     )
     truth = {task: test_set.labels(task) for task in model.choices}
-    return (model, *model.judged(new, truth))
+    return _HeldOut(test, model.stopping_, *model.judged(new, truth))
+
+
+def _compared(
+    task: str, folds: Sequence[_HeldOut], decision_points_s: Sequence[float]
+) -> StoppingComparison:
+    """A task's early decisions over all folds."""
+    shape = len(decision_points_s), len(folds[0].test)
+    right = np.empty(shape, dtype=bool)
+    confidence = np.empty(shape)
+    for fold in folds:
+        right[:, fold.test] = fold.right[task]
+        confidence[:, fold.test] = fold.confidence[task]
+    certified = []
+    for error in ERRORS:
+        allowed = []
+        for fold in folds:
+            rule = fold.stopping[task].rule(error)
+            if rule is not None:
+                allowed.append((fold.courses[task], rule))
+        if allowed:
+            certified.append(_certified(error, allowed, decision_points_s))
+    joined = _joined([fold.courses[task] for fold in folds])
+    points = tuple(decision_points_s)
+    return StoppingComparison(points, right, confidence, joined, certified)
 
 
 def _joined(courses: Sequence[Course]) -> Course:
