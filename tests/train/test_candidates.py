@@ -48,7 +48,7 @@ def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
 def test_features_of_joints_are_candidates_where_recordings_have_them():
     assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
     with_joints = candidates(TASKS, joints=True)
-    assert {c.sets for c in with_joints if not c.early} == set(WITH_JOINTS)
+    assert {c.sets for c in with_joints if c.full} == set(WITH_JOINTS)
     assert {c.sets for c in with_joints if c.early} == set(EARLY_WITH_JOINTS)
     assert len(candidates(TASKS, joints=True, quick=True)) == 3
 
