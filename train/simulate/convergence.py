@@ -11,9 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from train.simulate.arm import Array
-from train.simulate.contact import total
 from train.simulate.engine import begin, run_physics
-from train.simulate.plan import ALL, PACE, make_plan, required_effects
+from train.simulate.plan import PACE, RESOLVE, make_plan, required_effects
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec, Value
 
 Kind = tuple[str, ...]
@@ -30,10 +29,6 @@ MOST_STEPS = 20_000
 REFERENCE_PART = 0.5
 """Step of the reference run, as a part of the shortest step tried; a swing may need
 less."""
-SWING_PART = 0.2
-"""A step of this part of sqrt(m / k) resolves how a mass m swings on a stiffness k."""
-PRESSED_M = 0.002
-"""Depth to which a swinging object is pressed: it swings on the springs met by then."""
 LITTLE_GAIN = 2.0
 """Largest error of the step chosen where no step is within the tolerance, in smallest
 errors."""
@@ -232,13 +227,6 @@ def _swing_steps(scene: Scene, kinds: list[_Kind]) -> list[float]:
     """For each kind, the step that resolves how its lightest object swings on the
     skin."""
     specs = tuple(spec for kind in kinds for spec in kind.specs)
-    t = begin(scene, specs)
-    stiffness = total(t.weight) * total(np.where(t.gaps < PRESSED_M, t.stiffness, 0.0))
-    if "stems" in t.states:
-        stems = total(t.states["stems"].stiffness)
-        stiffness = np.where(stems > 0.0, stems, stiffness)
-    steps = SWING_PART * np.sqrt(
-        t.values.get("mass_kg", np.full(t.n, np.inf)) / stiffness
-    )
-    steps = np.where(t.plan.also("sliding", ALL), steps, np.inf)
-    return [float(of_kind.min()) for of_kind in _by_kind(steps, kinds)]
+    batch = begin(scene, specs)
+    batch.everyone.run(*RESOLVE)
+    return [float(of_kind.min()) for of_kind in _by_kind(batch.clock.longest_s, kinds)]

@@ -17,22 +17,22 @@ from edge.errors import EdgeError, InputError
 from train.simulate import streams
 from train.simulate.arm import Array, Places
 from train.simulate.plan import (
-    ALL,
     FRAME,
     PACE,
     SAMPLE,
     SENSOR,
     SETUP,
     STEP,
+    TRACE,
+    TRACTION,
     TUNE,
     Plan,
     make_plan,
-    module_of,
 )
 from train.simulate.readings import FULL, Readings
 from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import STIFFNESSES
-from train.simulate.trials import Trials
+from train.simulate.trials import Batch, Trials
 
 ENERGY_MADE = 0.01
 """Tolerance as a part of the work put in, since frames only sample that work."""
@@ -105,20 +105,24 @@ def frame_count(scene: Scene) -> int:
 
 def begin(
     scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None
-) -> Trials:
+) -> Batch:
     """Trials before their first step, with the hooks of a plan (None makes it).
 
     Raises:
         InputError: an object touches the arm before it moves.
     """
-    t = Trials(scene, specs, values_of(scene, specs), plan or make_plan(scene, specs))
-    t.plan.run((*SETUP, *TUNE, *FRAME), t)
-    t.y[:] = t.y_frame
-    t.compliance[:] = 0.0
-    touches = t.ask(ALL, t.y[0], t.compliance[0])[0] > 0.0
+    batch = Batch(
+        scene, specs, values_of(scene, specs), plan or make_plan(scene, specs)
+    )
+    t = batch.everyone
+    t.run(*SETUP, *TUNE, *FRAME)
+    contact = t.contact
+    contact.y = contact.y_frame
+    contact.compliance = np.zeros_like(contact.compliance)
+    touches = t.solve_loads(contact.free_depth, np.zeros(len(t)))[0] > 0.0
     if touches.any():
         i = int(np.argmax(touches))
-        trial = t.specs[i]
+        trial = specs[i]
         yaw = abs(t.values["yaw_deg"][i])
         raise InputError(
             f"{scene.name}: object {trial.object.name!r} touches the arm before it "
@@ -128,7 +132,7 @@ def begin(
             "give spread.yaw_deg or the object's width_m less, or trials.lead_s more "
             "time"
         )
-    return t
+    return batch
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,7 @@ class PhysicsRun:
     traces: dict[str, Array]
     window: NDArray[np.float32]
     images: dict[str, NDArray[np.float32]]
-    trials: Trials
+    trials: Batch
 
 
 def run_physics(
@@ -173,125 +177,108 @@ def run_physics(
         InputError: as of `begin`.
         EdgeError: the solver did not find a contact's loads, or a trial gained energy.
     """
-    t = begin(scene, specs, plan=plan)
+    batch = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
-    log = _Log.of(t, frames, images=images)
-    active = np.arange(t.n)
-    while active.size:
-        starts = active[t.left[active] == 0]
-        if starts.size:
-            start_frames(t, starts)
-        t.plan.run(STEP, t, active)
-        t.left[active] -= 1
-        ends = active[t.left[active] == 0]
-        if not ends.size:
+    log = _Log.of(batch, frames, images=images)
+    active = batch.everyone
+    while len(active):
+        starting = active.clock.left == 0
+        if starting.any():
+            start_frames(active.only(starting))
+        active.run(*STEP)
+        active.clock.left -= 1
+        ending = active.clock.left == 0
+        if not ending.any():
             continue
-        t.frame[ends] += 1
-        k = t.frame[ends]
+        ends = active.only(ending)
+        ends.clock.frame += 1
         # A frame ends at its own time: sums of steps would drift from it.
-        t.t[ends] = k / t.rate_hz
-        t.plan.run(SAMPLE, t, ends)
-        log.take(t, ends, k)
-        if (k == frames - 1).any():
-            active = active[t.frame[active] < frames - 1]
-    if t.lost.any():
+        ends.clock.t = ends.clock.frame / scene.rate_hz
+        ends.run(*SAMPLE)
+        log.take(ends)
+        active = active.only(active.clock.frame < frames - 1)
+    lost = np.count_nonzero(batch.bed.lost)
+    if lost:
         raise EdgeError(
-            f"{scene.name}: the forearm's tilt was not found in "
-            f"{np.count_nonzero(t.lost)} trials; give skin.taxel_n_m, the object's "
-            "stiffness or [step_s] less extreme values"
+            f"{scene.name}: the forearm's tilt was not found in {lost} trials; give "
+            "skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
         )
     times = np.arange(frames) / scene.rate_hz
-    check_energy(t, log.joints, times)
+    check_energy(batch, log.joints, times)
     return PhysicsRun(
-        times, log.joints, log.force, log.traces, log.window, log.images, t
+        times, log.joints, log.force, log.traces, log.window, log.images, batch
     )
 
 
 @dataclass(frozen=True)
 class _Log:
-    """The frames of a run, as it keeps them; see `PhysicsRun`.
-
-    Attributes:
-        joints, force, traces, window, images: of `PhysicsRun`.
-        sources: {trace: the object that holds its value, and the attribute}.
-        further: {effect: the attributes of its images}.
-        images_wanted: whether any images are kept.
-    """
+    """The frames of a run, as it keeps them; see `PhysicsRun`."""
 
     joints: Array
     force: Array
     traces: dict[str, Array]
     window: NDArray[np.float32]
     images: dict[str, NDArray[np.float32]]
-    sources: dict[str, tuple[Any, str]]
-    further: dict[str, tuple[str, ...]]
-    images_wanted: bool
 
     @classmethod
-    def of(cls, t: Trials, frames: int, *, images: bool) -> Self:
+    def of(cls, batch: Batch, frames: int, *, images: bool) -> Self:
         """An empty log, with the joints at the start."""
-        sources: dict[str, tuple[Any, str]] = {"depth_m": (t, "deepest")}
-        for effect in t.plan.calls:
-            for name, attribute in getattr(module_of(effect), "TRACES", {}).items():
-                sources[name] = t.states[effect], attribute
-        shape = t.n, frames if images else 0, *t.image.shape[:2]
-        further = images_of(t) if images else {}
+        n = batch.n
+        shape = n, frames if images else 0, *batch.touch.image.shape[:2]
         log = cls(
-            joints=np.empty((t.n, frames, len(t.q))),
-            force=np.zeros((t.n, frames)),
-            traces={name: np.zeros((t.n, frames)) for name in sources},
+            joints=np.empty((n, frames, len(batch.arm.q))),
+            force=np.zeros((n, frames)),
+            traces={},
             window=np.zeros(shape, dtype=np.float32),
             images={
-                effect: np.zeros((*shape, len(names)), dtype=np.float32)
-                for effect, names in further.items()
+                call.owner: np.zeros((*shape, 2), dtype=np.float32)
+                for call in batch.plan.stages[TRACTION]
             },
-            sources=sources,
-            further=further,
-            images_wanted=images,
         )
-        log.joints[:, 0] = t.q.T
+        log.joints[:, 0] = batch.arm.q.T
         return log
 
-    def take(self, t: Trials, ends: Places, k: NDArray[np.int64]) -> None:
-        """Take in the frames k of the trials that end one."""
-        self.joints[ends, k] = t.q.T[ends]
-        self.force[ends, k] = t.force[ends]
-        for name, (owner, attribute) in self.sources.items():
-            self.traces[name][ends, k] = getattr(owner, attribute)[ends]
-        scale = t.skin.counts_per_newton
-        if self.images_wanted:
-            touched = t.force[ends] > 0.0
-            counts = np.minimum(t.image.take(ends[touched], -1) * scale, FULL)
-            self.window[ends[touched], k[touched]] = np.moveaxis(counts, -1, 0)
-        for effect, names in self.further.items():
-            for place, name in enumerate(names):
-                loads = getattr(t.states[effect], name).take(ends, -1) * scale
-                self.images[effect][ends, k, ..., place] = np.moveaxis(loads, -1, 0)
+    def take(self, ends: Trials) -> None:
+        """Take in the frames of trials that end one."""
+        at = ends.places, ends.clock.frame
+        touched = ends.touch.force > 0.0
+        self.joints[at] = ends.arm.q.T
+        self.force[at] = ends.touch.force
+        for call, t in ends.calls(TRACE):
+            for name, values in call.function(t).items():
+                if name not in self.traces:
+                    self.traces[name] = np.zeros_like(self.force)
+                self.traces[name][t.places, t.clock.frame] = values
+        if self.window.size and touched.any():
+            self._take_images(ends.only(touched))
+
+    def _take_images(self, t: Trials) -> None:
+        """Take in the images of trials that are touched."""
+        scale = t.scene.skin.counts_per_newton
+        counts = np.minimum(t.touch.image * scale, FULL)
+        self.window[t.places, t.clock.frame] = np.moveaxis(counts, -1, 0)
+        for call, rubbed in t.calls(TRACTION):
+            loads = call.function(rubbed) * scale
+            image = np.moveaxis(loads, (0, -1), (-1, 0))
+            self.images[call.owner][rubbed.places, rubbed.clock.frame] = image
 
 
-def images_of(t: Trials) -> dict[str, tuple[str, ...]]:
-    """{effect: the attributes of its state that are images of their own}."""
-    modules = {effect: module_of(effect) for effect in t.plan.calls}
-    return {
-        effect: module.IMAGES
-        for effect, module in modules.items()
-        if hasattr(module, "IMAGES")
-    }
+def start_frames(starts: Trials) -> None:
+    """Choose the step of trials' next frame, and locate their contacts."""
+    clock = starts.clock
+    before = clock.steps.copy()
+    starts.run(*PACE)
+    changed = clock.steps != before
+    if changed.any():
+        others = starts.only(changed)
+        rate_hz = starts.scene.rate_hz * others.clock.steps
+        others.clock.h = np.asarray(1.0 / rate_hz, dtype=float)
+        others.run(*TUNE)
+    starts.run(*FRAME)
+    clock.left = clock.steps
 
 
-def start_frames(t: Trials, starts: Places) -> None:
-    """Choose the step of some trials' next frame, and locate their contacts."""
-    before = t.steps[starts]
-    t.plan.run(PACE, t, starts)
-    changed = starts[t.steps[starts] != before]
-    if changed.size:
-        t.h[changed] = 1.0 / (t.rate_hz * t.steps[changed])
-        t.plan.run(TUNE, t, changed)
-    t.plan.run(FRAME, t, starts)
-    t.left[starts] = t.steps[starts]
-
-
-def check_energy(t: Trials, joints: Array, times: Array) -> None:
+def check_energy(batch: Batch, joints: Array, times: Array) -> None:
     """Check that no trial gains energy.
 
     Only the motion of the equilibrium point puts energy in, W = int k (q_eq - q) dq_eq.
@@ -307,20 +294,21 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
     Raises:
         EdgeError: a trial gains energy; the sentence names the first one.
     """
-    scene = t.scene
-    k = t.joint_k.T
+    scene = batch.scene
+    k = batch.joints.stiffness.T
     moving = 0.5 * sum(
         i * r * r for i, r in zip(scene.inertia, scene.rate, strict=False)
     )
-    targets = t.start.T[:, None] + t.rate.T * np.minimum(
-        times[:, None], t.travel_s.T[:, None]
-    )
+    way_s = np.minimum(times[:, None], batch.arm.travel_s.T[:, None])
+    targets = batch.arm.start.T[:, None] + batch.joints.rate.T * way_s
     torque = k * (targets - joints)
     stored = (0.5 * torque * (targets - joints)).sum(axis=2)
     put_in = (0.5 * (torque[:, 1:] + torque[:, :-1]) * np.diff(targets, axis=1)).sum(
         axis=2
     )
-    turned = t.damping.T * np.diff(joints, axis=1) ** 2 / np.diff(times)[:, None]
+    turned = (
+        batch.joints.damping.T * np.diff(joints, axis=1) ** 2 / np.diff(times)[:, None]
+    )
     work, both_ways, lost = (
         np.pad(np.add.accumulate(energy, axis=1), ((0, 0), (1, 0)))
         for energy in (put_in, np.abs(put_in), turned.sum(axis=2))
@@ -332,7 +320,7 @@ def check_energy(t: Trials, joints: Array, times: Array) -> None:
         i = int(np.argmax(gains.any(axis=1)))
         frame = int(np.argmax(gains[i]))
         raise EdgeError(
-            f"{scene.name}: trial {t.specs[i].number} of {t.specs[i].key} makes "
+            f"{scene.name}: trial {batch.specs[i].number} of {batch.specs[i].key} makes "
             "energy: "
             f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J "
             "of the "
@@ -350,20 +338,20 @@ def readings(
         which: the trials to read; None for all.
         scene: a scene with other sensors, to read the run with these instead.
     """
-    t = physics.trials
-    scene = scene or t.scene
-    every = np.arange(t.n) if which is None else which
-    plan = t.plan if scene is t.scene else make_plan(scene, t.specs)
+    batch = physics.trials
+    scene = scene or batch.scene
+    every = np.arange(batch.n) if which is None else which
+    plan = batch.plan if scene is batch.scene else make_plan(scene, batch.specs)
     for i in every.tolist():
-        counts = np.zeros((len(physics.t), *t.skin.shape), dtype=np.float32)
-        counts[:, :, t.columns[:, i]] = physics.window[i]
+        counts = np.zeros((len(physics.t), *scene.skin.shape), dtype=np.float32)
+        counts[:, :, batch.bed.columns[:, i]] = physics.window[i]
         images = {}
         for effect, window in physics.images.items():
             images[effect] = np.zeros((*counts.shape, window.shape[-1]), np.float32)
-            images[effect][:, :, t.columns[:, i]] = window[i]
+            images[effect][:, :, batch.bed.columns[:, i]] = window[i]
         reading = Readings(
             scene=scene,
-            trial=t.specs[i],
+            trial=batch.specs[i],
             effects=plan.effects[i],
             which=i,
             t=physics.t,

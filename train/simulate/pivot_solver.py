@@ -7,6 +7,7 @@ Hessian of the springs touched (Qi and Sun, Math. Programming 58, 1993). In the 
 trials where it cycles, a line search on the slope takes over.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -15,8 +16,6 @@ import numpy as np
 
 from train.simulate.arm import Array, Mask
 from train.simulate.contact import total
-from train.simulate.plan import Index
-from train.simulate.trials import pick
 
 ROUNDS = 8
 """Plain Newton rounds before the line search takes over; most searches need two or
@@ -56,29 +55,22 @@ class Pivots:
     """Contacts of n pivoting forearms, whose loads must satisfy y = free - C (F, M).
 
     Attributes:
-        at: index of the contacts' trials in the next two.
-        gaps: (S, 1, trials) metres at which each spring is touched.
-        stiffness: (S, 1, trials) newtons a metre, or (S, rows, trials) where it differs
-            by row.
-        nearest: (S,) ascending; no trial's springs from s on are touched above
-            nearest[s].
+        reached_springs: of a depth, (S, 1, n) metres at which each spring is touched,
+            and (S, 1, n) newtons a metre, or (S, rows, n) where it differs by row, of
+            at least those springs that are touched there.
         weight, line_gap, lever: (rows, n) the part of each row that the face covers,
             metres by which the face draws back there, metres from the contact's middle.
-        gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load
-            (`viscous`).
+        gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load.
         free: (2, n) the coordinates without load; c: (3, n) the arm's compliance in
             them.
     """
 
-    at: Index
-    gaps: Array
-    stiffness: Array
-    nearest: Array
+    reached_springs: Callable[[float], tuple[Array, Array]]
     weight: Array
     line_gap: Array
     lever: Array
-    gain: Array | float
-    load: Array | float
+    gain: Array
+    load: Array
     free: Array
     c: Array
 
@@ -92,20 +84,16 @@ class Pivots:
     def loads(self, y: Array) -> Loads:
         """The loads of the springs at coordinates y (2, n)."""
         depth = y[0] + self.lever * y[1] - self.line_gap
-        deep = max(1, int(np.searchsorted(self.nearest, depth.max(initial=0.0))))
-        inside = depth - pick(self.gaps[:deep], self.at)
+        gaps, springs = self.reached_springs(depth.max(initial=0.0))
+        inside = depth - gaps
         np.maximum(inside, 0.0, out=inside)
-        touched = (inside > 0.0) * pick(self.stiffness[:deep], self.at)
+        touched = (inside > 0.0) * springs
         np.multiply(inside, touched, out=inside)
-        force = total(inside)
-        held = total(touched)
-        force = force * self.weight
-        held = held * self.weight
-        if not isinstance(self.load, float):
-            borne = self.gain * force + self.load
-            bears = (force > 0.0) & (borne > 0.0)
-            force = np.where(bears, borne, 0.0)
-            held = np.where(bears, self.gain * held, 0.0)
+        elastic = total(inside) * self.weight
+        borne = self.gain * elastic + self.load
+        bears = (elastic > 0.0) & (borne > 0.0)
+        force = np.where(bears, borne, 0.0)
+        held = np.where(bears, self.gain * (total(touched) * self.weight), 0.0)
         stiffness = total(held)
         mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
         off = self.lever - mean

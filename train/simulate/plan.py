@@ -1,9 +1,9 @@
 """The effects that trials call for, and the order in which their hooks run.
 
 An effect is a module of `train.simulate.effects` with some of the hooks named below. It
-is imported only where a trial calls for it. Each hook gets the trials and the index of
-those that call for its effect. `base` has the hooks of all trials, which run first in
-their stage.
+is imported only where a trial calls for it. Each hook gets the trials that call for its
+effect (`trials.Trials`). `base` has the hooks of all trials, which run first in their
+stage.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,10 +17,6 @@ from edge.errors import InputError
 from train.simulate.arm import Mask
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec
 from train.simulate.schema import EFFECTS, FAMILIES, SHARED
-
-Index = Any
-"""Some of the trials: an array of their places, or `ALL`."""
-ALL = slice(None)
 
 SETUP = (
     "swing",  # the arm in its steady sweep
@@ -44,6 +40,7 @@ STEP = (
     "give_way",  # the object's compliance
     "press",  # the loads
     "move",  # the object under these loads
+    "share",  # the force on each row
     "settle",  # the arm under these loads
 )
 SAMPLE = (
@@ -51,7 +48,14 @@ SAMPLE = (
     "lean",  # further force on the skin
     "image",  # the load on the taxels
     "pass_on",  # how the load spreads, and the bubbles that it bursts
-    "traction",  # the taxels' tangential load
+)
+TRACE = "trace"
+"""Returns {name: (m,)} of what a run keeps at each frame."""
+TRACTION = "traction"
+"""Returns (2, rows, C, m) newtons, the taxels' tangential load."""
+RESOLVE = (
+    "hang",  # the stiffness on which a light object swings
+    "resolve",  # the longest step that resolves that swing
 )
 SENSOR = (
     "clock",  # the frames' times
@@ -59,13 +63,16 @@ SENSOR = (
 )
 ANSWER = "answer"
 """The solver of a contact, which `press` calls."""
-INSTEAD = ("lay", "law", "locate", ANSWER, "bear", "image")
+INSTEAD = ("lay", "law", "hang", "locate", ANSWER, "share", "bear", "image")
 """Stages in which a trial runs a single hook: that of the last of its effects with such
 a hook."""
-STAGES = (*SETUP, *PACE, *TUNE, *FRAME, *STEP, ANSWER, *SAMPLE, *SENSOR)
+STAGES = (
+    *(*SETUP, *RESOLVE, *PACE, *TUNE, *FRAME, *STEP, ANSWER),
+    *(*SAMPLE, TRACE, TRACTION, *SENSOR),
+)
 
 
-@dataclass
+@dataclass(eq=False)
 class Call:
     """A hook, the effect that owns it, and (n,) whether each trial calls for that
     effect."""
@@ -73,10 +80,6 @@ class Call:
     owner: str
     function: Callable[..., Any]
     which: Mask
-
-    def __post_init__(self) -> None:
-        """Prepare the index of these trials."""
-        self.index: Index = ALL if self.which.all() else self.which.nonzero()[0]
 
 
 @dataclass(frozen=True)
@@ -92,24 +95,6 @@ class Plan:
     effects: tuple[tuple[str, ...], ...]
     calls: dict[str, Mask]
     stages: dict[str, list[Call]]
-
-    def run(self, stages: tuple[str, ...], trials: Any, i: Index = ALL) -> None:
-        """Run the hooks of stages for some of the trials."""
-        i = ALL if i is not ALL and len(i) == trials.n else i
-        for stage in stages:
-            for call in self.stages[stage]:
-                if call.index is ALL:
-                    call.function(trials, i)
-                    continue
-                callers = call.index if i is ALL else i[call.which[i]]
-                if callers.size:
-                    call.function(trials, callers)
-
-    def also(self, effect: str, i: Index) -> Mask:
-        """Whether each of the trials i calls for an effect."""
-        if effect in self.calls:
-            return self.calls[effect][i]
-        return np.zeros(len(self.effects), dtype=bool)[i]
 
 
 def module_of(effect: str) -> Any:
@@ -138,6 +123,10 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     owners = [("base", module_of("base"), everyone)]
     owners += [(name, module_of(name), mask) for name, mask in calls.items()]
     stages = {stage: _hooks(stage, owners) for stage in STAGES}
+    # Hooks of the same trials share one mask, and so what is gathered for them.
+    masks: dict[bytes, Mask] = {}
+    for call in (call for hooks in stages.values() for call in hooks):
+        call.which = masks.setdefault(call.which.tobytes(), call.which)
     return Plan(effects, calls, stages)
 
 

@@ -5,10 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from edge.config import ConfigTable
 from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
-from train.simulate.arm import Kinematics
+from train.simulate.arm import Array, Kinematics
 from train.simulate.schema import EFFECTS, Field
 
 
@@ -98,6 +100,11 @@ class Cylinder(SkinLayout):
     radius_m: float = 1.0
     column_angles_deg: tuple[float, ...] = ()
     counts_per_newton: float = 1.0
+
+    @cached_property
+    def row_z(self) -> Array:
+        """(rows, 1) metres of each row in the skin's link."""
+        return self.row0_z_m - self.pitch[0] * np.arange(float(self.rows))[:, None]
 
 
 @dataclass(frozen=True)

@@ -1,62 +1,178 @@
-"""The state of trials that run side by side, in arrays whose last axis is the trial."""
+"""The state of trials that run side by side, in arrays whose last axis is the trial.
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+A `Batch` holds the arrays of all its trials. A hook gets `Trials`: some of them, whose
+arrays hold these alone. What it reads is gathered for it, and what it assigns is
+scattered among the others.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.simulate.arm import Array, Mask, Places
-from train.simulate.contact import bed_law, by_depth, total
-from train.simulate.plan import ALL, Index, Plan
+from train.simulate.contact import bed_law, by_depth
+from train.simulate.plan import ANSWER, Call, Plan
 from train.simulate.scene_model import Scene, TrialSpec
 
-__all__ = ["ALL", "Array", "Index", "Mask", "Places", "Trials", "pick", "total"]
+__all__ = ["Array", "Group", "Mask", "Pair", "PerJoint", "PerRow", "Places", "Trials"]
+G = TypeVar("G", bound="Group")
 WINDOW_HALF = 6
 """Columns on either side of the one that meets the object: +-90 degrees, beyond which a
 cylinder has no surface to press."""
 
 
-def pick(values: NDArray[Any], i: Index) -> NDArray[Any]:
-    """The values (..., n) of some trials, to read; for `ALL`, the array itself."""
-    return values if i is ALL else values.take(i, axis=-1)
+PerJoint = Annotated[Array, "joint"]
+PerRow = Annotated[Array, "row"]
+PerColumn = Annotated[Array, "column"]
+Vector = Annotated[Array, "xyz"]
+Pair = Annotated[Array, "pair"]
+"""Arrays with these axes before that of the trials; a plain `Array` is (n,)."""
+
+
+class Column:
+    """An array of a `Group`."""
+
+    def __init__(self, name: str) -> None:
+        """Of its name."""
+        self.name = name
+
+    def __get__(self, group: "Group", owner: type) -> Any:
+        """The values of the group's trials: of all of them the array itself."""
+        values = group.arrays[self.name]
+        return values if group.places is None else values.take(group.places, -1)
+
+    def __set__(self, group: "Group", values: Any) -> None:
+        """Set the values of the group's trials."""
+        array = group.arrays[self.name]
+        if group.places is None:
+            array[...] = values
+        elif array.ndim == 1:
+            array[group.places] = values
+        else:
+            array[..., group.places] = values
+
+
+class Group:
+    """Arrays (..., n), of which the trials at some places are read and assigned; None
+    for all."""
+
+    def __init_subclass__(cls) -> None:
+        """Make an array of each attribute that the class names."""
+        for name in cls.__annotations__:
+            setattr(cls, name, Column(name))
+
+    def __init__(self, arrays: dict[str, Any], places: Places | None = None) -> None:
+        """Of {name: array of all trials}."""
+        self.arrays = arrays
+        self.places = places
+
+
+class Clock(Group):
+    """Each trial's own clock, (n,) each.
+
+    Attributes:
+        usual, steps, left: number of steps in a frame away from jolts, in the present
+            frame, and still to come in it.
+        frame: number of frames ended.
+        t, h: seconds now, and seconds of a step.
+        longest_s: seconds of the longest step that resolves how an object swings.
+    """
+
+    usual: Places
+    steps: Places
+    left: Places
+    frame: Places
+    t: Array
+    h: Array
+    longest_s: Array
 
 
 @dataclass
-class Trials:
-    """n trials of a scene, from the setup to their last step.
-
-    These attributes belong to all trials. An effect keeps its own state in `states`, as a
-    small dataclass whose arrays also end in the trial axis; without the effect it does
-    not exist.
+class Joints:
+    """The arm's joints, the same in all trials, (dof, 1) each.
 
     Attributes:
-        values: {name: (n,)} the values drawn for each trial.
-        plan: the hooks to run.
-        states: {effect: its state}.
-        usual, steps, left: (n,) the number of steps in a frame away from jolts, in the
-            present frame, and still to come in it.
-        frame, t, h: (n,) number of frames ended, seconds now, and seconds of a step.
-            Each trial has its own clock.
-        start, rate, travel_s: (dof, n), (dof, 1), (dof, n): the equilibrium point's
-            angles at t = 0, its speed, and for how long it moves.
-        lag: (dof, 1) radians by which a joint trails its equilibrium point in free
-            motion.
-        damping, joint_k: (dof, 1) of each joint.
-        held, give: (dof, n) stiffness of a joint's damping and inertia within a step,
-            and the compliance of the joint with it.
+        stiffness, damping, rate: of each joint, and its equilibrium point's speed.
+        lag: radians by which it trails its equilibrium point in free motion.
+    """
+
+    stiffness: Array
+    damping: Array
+    rate: Array
+    lag: Array
+
+
+class Arm(Group):
+    """The arm's motion.
+
+    Attributes:
+        start, travel_s: (dof, n) the equilibrium point's angles at t = 0, and for how
+            long it moves.
         q, q_free, q_frame: (dof, n) joint angles: now, after the step without load, at
             the frame.
-        point, normal, face, along_face: (3, n) the point of the forearm's axis beside
-            the contact; of the object's face its normal, a point, and its direction
-            along the forearm.
+        step_stiffness, step_compliance: (dof, n) stiffness of a joint's damping and
+            inertia within a step, and the compliance of the joint with it.
+        axes, origins: (3, dof, n) of the joints at the frame, as of `arm.Pose`.
+        point: (3, n) the point of the forearm's axis beside the contact.
+    """
+
+    start: PerJoint
+    travel_s: PerJoint
+    q: PerJoint
+    q_free: PerJoint
+    q_frame: PerJoint
+    step_stiffness: PerJoint
+    step_compliance: PerJoint
+    axes: Annotated[Array, "xyz", "joint"]
+    origins: Annotated[Array, "xyz", "joint"]
+    point: Vector
+
+
+class Contact(Group):
+    """The contact between forearm and object.
+
+    Attributes:
+        y, y_frame, depth, loads: (2, n) its coordinates (`contact`) without load, at
+            the frame and under load, and its loads.
+        normal, face, along_face: (3, n) of the object's face its normal, a point, and
+            its direction along the forearm.
+        jacobian, compliance: (dof, 2, n), (3, n) how the joints move its coordinates,
+            and the arm's compliance in them.
         z: (n,) metres in the skin's link, where the object is met.
-        y, y_frame, depth, loads: (2, n) the contact's coordinates (`contact`) without
-            load, at the frame and under load, and its loads.
         soft: (n,) metres that the object gives way for each newton in this step.
-        compliance, jacobian: (3, n), (dof, 2, n) the arm's compliance in these
-            coordinates, and how the joints move them.
-        row_z: (rows, 1) metres of each row in the skin's link.
+        fits: (n,) 1 where the object fits itself to a forearm that lies askew, else 0.
+        grip, pull: (n,) friction between skin and face, and newtons of the skin's pull
+            on the arm along the face.
+        lift: (n,) newtons with which that pull lifts the object.
+        turned: (n,) radians that the face has turned about the vertical.
+        free_depth: (n,) the depth without load, which is y[0].
+    """
+
+    y: Pair
+    y_frame: Pair
+    depth: Pair
+    loads: Pair
+    normal: Vector
+    face: Vector
+    along_face: Vector
+    jacobian: Annotated[Array, "joint", "pair"]
+    compliance: Vector
+    z: Array
+    soft: Array
+    fits: Array
+    grip: Array
+    pull: Array
+    lift: Array
+    turned: Array
+    free_depth: Array
+
+
+class Bed(Group):
+    """The springs between skin and object.
+
+    Attributes:
         columns, column_gaps, reach: (C, n) the skin's columns that can touch, the gap
             of each in metres at zero depth, and the part of it that the face can touch.
         column_angle: (C, n) radians from the push to each of these columns, positive
@@ -65,16 +181,87 @@ class Trials:
         gaps, stiffness: (S, n) the springs of a row: metres at which each is touched,
             and newtons a metre. A trial of fewer springs has some at infinity, of no
             stiffness.
-        law_gaps, slopes, intercepts: (E, n) a bed's law max_s (K_s a - B_s), by its
+        intact: (S, 1, n), or (S, rows, n) where springs may break: 1, or 0 of a broken
+            one.
+        springs: (n,) number of springs of a row.
+        law_gaps, slopes, intercepts: (E, n) the bed's law max_s (K_s a - B_s), by its
             gaps.
-        weight, line_gap, line_depth: (rows, n) the part of each row that the face
-            covers, metres by which the face draws back there, and metres of its depth.
+        weight, line_gap: (rows, n) the part of each row that the face covers, and
+            metres by which the face draws back there.
+        gain, load: (n,), (rows, n) a row whose springs bear F bears gain F + load.
         row_force: (rows, n) newtons on each row in the last step; where the forearm
             does not pivot, the first row holds the sum.
+        first_row_force: (n,) which is row_force[0].
+        swing_k: (n,) newtons a metre on which a light object swings.
         lost: (n,) whether the solver failed to find a contact's loads.
-        force, deepest, inside: (n,) at a frame: newtons on the skin, depth of the
-            deepest row, and the same but negative where no row touches.
+    """
+
+    columns: Annotated[Places, "column"]
+    column_gaps: PerColumn
+    reach: PerColumn
+    column_angle: PerColumn
+    taxel_k: Array
+    gaps: Annotated[Array, "spring"]
+    stiffness: Annotated[Array, "spring"]
+    intact: Annotated[Array, "spring", "line"]
+    springs: Places
+    law_gaps: Annotated[Array, "line"]
+    slopes: Annotated[Array, "line"]
+    intercepts: Annotated[Array, "line"]
+    weight: PerRow
+    line_gap: PerRow
+    gain: Array
+    load: PerRow
+    row_force: PerRow
+    first_row_force: Array
+    swing_k: Array
+    lost: Mask
+
+
+@dataclass
+class RowSprings:
+    """Each row's springs in the order of their depth, for a forearm that pivots.
+
+    Attributes:
+        gaps: (S, 1, n) metres at which each spring is touched, ascending.
+        stiffness: (S, 1, n) newtons a metre, or (S, rows, n) where springs may break.
+        nearest: (S,) the smallest gap of any trial's s-th spring.
+    """
+
+    gaps: Array
+    stiffness: Array
+    nearest: Array
+
+
+class Touch(Group):
+    """What the skin feels at a frame.
+
+    Attributes:
+        line_depth: (rows, n) metres of each row's depth.
         image: (rows, C, n) newtons on each taxel.
+        force, deepest, inside: (n,) newtons on the skin, depth of the deepest row, and
+            the same but negative where no row touches.
+    """
+
+    line_depth: PerRow
+    image: Annotated[Array, "row", "column"]
+    force: Array
+    deepest: Array
+    inside: Array
+
+
+@dataclass
+class Batch:
+    """n trials of a scene, from the setup to their last step.
+
+    An effect keeps its own state in `states`, as a small dataclass whose arrays also end
+    in the trial axis; without the effect it does not exist.
+
+    Attributes:
+        values: {name: (n,)} the values drawn for each trial.
+        plan: the hooks to run.
+        states: {effect: its state}.
+        everyone: all of the trials.
     """
 
     scene: Scene
@@ -84,113 +271,225 @@ class Trials:
     states: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Fill the attributes above with zeros."""
-        self.skin = self.scene.skin
-        self.kinematics = self.scene.kinematics
-        skin = self.skin
-        n = len(self.specs)
-        dof = len(self.scene.stiffness)
-        rate_hz = self.scene.trials["rate_hz"]
-        zeros = np.zeros
-        self.n = n
-        self.rate_hz = rate_hz
-        self.rows, window = skin.rows, 2 * min(WINDOW_HALF, (skin.cols - 1) // 2) + 1
-        self.usual = np.array(
-            [max(1, round(1.0 / (rate_hz * spec.step_s))) for spec in self.specs],
-            dtype=np.int64,
+        """Begin the groups of arrays."""
+        scene = self.scene
+        columns = 2 * min(WINDOW_HALF, (scene.skin.cols - 1) // 2) + 1
+        usual = [max(1, round(1.0 / (scene.rate_hz * s.step_s))) for s in self.specs]
+        h = 1.0 / (scene.rate_hz * np.array(usual))
+        stiffness = np.array(scene.stiffness)[:, None]
+        damping = np.array(scene.damping)[:, None]
+        rate = np.array(scene.rate)[:, None]
+        self.n = len(self.specs)
+        self.sizes = {"joint": len(rate), "row": scene.skin.rows, "column": columns}
+        self.sizes |= {"xyz": 3, "pair": 2, "spring": 0, "line": 1}
+        self.joints = Joints(stiffness, damping, rate, damping / stiffness * rate)
+        self.clock = self.begin(
+            Clock, usual=usual, steps=usual, left=0, frame=0, h=h, longest_s=np.inf
         )
-        self.steps, self.left, self.frame = (
-            self.usual.copy(),
-            *zeros((2, n), dtype=np.int64),
+        self.arm = self.begin(Arm)
+        self.contact = self.begin(Contact)
+        self.contact.arrays["free_depth"] = self.contact.y[0]
+        self.bed = self.begin(
+            Bed, columns=0, springs=0, law_gaps=np.inf, gain=1.0, lost=False
         )
-        self.t = zeros(n)
-        self.h = 1.0 / (rate_hz * self.usual)
-        self.damping = np.array(self.scene.damping)[:, None]
-        self.joint_k = np.array(self.scene.stiffness)[:, None]
-        self.rate = np.array(self.scene.rate)[:, None]
-        self.lag = self.damping / self.joint_k * self.rate
-        self.start, self.travel_s, self.held, self.give = zeros((4, dof, n))
-        self.q, self.q_free, self.q_frame = zeros((3, dof, n))
-        self.point, self.normal, self.face, self.along_face = zeros((4, 3, n))
-        self.axes, self.origins, self.jacobian = (
-            *zeros((2, 3, dof, n)),
-            zeros((dof, 2, n)),
-        )
-        self.y, self.y_frame, self.depth, self.loads = zeros((4, 2, n))
-        self.compliance = zeros((3, n))
-        self.row_z = (
-            skin.row0_z_m - skin.pitch[0] * np.arange(skin.rows, dtype=float)[:, None]
-        )
-        self.columns = zeros((window, n), dtype=np.intp)
-        self.column_gaps, self.reach, self.column_angle = zeros((3, window, n))
-        self.gaps, self.stiffness = zeros((2, 0, n))
-        self.weight, self.line_gap, self.line_depth, self.row_force = zeros(
-            (4, skin.rows, n)
-        )
-        self.law_gaps, self.slopes, self.intercepts = (
-            np.full((1, n), np.inf),
-            *zeros((2, 1, n)),
-        )
-        self.lost = zeros(n, dtype=bool)
-        self.soft, self.z, self.taxel_k, self.force, self.deepest, self.inside = zeros(
-            (6, n)
-        )
-        self.image = zeros((skin.rows, window, n))
+        self.bed.arrays["first_row_force"] = self.bed.row_force[0]
+        self.touch = self.begin(Touch)
+        self.row_springs: RowSprings | None = None
+        self.everyone = Trials(self, np.arange(self.n), np.arange(self.n))
 
-    def keep(self, effect: str, state: type[Any], **given: Any) -> Any:
-        """Keep an effect's state, a dataclass; an array that is not given is (n,)
-        zeros."""
-        empty = {field.name: np.zeros(self.n) for field in fields(state)}
-        self.states[effect] = state(**{**empty, **given})
-        return self.states[effect]
+    def begin(self, group: type[G], **values: Any) -> G:
+        """A group whose arrays begin at some values, and otherwise at 0."""
+        arrays = {}
+        for name, kind in group.__annotations__.items():
+            shape = [self.sizes[axis] for axis in getattr(kind, "__metadata__", ())]
+            arrays[name] = np.full((*shape, self.n), values.get(name, 0.0))
+        return group(arrays)
 
-    def equilibrium(self, t: Any, i: Index = ALL) -> Array:
-        """(dof, n) equilibrium angles of some trials at their times (n,)."""
-        way = self.rate * np.minimum(t, pick(self.travel_s, i))
-        return np.asarray(pick(self.start, i) + way)
 
-    def add_springs(self, i: Index, gaps: Array, stiffness: Array) -> None:
-        """Add springs (S, n of i) to each row of some trials."""
-        more = np.full((len(gaps), self.n), np.inf)
-        added = np.zeros((len(gaps), self.n))
-        more[:, i] = np.where(stiffness > 0.0, gaps, np.inf)
-        added[:, i] = stiffness
-        self.gaps = np.concatenate([self.gaps, more])
-        self.stiffness = np.concatenate([self.stiffness, added])
+class Gathered(dict[str, Any]):
+    """Arrays and groups of some trials, each gathered when it is first asked for."""
 
-    def obey(self, i: Index, gaps: Array, stiffness: Array) -> Places:
-        """Give some trials the law of springs (E, n of i); returns the springs' order
-        by depth."""
+    def __init__(self, source: Mapping[str, Any], places: Any) -> None:
+        """Of the arrays or groups of all trials."""
+        self.source = source
+        self.places = places
+
+    def __missing__(self, name: str) -> Any:
+        """Gather one."""
+        values = self.source[name]
+        if isinstance(values, Group):
+            self[name] = type(values)(values.arrays, self.places)
+        else:
+            self[name] = values.take(self.places)
+        return self[name]
+
+
+class Trials:
+    """Some trials of a batch; each array holds these m trials alone.
+
+    Attributes:
+        scene, joints: those of all trials.
+        places, within: (m,) their places in the batch, and in the trials of which they
+            were chosen.
+        clock, arm, contact, bed, touch: the groups of arrays.
+        values: {name: (m,)} the values drawn for each trial.
+        states: {effect: its state}.
+    """
+
+    def __init__(self, batch: Batch, places: Places, within: Places) -> None:
+        """The trials at some places of a batch, in rising order."""
+        self.batch = batch
+        self.places = places
+        self.within = within
+        self.scene = batch.scene
+        self.joints = batch.joints
+        at = None if len(places) == batch.n else places
+        self.clock = Clock(batch.clock.arrays, at)
+        self.arm = Arm(batch.arm.arrays, at)
+        self.contact = Contact(batch.contact.arrays, at)
+        self.bed = Bed(batch.bed.arrays, at)
+        self.touch = Touch(batch.touch.arrays, at)
+        self.values = Gathered(batch.values, places)
+        self.states = Gathered(batch.states, at)
+        self._parts: dict[int, Trials | None] = {}
+        self._gathered: RowSprings | None = None
+
+    def __len__(self) -> int:
+        """The number of trials."""
+        return len(self.places)
+
+    @property
+    def specs(self) -> list[TrialSpec]:
+        """What each trial is."""
+        return [self.batch.specs[place] for place in self.places]
+
+    def only(self, which: Mask) -> "Trials":
+        """Those of these trials for which `which` (m,) is true."""
+        within = which.nonzero()[0]
+        if len(within) == len(self):
+            return self
+        return Trials(self.batch, self.places[within], within)
+
+    def calls(self, *stages: str) -> Iterator[tuple[Call, "Trials"]]:
+        """The hooks of stages, each with those of these trials that call for it."""
+        for stage in stages:
+            for call in self.batch.plan.stages[stage]:
+                callers = self._part(call.which)
+                if len(callers.places):
+                    yield call, callers
+
+    def _part(self, which: Mask) -> "Trials":
+        """Those of these trials that a mask (n,) of the plan names."""
+        key = id(which)
+        if key not in self._parts:
+            part = self.only(which[self.places])
+            self._parts[key] = None if part is self else part
+        kept = self._parts[key]
+        return self if kept is None else kept
+
+    def run(self, *stages: str) -> None:
+        """Run the hooks of stages."""
+        for call, callers in self.calls(*stages):
+            call.function(callers)
+
+    def add_state(self, effect: str, group: type[Group], **given: Any) -> None:
+        """Add an effect's state; arrays (..., m) that are not given begin at 0."""
+        state = self.batch.begin(group)
+        for name, values in given.items():
+            shape = *np.shape(values)[:-1], self.batch.n
+            array = np.zeros(shape, dtype=np.asarray(values).dtype)
+            array[..., self.places] = values
+            state.arrays[name] = array
+        self.batch.states[effect] = state
+
+    def equilibrium(self, t: Any) -> Array:
+        """(dof, m) equilibrium angles at times (m,)."""
+        way = self.joints.rate * np.minimum(t, self.arm.travel_s)
+        return np.asarray(self.arm.start + way)
+
+    def add_springs(
+        self, gaps: Array, stiffness: Array, intact: Array | None = None
+    ) -> None:
+        """Add springs (S, m) to each row; with `intact` (S, rows, m), they may break."""
+        bed = self.bed.arrays
+        first = int(self.bed.springs.max())
+        added = slice(first, first + len(gaps))
+        more = max(added.stop - len(bed["gaps"]), 0)
+        if intact is not None and bed["intact"].shape[1] == 1:
+            bed["intact"] = np.repeat(bed["intact"], intact.shape[1], axis=1)
+        rest = (0, more), (0, 0)
+        bed["gaps"] = np.pad(bed["gaps"], rest, constant_values=np.inf)
+        bed["stiffness"] = np.pad(bed["stiffness"], rest)
+        bed["intact"] = np.pad(bed["intact"], (*rest, (0, 0)), constant_values=1.0)
+        bed["gaps"][added, self.places] = np.where(stiffness > 0.0, gaps, np.inf)
+        bed["stiffness"][added, self.places] = stiffness
+        if intact is not None:
+            bed["intact"][added, :, self.places] = intact
+        self.bed.springs = np.array(added.stop)
+
+    def set_bed_law(self, gaps: Array, stiffness: Array) -> Places:
+        """Set the law of springs (E, m); returns their order by depth."""
         order, gaps, stiffness = by_depth(gaps, stiffness)
-        short = len(gaps) - len(self.law_gaps)
-        if short > 0:
-            self.law_gaps = np.pad(
-                self.law_gaps, ((0, short), (0, 0)), constant_values=np.inf
-            )
-            self.slopes, self.intercepts = (
-                np.pad(law, ((0, short), (0, 0)))
-                for law in (self.slopes, self.intercepts)
-            )
-        self.law_gaps[: len(gaps), i] = gaps
-        self.slopes[: len(gaps), i], self.intercepts[: len(gaps), i] = bed_law(
-            gaps, stiffness
-        )
+        bed = self.bed.arrays
+        rest = (0, max(len(gaps) - len(bed["law_gaps"]), 0)), (0, 0)
+        bed["law_gaps"] = np.pad(bed["law_gaps"], rest, constant_values=np.inf)
+        bed["slopes"] = np.pad(bed["slopes"], rest)
+        bed["intercepts"] = np.pad(bed["intercepts"], rest)
+        bed["law_gaps"][: len(gaps), self.places] = gaps
+        self.set_lines(*bed_law(gaps, stiffness))
         return order
 
-    def ask(self, i: Index, y: Array, c: Array) -> Array:
-        """(2, n of i) the loads of some trials' contacts.
+    def set_lines(self, slopes: Array, intercepts: Array) -> None:
+        """Set the first lines (E, m) of the bed's law."""
+        lines = slice(len(slopes))
+        self.batch.bed.slopes[lines, self.places] = slopes
+        self.batch.bed.intercepts[lines, self.places] = intercepts
+
+    def set_row_law(self, gaps: Array, stiffness: Array) -> None:
+        """Set the springs (S, m) of each row, of stiffness (S, 1, m) or (S, rows, m),
+        for a forearm that pivots."""
+        order = gaps.argsort(axis=0, kind="stable")[:, None]
+        deep = int(np.isfinite(gaps).sum(axis=0).max())
+        stiffness = np.take_along_axis(stiffness, order, 0)[:deep]
+        gaps = np.take_along_axis(gaps[:, None], order, 0)[:deep]
+        law = self.batch.row_springs
+        if law is None:
+            n = self.batch.n
+            nothing = np.zeros((deep, stiffness.shape[1], n))
+            far = np.full((deep, 1, n), np.inf)
+            law = RowSprings(far, nothing, nearest=gaps.min(axis=(1, 2)))
+        law.gaps[:deep, :, self.places] = gaps
+        law.stiffness[:deep, :, self.places] = stiffness
+        # A new record tells the trials that have gathered the law to do so again.
+        self.batch.row_springs = replace(law)
+
+    def reached_springs(self, depth: float) -> tuple[Array, Array]:
+        """Gaps (S, 1, m) and stiffness (S, 1 or rows, m) of each row's springs that a
+        row at a depth may touch."""
+        law = self.batch.row_springs
+        assert law is not None
+        if self._gathered is not law:
+            self._gathered = law
+            self._row_gaps = law.gaps.take(self.places, -1)
+            self._row_stiffness = law.stiffness.take(self.places, -1)
+        deep = max(1, int(np.searchsorted(law.nearest, depth)))
+        return self._row_gaps[:deep], self._row_stiffness[:deep]
+
+    def solve_loads(self, y: Array, c: Array, where: Mask | None = None) -> Array:
+        """(2, m) the loads of the contacts.
 
         Args:
-            y, c: (n of i) depth without load, and metres that it gives way for each
-                newton, instead of the trials' own.
+            y, c: (m,) depth without load, and metres that it gives way for each newton.
+            where: (m,) whether to solve a contact; the others keep their loads.
         """
-        calls = self.plan.stages["answer"]
-        if len(calls) == 1:
-            return np.asarray(calls[0].function(self, i, y, c))
-        trials = np.arange(self.n) if i is ALL else i
-        loads = np.zeros((2, len(trials)))
-        for call in calls:
-            at = call.which[trials].nonzero()[0]
-            if at.size:
-                loads[:, at] = call.function(self, trials[at], y[at], c[at])
+        if where is not None:
+            loads = self.contact.loads.copy()
+            loads[:, where] = self.only(where).solve_loads(y[where], c[where])
+            return loads
+        loads = np.zeros((2, len(self)))
+        for call, callers in self.calls(ANSWER):
+            if callers is self:
+                return np.asarray(call.function(self, y, c))
+            at = callers.within
+            loads[:, at] = call.function(callers, y[at], c[at])
         return loads

@@ -49,7 +49,7 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
     touched = physics.force > 0.0
     onset = np.argmax(touched, axis=1)
     every = np.arange(trials.n)
-    last = onset + round(labels["window_s"] * trials.rate_hz)
+    last = onset + round(labels["window_s"] * trials.scene.rate_hz)
     last = np.minimum(last, touched.shape[1] - 1)
 
     def by_then(name: str) -> Any:
@@ -89,8 +89,8 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     empty texts."""
     trials = physics.trials
     scene = trials.scene
-    moves = trials.rate[:, 0] != 0.0
-    stroke_s = float(trials.travel_s[moves, i].max())
+    moves = trials.joints.rate[:, 0] != 0.0
+    stroke_s = float(trials.arm.travel_s[moves, i].max())
     ends_s = min(physics.t[-1], stroke_s)
     if ends_s - onset_s >= scene.labels["window_s"]:
         return "", ""

@@ -13,7 +13,7 @@ from train.simulate.plan import STEP, TUNE, plan_of
 from train.simulate.readings import Readings
 from train.simulate.scene import Scene, from_dict
 from train.simulate.scene_model import TrialSpec
-from train.simulate.trials import Trials
+from train.simulate.trials import Batch
 
 
 def one_object(**keys):
@@ -46,22 +46,22 @@ def specs_of(scene, step_s=0.01):
 
 
 @dataclass(frozen=True)
-class Batch(PhysicsRun):
+class Seen(PhysicsRun):
     """A run with its readings, and their counts (n, frames, rows, cols)."""
 
     counts: np.ndarray
     seen: list[Readings]
 
 
-def run_batch(scene, specs, **options) -> Batch:
+def run_batch(scene, specs, **options) -> Seen:
     physics = run_physics(scene, specs, **options)
     seen = list(readings(physics))
-    return Batch(
+    return Seen(
         **vars(physics), counts=np.stack([read.frames() for read in seen]), seen=seen
     )
 
 
-def run(scene, step_s=0.01, **options) -> Batch:
+def run(scene, step_s=0.01, **options) -> Seen:
     return run_batch(scene, specs_of(scene, step_s), **options)
 
 
@@ -100,34 +100,38 @@ class Rig:
             key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)
         }
         specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
-        self.trials = t = Trials(scene, specs, values, plan_of((effects,) * n))
-        t.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
-        t.rate, t.joint_k, t.damping = (
+        self.trials = t = Batch(scene, specs, values, plan_of((effects,) * n))
+        t.clock.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
+        t.joints.rate, t.joints.stiffness, t.joints.damping = (
             np.zeros((5, 1)),
             np.ones((5, 1)),
             np.zeros((5, 1)),
         )
-        t.rate[0] = speed
-        t.joint_k[0] = arm_k
-        t.damping[0] = arm_d
-        t.travel_s[0] = travel_s
-        t.jacobian[0, 0] = 1.0
+        t.joints.rate[0] = speed
+        t.joints.stiffness[0] = arm_k
+        t.joints.damping[0] = arm_d
+        t.arm.travel_s[0] = travel_s
+        t.contact.jacobian[0, 0] = 1.0
         shape = (len(law[1]), n)
-        t.law_gaps, t.slopes, t.intercepts = (
-            np.broadcast_to(part, shape) for part in law
-        )
-        t.plan.run(("stand", *TUNE), t)
-        t.compliance[0] = t.give[0]
+        for name, part in zip(("law_gaps", "slopes", "intercepts"), law, strict=True):
+            t.bed.arrays[name] = np.broadcast_to(part, shape)
+        t.everyone.run("stand", *TUNE)
+        t.contact.compliance[0] = t.arm.step_compliance[0]
 
     def run(self, steps: int) -> Trace:
         t = self.trials
         seen = []
         still = np.zeros(self.trials.n)
         for _ in range(steps):
-            t.plan.run(STEP, t)
+            t.everyone.run(*STEP)
             mover = t.states.get("sliding", SimpleNamespace(slide=still, speed=still))
-            now = (t.t, t.loads[0], t.q[0], t.equilibrium(t.t)[0])
-            seen.append(np.array([*now, mover.slide, mover.speed, t.depth[0]]))
+            now = (
+                t.clock.t,
+                t.contact.loads[0],
+                t.arm.q[0],
+                t.everyone.equilibrium(t.clock.t)[0],
+            )
+            seen.append(np.array([*now, mover.slide, mover.speed, t.contact.depth[0]]))
         return Trace(*np.moveaxis(seen, 1, 0))
 
 

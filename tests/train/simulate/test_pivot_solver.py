@@ -12,7 +12,6 @@ from edge.errors import EdgeError
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate.effects import tilt
 from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, search
-from train.simulate.plan import ALL
 from train.simulate.scene_model import Value
 
 
@@ -94,9 +93,12 @@ def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
     """The simulator's answers, searched for from no load."""
     n = len(free[0])
     gaps = springs.gaps
-    beds = (ALL, gaps[:, None], springs.stiffness[:, None], gaps.min(axis=1))
-    rows = (springs.weight, springs.line_gap, springs.lever)
-    pivots = Pivots(*beds, *rows, 1.0, 0.0, np.array(free), np.array(c))
+    beds = gaps[:, None], springs.stiffness[:, None]
+    rows = springs.weight, springs.line_gap, springs.lever
+    load = np.zeros((16, n))
+    pivots = Pivots(
+        lambda depth: beds, *rows, np.ones(n), load, np.array(free), np.array(c)
+    )
     (force, moment), _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
     return SimpleNamespace(force=force, moment=moment, lost=lost)
 

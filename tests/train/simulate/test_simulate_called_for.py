@@ -103,7 +103,7 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         assert before[i].joints.tobytes() == after.joints.tobytes()
 
 
-STATE = set("pop stems tilt inertia friction sliding turning tipping viscous".split())
+STATE = set("stems tilt inertia friction sliding turning tipping viscous".split())
 """Effects with state of their own."""
 
 

@@ -84,32 +84,39 @@ class Ledger:
         """(n, frames) newtons of the trials, with every step booked."""
         return engine.run_physics(self.scene, self.specs, plan=self.plan).force
 
-    def book(self, t, i):
+    def book(self, active):
         """Book the work of this step, for the trials that took it."""
+        t = active.batch
         if self.q is None:
-            self.q, self.slide = t.equilibrium(0.0) - t.lag, np.zeros(t.n)
-            self.v, self.speed = np.broadcast_to(t.rate, t.q.shape), np.zeros(t.n)
+            self.q, self.slide = (
+                t.everyone.equilibrium(0.0) - t.joints.lag,
+                np.zeros(t.n),
+            )
+            self.v, self.speed = (
+                np.broadcast_to(t.joints.rate, t.arm.q.shape),
+                np.zeros(t.n),
+            )
         if self.meddle:
             self.meddle(t)
         moved = np.zeros(t.n, dtype=bool)
-        moved[i] = True
-        dq = t.q - self.q
-        load = t.loads[0]
-        v = np.where(moved, dq / t.h, self.v)
-        spring = t.joint_k * (t.q - t.equilibrium(t.t))
-        torque = self.inertia * (v - self.v) / t.h + t.damping * v + spring
+        moved[active.places] = True
+        dq = t.arm.q - self.q
+        load = t.contact.loads[0]
+        v = np.where(moved, dq / t.clock.h, self.v)
+        spring = t.joints.stiffness * (t.arm.q - t.everyone.equilibrium(t.clock.t))
+        torque = self.inertia * (v - self.v) / t.clock.h + t.joints.damping * v + spring
         self.took.append(-(torque * dq).sum(axis=0))
-        self.q = t.q.copy()
+        self.q = t.arm.q.copy()
         self.v = v
         idle = load == 0.0
         if "viscous" in t.states:
-            idle = idle & (np.abs(t.states["viscous"].load).max(axis=0) < 1e-6)
+            idle = idle & (np.abs(t.bed.load).max(axis=0) < 1e-6)
         if "sliding" in t.states:
             mover = t.states["sliding"]
             way = mover.slide - self.slide
             self.slide = mover.slide.copy()
             self.pushed.append(load * way)
-            self.speed = np.where(moved, way / t.h, self.speed)
+            self.speed = np.where(moved, way / t.clock.h, self.speed)
             has = 0.5 * mover.inertia * self.speed * self.speed + lean(t, mover)
             self.has.append(has)
             idle = idle & (has == 0.0)
@@ -185,7 +192,7 @@ def test_the_ledger_notices_a_contact_that_gives_back_more_than_it_took(monkeypa
     trial_scene = pair_scene("inertia", "tilt")
 
     def push(t):
-        t.q[:, t.loads[0] > 0.0] -= 1e-3
+        t.arm.q[:, t.contact.loads[0] > 0.0] -= 1e-3
 
     monkeypatch.setattr(engine, "check_energy", lambda *_: None)
     ledger = Ledger(trial_scene, specs_of(trial_scene), push)

@@ -22,9 +22,9 @@ from tests.train.simulate.scenes import (
 from train.simulate import engine
 from train.simulate.arm import Kinematics
 from train.simulate.contact import GRAVITY
-from train.simulate.effects import friction, tilt
+from train.simulate.effects import friction, sliding, tilt
 from train.simulate.effects.inertia import FINER
-from train.simulate.plan import ALL, make_plan
+from train.simulate.plan import make_plan
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS
 
 ARM_K = 115.0
@@ -80,7 +80,7 @@ class TestArm:
 
     def test_a_frame_ends_at_its_own_time_and_not_at_the_sum_of_its_steps(self):
         batch = run(make(one_object()))
-        assert batch.trials.t.tolist() == [batch.t[-1]] * 2
+        assert batch.trials.clock.t.tolist() == [batch.t[-1]] * 2
         assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
 
     def test_contact_holds_the_arm_where_the_object_is(self):
@@ -88,14 +88,16 @@ class TestArm:
         # the push.
         batch = run(make(one_object(width_m=0.05)))
         t = batch.trials
-        held = t.kinematics.pose(batch.joints[0].T)
-        point = held.origin + held.rotation[2] * t.z[0]
-        along = ((point - t.face[:, :1]) * t.normal[:, :1]).sum(axis=0) + RADIUS
+        held = t.scene.kinematics.pose(batch.joints[0].T)
+        point = held.origin + held.rotation[2] * t.contact.z[0]
+        along = ((point - t.contact.face[:, :1]) * t.contact.normal[:, :1]).sum(
+            axis=0
+        ) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
-        free = t.kinematics.pose(t.equilibrium(batch.t[-1]))
-        gone = free.origin[:, 0] + free.rotation[2, :, 0] * t.z[0]
-        assert (gone - t.face[:, 0]) @ t.normal[:, 0] + RADIUS > 0.12
+        free = t.scene.kinematics.pose(t.everyone.equilibrium(batch.t[-1]))
+        gone = free.origin[:, 0] + free.rotation[2, :, 0] * t.contact.z[0]
+        assert (gone - t.contact.face[:, 0]) @ t.contact.normal[:, 0] + RADIUS > 0.12
 
 
 class TestSliding:
@@ -172,14 +174,14 @@ class TestInertia:
         pulling."""
         t = batch.trials
         rate = math.radians(30.0)
-        slopes = t.slopes[:, 0]
-        intercepts = t.intercepts[:, 0]
+        slopes = t.bed.slopes[:, 0]
+        intercepts = t.bed.intercepts[:, 0]
 
         def contact_at(q, speed):
-            pose = t.kinematics.pose(np.array([[q]]))
-            axis = pose.origin[:, 0] + pose.rotation[2, :, 0] * t.z[0]
-            normal = t.normal[:, 0]
-            depth = (axis - t.face[:, 0]) @ normal + RADIUS
+            pose = t.scene.kinematics.pose(np.array([[q]]))
+            axis = pose.origin[:, 0] + pose.rotation[2, :, 0] * t.contact.z[0]
+            normal = t.contact.normal[:, 0]
+            depth = (axis - t.contact.face[:, 0]) @ normal + RADIUS
             lever = np.cross(pose.axes[:, 0, 0], axis) @ normal
             elastic = max((slopes * depth - intercepts).max(), 0.0)
             stiffness = (
@@ -237,10 +239,11 @@ class TestInertia:
         steps = []
         start_frames = engine.start_frames
 
-        def watched(t, starts):
-            start_frames(t, starts)
-            steps.append(int(t.steps[0]))
-            assert t.h[0] == 0.01 / steps[-1]
+        def watched(starts):
+            start_frames(starts)
+            clock = starts.batch.clock
+            steps.append(int(clock.steps[0]))
+            assert clock.h[0] == 0.01 / steps[-1]
 
         monkeypatch.setattr(engine, "start_frames", watched)
         hit = int(np.argmax(run(trial_scene).force[0, 1:] > 0.0))
@@ -258,26 +261,31 @@ class TestFriction:
         plain = run(make(one_object(width_m=0.05)))
         held = run(make(one_object(width_m=0.05, skin_friction=mu)))
         shear = held.trials.states["friction"]
+        pull = held.trials.contact.pull[0]
         force = held.force[0, -1]
-        assert abs(shear.pull[0]) == pytest.approx(mu * force, rel=0.02)
-        c_nn = held.trials.compliance[0, 0]
+        assert abs(pull) == pytest.approx(mu * force, rel=0.02)
+        c_nn = held.trials.contact.compliance[0, 0]
         c_nt = shear.coupled[0, 0]
-        want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(shear.pull[0]) * c_nt)
+        want = plain.force[0, -1] * c_nn / (c_nn + mu * np.sign(pull) * c_nt)
         assert force == pytest.approx(want, rel=0.05)
         assert force < 0.95 * plain.force[0, -1]
 
     def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
         t = run(make(one_object(width_m=0.05, skin_friction=0.4))).trials
-        pose = t.kinematics.pose(t.q_frame)
+        pose = t.scene.kinematics.pose(t.arm.q_frame)
         local = np.einsum(
-            "kin,in->kn", pose.rotation, t.point + RADIUS * t.normal - pose.origin
+            "kin,in->kn",
+            pose.rotation,
+            t.arm.point + RADIUS * t.contact.normal - pose.origin,
         )
         for j in range(4):
             moved = []
             for turned in (-1e-6, 1e-6):
-                pose = t.kinematics.pose(t.q_frame + turned * np.eye(5)[j][:, None])
+                pose = t.scene.kinematics.pose(
+                    t.arm.q_frame + turned * np.eye(5)[j][:, None]
+                )
                 point = pose.origin + np.einsum("kin,kn->in", pose.rotation, local)
-                moved.append((point * t.along_face).sum(axis=0))
+                moved.append((point * t.contact.along_face).sum(axis=0))
             want = t.states["friction"].jacobian[j]
             np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
 
@@ -285,27 +293,34 @@ class TestFriction:
         self,
     ):
         stuck = make(one_object(width_m=0.05, skin_friction=5.0), "tilt", after_s=4.0)
-        shear = run(replace(stuck, travel_s=0.6)).trials.states["friction"]
-        assert (np.abs(shear.pull) > 0.5).all()
-        np.testing.assert_allclose(1e4 * shear.stretch, shear.pull, rtol=1e-3)
+        t = run(replace(stuck, travel_s=0.6)).trials
+        pull = t.contact.pull
+        assert (np.abs(pull) > 0.5).all()
+        np.testing.assert_allclose(1e4 * t.states["friction"].stretch, pull, rtol=1e-3)
 
     def test_a_smooth_soft_object_presses_along_the_forearms_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
         t = run(make(foam, "tilt")).trials
-        push = t.loads[0] * t.normal + t.states["friction"].pull * t.along_face
-        forearm = t.kinematics.pose(t.q_frame).rotation[2]
-        askew = (t.normal * forearm).sum(axis=0)
+        push = (
+            t.contact.loads[0] * t.contact.normal
+            + t.contact.pull * t.contact.along_face
+        )
+        forearm = t.scene.kinematics.pose(t.arm.q_frame).rotation[2]
+        askew = (t.contact.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
         np.testing.assert_allclose(
-            (push * forearm).sum(axis=0) / t.loads[0], 0.0, atol=0.01
+            (push * forearm).sum(axis=0) / t.contact.loads[0], 0.0, atol=0.01
         )
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
         batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
         t = batch.trials
-        push = t.loads[0] * t.normal + t.states["friction"].pull * t.along_face
-        forearm = t.kinematics.pose(t.q).rotation[2]
-        own = t.normal - forearm * (t.normal * forearm).sum(axis=0)
+        push = (
+            t.contact.loads[0] * t.contact.normal
+            + t.contact.pull * t.contact.along_face
+        )
+        forearm = t.scene.kinematics.pose(t.arm.q).rotation[2]
+        own = t.contact.normal - forearm * (t.contact.normal * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
         np.testing.assert_allclose(
             batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3
@@ -313,11 +328,11 @@ class TestFriction:
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         held = run(make(movable(0.05, 0.5, 0.5, skin_friction=0.5, width_m=0.2)))
-        shear = held.trials.states["friction"]
-        mover = held.trials.states["sliding"]
-        shear.pull = 5.0 / held.trials.along_face[2]
-        friction.drag(held.trials, ALL)
-        assert mover.weight.tolist() == [0.0, 0.0]
+        t = held.trials
+        t.contact.pull[:] = 5.0 / t.contact.along_face[2]
+        friction.drag(t.everyone)
+        sliding.drag(t.everyone)
+        assert t.states["sliding"].weight.tolist() == [0.0, 0.0]
 
     def test_the_shear_presses_a_pushed_box_to_the_floor(self):
         plain, held = (
@@ -325,10 +340,9 @@ class TestFriction:
             for more in ({}, {"skin_friction": 0.5})
         )
         assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
-        shear = held.trials.states["friction"]
-        mover = held.trials.states["sliding"]
-        assert mover.weight[0] == pytest.approx(
-            GRAVITY - shear.pull[0] * held.trials.along_face[2, 0], rel=0.01
+        t = held.trials
+        assert t.states["sliding"].weight[0] == pytest.approx(
+            GRAVITY - t.contact.pull[0] * t.contact.along_face[2, 0], rel=0.01
         )
         assert held.force[0].max() > 1.2 * plain.force[0].max()
 
@@ -336,19 +350,19 @@ class TestFriction:
 class TestTilt:
     def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
         t = run(make(one_object(width_m=0.05), "tilt")).trials
-        tilt.locate(t, ALL)
-        before = t.y_frame.copy()
-        jacobian = t.jacobian.copy()
+        tilt.locate(t.everyone)
+        before = t.contact.y_frame.copy()
+        jacobian = t.contact.jacobian.copy()
         middle = t.states["tilt"].lever[0].copy()
         for j in range(4):
-            t.q[j] += 1e-6
-            tilt.locate(t, ALL)
+            t.arm.q[j] += 1e-6
+            tilt.locate(t.everyone)
             # The point of the forearm that is looked at moves along it; the Jacobian's
             # does not.
-            moved = t.y_frame - before
+            moved = t.contact.y_frame - before
             moved[0] -= before[1] * (middle - t.states["tilt"].lever[0])
             np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
-            t.q[j] -= 1e-6
+            t.arm.q[j] -= 1e-6
 
     def test_an_object_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
         batch = run(
@@ -363,6 +377,8 @@ class TestTilt:
             one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia"
         )
         t = run(trial_scene, 0.0025).trials
-        moved = (t.jacobian * (t.q - t.q_frame)[:, None]).sum(axis=0)
+        moved = (t.contact.jacobian * (t.arm.q - t.arm.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
-        np.testing.assert_allclose(t.depth, t.y_frame + moved, rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(
+            t.contact.depth, t.contact.y_frame + moved, rtol=0.0, atol=1e-13
+        )

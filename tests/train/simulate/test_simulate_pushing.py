@@ -9,7 +9,6 @@ import pytest
 from tests.train.simulate.scenes import make, one_object, run
 from train.simulate.contact import GRAVITY
 from train.simulate.effects import base, sliding, stribeck, tipping
-from train.simulate.plan import ALL
 
 MU = 0.4
 MASS = 1.0
@@ -87,7 +86,7 @@ class TestSlope:
         t = push(friction_static=0.6, friction_kinetic=0.2, stribeck_m_s=0.05).trials
         mover = t.states["sliding"]
         mover.speed[:] = 0.1
-        stribeck.drag(t, ALL)
+        stribeck.drag(t.everyone)
         friction = 0.2 + 0.4 * math.exp(-4.0)
         assert mover.resist[0] == pytest.approx(friction * MASS * GRAVITY, rel=1e-12)
 
@@ -132,11 +131,11 @@ class TestToppling:
         mover = t.states["sliding"]
         mover.slide[:] = 1e-6
         mover.speed[:] = 0.0
-        t.y[:] = -0.1
-        tipping.drag(t, ALL)
-        sliding.give_way(t, ALL)
-        base.press(t, ALL)
-        sliding.move(t, ALL)
+        t.contact.y[:] = -0.1
+        tipping.drag(t.everyone)
+        sliding.give_way(t.everyone)
+        base.press(t.everyone)
+        sliding.move(t.everyone)
         assert mover.slide.tolist() == [0.0]
         assert mover.speed.tolist() == [0.0]
-        assert (t.loads == 0.0).all()
+        assert (t.contact.loads == 0.0).all()

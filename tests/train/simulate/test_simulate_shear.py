@@ -13,7 +13,6 @@ from tests.train.simulate.scenes import movable, one_object, run, scene
 from train.simulate.effects import shear
 from train.simulate.effects.shear import shared
 from train.simulate.run import recordings
-from train.simulate.trials import ALL
 
 SETTINGS = {"trials": {"count": 2, "after_s": 1.0}}
 THREE = {"skin": {"axes": 3}}
@@ -63,29 +62,31 @@ def test_a_pull_beyond_all_limits_is_shared_by_them():
 @pytest.mark.parametrize("add", [(), ("tilt",)])
 def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
     batch = run(scene(box(mu), effects={"add": list(add)}, **SETTINGS, **THREE))
-    along = batch.trials.states["shear"].along.sum(axis=(0, 1))
-    pull = batch.trials.states["friction"].pull
+    along = shear.traction(batch.trials.everyone)[0].sum(axis=(0, 1))
+    pull = batch.trials.contact.pull
     assert (np.abs(pull) > 0.01).all()
     np.testing.assert_allclose(along, pull, rtol=1e-9)
 
 
 def test_the_skin_is_drawn_against_its_own_motion():
-    t = run(scene(box(0.4), **SETTINGS, **THREE)).trials
+    batch = run(scene(box(0.4), **SETTINGS, **THREE))
+    t = batch.trials
     stretch = t.states["friction"].stretch
     assert (stretch < 0.0).all()  # the skin has moved against the face's direction
-    forearm = t.kinematics.pose(t.q).rotation[2]
-    towards_wrist = -(t.along_face * forearm).sum(axis=0)
+    forearm = t.scene.kinematics.pose(t.arm.q).rotation[2]
+    towards_wrist = -(t.contact.along_face * forearm).sum(axis=0)
     moved = np.sign(stretch * towards_wrist)
-    pulled = np.sign(t.states["shear"].along.sum(axis=(0, 1)))
+    pulled = np.sign(shear.traction(batch.trials.everyone)[0].sum(axis=(0, 1)))
     assert (moved == -pulled).all()
 
 
 def test_taxels_that_all_stick_bear_alike():
-    t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
-    along = t.states["shear"].along
-    loaded = t.image > 0.0
+    batch = run(scene(STICKY_FOAM, **BRIEF, **THREE))
+    t = batch.trials
+    along = shear.traction(batch.trials.everyone)[0]
+    loaded = t.touch.image > 0.0
     assert loaded.sum() > 10
-    alike = t.states["friction"].pull / loaded.sum(axis=(0, 1))
+    alike = t.contact.pull / loaded.sum(axis=(0, 1))
     expected = np.where(loaded, alike, 0.0)
     np.testing.assert_allclose(along, expected, rtol=1e-12)
 
@@ -93,25 +94,25 @@ def test_taxels_that_all_stick_bear_alike():
 def test_taxels_that_all_slip_bear_friction_times_their_load():
     slow = {"trials": {"count": 2, "after_s": 4.0}}
     t = run(scene(box(0.05), **slow, **THREE)).trials
-    along = np.abs(t.states["shear"].along)
-    assert (t.force > 10.0).all()
+    along = np.abs(shear.traction(t.everyone)[0])
+    assert (t.touch.force > 10.0).all()
     # The pull obeys the load of the step before, which is less by its growth.
-    np.testing.assert_allclose(along, 0.05 * t.image, rtol=5e-3)
+    np.testing.assert_allclose(along, 0.05 * t.touch.image, rtol=5e-3)
 
 
 def test_no_taxel_leaves_its_cone():
     batch = run(scene(box(0.4), effects={"add": ["tilt"]}, **SETTINGS, **THREE))
     t = batch.trials
-    size = np.hypot(t.states["shear"].along, t.states["shear"].around)
-    slack = np.maximum(np.abs(t.states["friction"].pull) / (0.4 * t.force), 1.0)
-    assert (size <= 0.4 * t.image * slack * (1.0 + 1e-12)).all()
+    size = np.hypot(*shear.traction(t.everyone))
+    slack = np.maximum(np.abs(t.contact.pull) / (0.4 * t.touch.force), 1.0)
+    assert (size <= 0.4 * t.touch.image * slack * (1.0 + 1e-12)).all()
 
 
 def test_around_the_forearm_a_load_acts_along_the_faces_normal():
     t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
-    around = t.states["shear"].around
-    assert (t.image.any(axis=0).sum(axis=0) > 1).all()
-    expected = t.image * np.sin(t.column_angle)
+    _, around = shear.traction(t.everyone)
+    assert (t.touch.image.any(axis=0).sum(axis=0) > 1).all()
+    expected = t.touch.image * np.sin(t.bed.column_angle)
     np.testing.assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
     # The skin is pressed away from the middle of the contact.
     assert (around.min(axis=(0, 1)) < 0.0).all()
@@ -122,21 +123,19 @@ def test_a_face_that_turns_takes_the_normal_with_it():
     foam = {"family": "foam", "skin_friction": 1.0, "width_m": 0.2}
     thing = movable(0.3, 0.2, 0.2, aside_m=0.05, foot_m=0.1, **foam)
     t = run(scene(thing, **SETTINGS, **THREE)).trials
-    turned = t.states["turning"].turned
+    turned = t.contact.turned
     assert (turned > 0.1).all()
-    t.states["friction"].pull[:] = 0.0
-    shear.traction(t, ALL)
-    around = t.states["shear"].around
-    expected = t.image * np.sin(t.column_angle - turned)
+    t.contact.pull[:] = 0.0
+    along, around = shear.traction(t.everyone)
+    expected = t.touch.image * np.sin(t.bed.column_angle - turned)
     assert np.count_nonzero(expected) > 20
     np.testing.assert_allclose(around, expected, rtol=1e-12)
-    assert not t.states["shear"].along.any()
+    assert not along.any()
 
 
 def test_without_skin_friction_there_is_no_shear():
     t = run(scene(one_object(), **SETTINGS, **THREE)).trials
-    assert not t.states["shear"].along.any()
-    assert not t.states["shear"].around.any()
+    assert not shear.traction(t.everyone).any()
 
 
 def test_nothing_but_the_shear_differs_from_the_scene_without_it():

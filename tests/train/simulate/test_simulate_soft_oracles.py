@@ -11,7 +11,6 @@ from tests.train.simulate.scenes import Rig, make, one_object, run
 from train.simulate import contact
 from train.simulate.effects import cover, lateral
 from train.simulate.effects.pop import BREAKS, SLOPES
-from train.simulate.plan import ALL
 from train.simulate.scene_model import Value
 
 RADIUS = 0.04604
@@ -188,7 +187,7 @@ class TestLateral:
         )
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
-        length = batch.trials.skin.pitch[0] * batch.trials.weight[:, 0].sum()
+        length = batch.trials.scene.skin.pitch[0] * batch.trials.bed.weight[:, 0].sum()
         assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
 
 
@@ -227,20 +226,22 @@ class TestAskew:
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
         slope = np.tan(np.radians(degrees))
-        pitch = t.skin.pitch[0]
+        pitch = t.scene.skin.pitch[0]
         # The face covers the skin's rows but the first and the last.
         depth = 1e-3 * depth_mm - slope * (np.arange(16) - 0.5) * pitch
-        t.weight[:] = np.pad(np.ones(14), 1)[:, None]
-        t.line_depth[:] = depth[:, None]
-        t.force[:] = force
+        t.bed.weight[:] = np.pad(np.ones(14), 1)[:, None]
+        t.touch.line_depth[:] = depth[:, None]
+        t.touch.force[:] = force
         # Half a column from the nearest on either side, as in the block's sum over
         # taxels.
-        angles_off = (np.arange(len(t.columns)) - len(t.columns) // 2 + 0.5) * 0.26166
-        radius = t.skin.radius_m
+        angles_off = (
+            np.arange(len(t.bed.columns)) - len(t.bed.columns) // 2 + 0.5
+        ) * 0.26166
+        radius = t.scene.skin.radius_m
         gaps = lateral.touched_at(radius * (1.0 - np.cos(angles_off)), radius, 0.1)
-        t.column_gaps[:] = gaps[:, None]
-        lateral.image(t, ALL)
-        image = t.image[..., 0]
+        t.bed.column_gaps[:] = gaps[:, None]
+        lateral.image(t.everyone)
+        image = t.touch.image[..., 0]
         borne = image.sum(axis=1)[1:7]
         assert borne.sum() == pytest.approx(sum(rows), rel=0.06)
         assert borne == pytest.approx(rows, abs=0.16 * max(rows))
@@ -261,7 +262,9 @@ def test_foam_pressed_flat_is_as_hard_as_the_skin():
 
 def test_a_sleeve_is_in_series_with_the_skin():
     covered = run(make(one_object(cover_n_m=2500.0)))
-    np.testing.assert_allclose(covered.trials.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
+    np.testing.assert_allclose(
+        covered.trials.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0)
+    )
 
 
 def test_a_sleeve_spreads_the_load_and_loses_none():
@@ -277,10 +280,10 @@ def test_a_sleeve_spreads_the_load_and_loses_none():
 
 def test_a_sleeve_gives_each_of_four_neighbours_its_part():
     t = run(make(one_object(cover_n_m=2500.0, cover_spread=0.1))).trials
-    t.image[:] = 0.0
-    t.image[5, 3] = 1.0
-    cover.pass_on(t, ALL)
-    image = t.image[..., 0]
+    t.touch.image[:] = 0.0
+    t.touch.image[5, 3] = 1.0
+    cover.pass_on(t.everyone)
+    image = t.touch.image[..., 0]
     want = np.zeros_like(image)
     want[5, 3] = 0.6
     want[[4, 6], 3] = 0.1
@@ -309,8 +312,8 @@ class TestBubbles:
     def test_they_stiffen_by_the_gas_law(self, part):
         # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
         t = self.wrap(pop_n=1e6).trials
-        bed = t.states["pop"]
-        columns = len(t.reach)
+        bed = t.bed
+        columns = len(t.bed.reach)
         middle = slice(columns // 2, None, columns)
         touched = bed.gaps[middle, 0][:3]
         stiffness = bed.stiffness[middle, 0][:3]
@@ -321,7 +324,7 @@ class TestBubbles:
 
     def test_burst_ones_leave_their_backing(self):
         batch = self.wrap(pop_n=0.5)
-        alive = batch.trials.states["pop"].alive
+        alive = batch.trials.bed.intact
         alive = alive.reshape(4, -1, *alive.shape[1:])
         burst = alive[3] == 1.0
         assert burst.any()
@@ -333,13 +336,12 @@ class TestBubbles:
 
     def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
         t = self.wrap(pop_n=0.5, width_m=0.05).trials
-        bubbles = t.states["pop"]
-        weight = t.weight[:, 0]
+        weight = t.bed.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
-        left = weight * bubbles.alive[..., 0] * bubbles.stiffness[:, :1]
-        law = [t.slopes[-1, 0], t.intercepts[-1, 0]]
-        gaps = t.line_gap[:, 0] + bubbles.gaps[:, :1]
-        want = [left.sum(), (left * gaps).sum()]
+        left = weight * t.bed.intact[..., 0] * t.bed.stiffness[:, :1]
+        law = [t.bed.slopes[-1, 0], t.bed.intercepts[-1, 0]]
+        gaps = t.bed.line_gap[:, 0] + t.bed.gaps[:, :1]
+        want = [left.sum(), (left[left > 0.0] * gaps[left > 0.0]).sum()]
         assert law == pytest.approx(want, rel=1e-12)
 
 
@@ -347,14 +349,14 @@ def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
     batch = run(make(one_object(family="foliage", **keys)))
     stems = batch.trials.states["stems"]
-    bent = np.maximum(batch.trials.depth[0] - stems.depth, 0.0)
+    bent = np.maximum(batch.trials.contact.depth[0] - stems.depth, 0.0)
     assert (bent > 0.03).any()
     assert (stems.stiffness[bent > 0.03] == 0.0).all()
     want = (stems.stiffness * bent).sum(axis=0)
     assert (want > 0.1).all()
     np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-9)
     # Between two rows, each stem's load is nearer to the one that it stands nearer to.
-    row = stems.taxel // len(batch.trials.columns) + stems.part
+    row = stems.taxel // len(batch.trials.bed.columns) + stems.part
     middle = (row * stems.stiffness * bent).sum(axis=0) / want
     seen = batch.counts[:, -1].sum(axis=2, dtype=float)
     measured = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
@@ -372,8 +374,8 @@ def test_stems_that_have_slipped_off_damp_no_more():
 def test_no_row_that_the_face_does_not_cover_is_the_deepest():
     keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
     batch = run(make(one_object(width_m=0.02, **keys), "tilt"))
-    covered = batch.trials.weight > 0.0
-    depth = batch.trials.line_depth
+    covered = batch.trials.bed.weight > 0.0
+    depth = batch.trials.touch.line_depth
     want = np.where(covered, depth, 0.0).max(axis=0)
     assert (want < depth.max(axis=0)).all()
     np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)
@@ -383,11 +385,11 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
     t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
     viscous = t.states["viscous"]
-    elastic = contact.spring_loads(t.line_depth, t.gaps, t.stiffness, t.weight).sum(
-        axis=0
-    )
+    elastic = contact.spring_loads(
+        t.touch.line_depth, t.bed.gaps, t.bed.stiffness, t.bed.weight
+    ).sum(axis=0)
     assert (np.ptp(elastic, axis=0) > 0.1).all()
-    np.testing.assert_allclose(t.row_force, elastic, atol=1e-3)
+    np.testing.assert_allclose(t.bed.row_force, elastic, atol=1e-3)
     np.testing.assert_allclose(viscous.given, viscous.ratio * elastic, atol=1e-3)
 
 
@@ -396,13 +398,13 @@ def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
         one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0
     )
     t = run(replace(wrap, travel_s=0.6)).trials
-    bubbles = t.states["pop"]
-    assert (np.ptp(bubbles.alive.sum(axis=0), axis=0) > 0.0).all()
+    bed = t.bed
+    assert (np.ptp(bed.intact.sum(axis=0), axis=0) > 0.0).all()
     loads = contact.spring_loads(
-        t.line_depth, bubbles.gaps, bubbles.stiffness, t.weight
+        t.touch.line_depth, bed.gaps, bed.stiffness, bed.weight
     )
     np.testing.assert_allclose(
-        t.row_force, (loads * bubbles.alive).sum(axis=0), atol=1e-6
+        bed.row_force, (loads * bed.intact).sum(axis=0), atol=1e-6
     )
 
 

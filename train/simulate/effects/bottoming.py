@@ -9,7 +9,7 @@ stays convex and piecewise linear.
 
 import numpy as np
 
-from train.simulate.trials import Index, Trials, pick
+from train.simulate.trials import Trials
 
 CLOSING = 0.65
 CLOSED = 0.93
@@ -19,16 +19,14 @@ STIFFER = 5.0
 """Stiffness between the two, as a multiple of the initial one."""
 
 
-def fill(t: Trials, i: Index) -> None:
+def fill(t: Trials) -> None:
     """Add each column's tangents: the closing cells, then the surface behind."""
-    gaps = pick(t.column_gaps, i)
-    reach = pick(t.reach, i)
-    depth = pick(t.values["depth_m"], i)
-    soft = reach * pick(t.taxel_k, i)
+    gaps = t.bed.column_gaps
+    reach = t.bed.reach
+    depth = t.values["depth_m"]
+    closing = reach * t.bed.taxel_k * (STIFFER - 1.0)
+    closed = reach * t.values["taxel_n_m"]
     t.add_springs(
-        i,
         np.concatenate([gaps + CLOSING * depth, gaps + CLOSED * depth]),
-        np.concatenate(
-            [soft * (STIFFER - 1.0), reach * pick(t.values["taxel_n_m"], i)]
-        ),
+        np.concatenate([closing, closed]),
     )

@@ -3,22 +3,20 @@ the load."""
 
 import numpy as np
 
-from train.simulate.trials import Index, Trials, pick
+from train.simulate.trials import Trials
 
 
-def soften(t: Trials, i: Index) -> None:
+def soften(t: Trials) -> None:
     """Put the sleeve in series with each taxel."""
-    t.taxel_k[i] = 1.0 / (
-        1.0 / pick(t.taxel_k, i) + 1.0 / pick(t.values["cover_n_m"], i)
-    )
+    t.bed.taxel_k = 1.0 / (1.0 / t.bed.taxel_k + 1.0 / t.values["cover_n_m"])
 
 
-def pass_on(t: Trials, i: Index) -> None:
+def pass_on(t: Trials) -> None:
     """Move a part of each taxel's load to its four neighbours; none is lost at the
     skin's ends."""
-    image = pick(t.image, i)
-    spread = image * pick(t.values["cover_spread"], i)
+    image = t.touch.image
+    spread = image * t.values["cover_spread"]
     around = np.pad(spread, ((1, 1), (1, 1), (0, 0)), mode="edge")
     beside = around[1:-1, 2:] + around[1:-1, :-2]
     above = around[2:, 1:-1] + around[:-2, 1:-1]
-    t.image[:, :, i] = image - 4.0 * spread + beside + above
+    t.touch.image = image - 4.0 * spread + beside + above

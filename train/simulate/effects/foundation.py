@@ -5,11 +5,14 @@ On such independent columns a cylinder of radius R at depth d bears F/L = (4/3) 
 sqrt(2 R d) (Winkler's foundation; Johnson, Contact Mechanics, 4.3).
 """
 
-from train.simulate.trials import Index, Trials, pick
+import numpy as np
+
+from train.simulate.trials import Trials
 
 
-def soften(t: Trials, i: Index) -> None:
+def soften(t: Trials) -> None:
     """Put a column of foam in series with each taxel."""
-    area = t.skin.pitch[0] * t.skin.pitch[1]
-    column = pick(t.values["modulus_pa"], i) * area / pick(t.values["depth_m"], i)
-    t.taxel_k[i] = 1.0 / (1.0 / pick(t.taxel_k, i) + 1.0 / column)
+    pitch = t.scene.skin.pitch
+    column = t.values["modulus_pa"] * (pitch[0] * pitch[1]) / t.values["depth_m"]
+    t.bed.taxel_k = 1.0 / (1.0 / t.bed.taxel_k + 1.0 / column)
+    t.contact.fits = np.array(1.0)

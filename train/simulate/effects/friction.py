@@ -9,117 +9,99 @@ A soft object fits itself to a forearm that lies askew, and presses along the fo
 normal. The bound then lies around the component of that normal along the face.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from train.simulate.arm import cross, dot
-from train.simulate.contact import GRAVITY
-from train.simulate.trials import ALL, Array, Index, Mask, Trials, pick, total
+from train.simulate.contact import total
+from train.simulate.trials import Array, Group, Pair, PerJoint, Trials
 
 
-@dataclass
-class Shear:
+class Shear(Group):
     """The skin's stretch along the face.
 
     Attributes:
-        stiffness: newtons a metre of the skin along the face.
-        fits: (n,) whether the object fits itself to a forearm that lies askew.
-        stretch, pull: (n,) metres of the spring, and its newtons on the arm along the
-            face.
-        jacobian: (dof, n) how the joints move the skin along the face.
-        coupled: (2, n) metres that the skin moves along the face for each load of the
-            contact.
-        give: (n,) metres that it moves for each newton along the face.
+        stretch: (n,) metres of the skin's shear spring.
+        give: (n,) metres that the skin moves along the face for each newton along it.
+        coupled: (2, n) metres that it moves so for each load of the contact.
+        jacobian: (dof, n) how the joints move it so.
         before: (dof, n) joint angles before the step.
     """
 
-    stiffness: float
-    fits: Mask
     stretch: Array
-    pull: Array
-    jacobian: Array
-    coupled: Array
     give: Array
-    before: Array
+    coupled: Pair
+    jacobian: PerJoint
+    before: PerJoint
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Begin with an unstretched skin."""
-    t.keep(
-        "friction",
-        Shear,
-        stiffness=t.scene.setting("friction", "shear_n_m"),
-        fits=t.plan.also("tilt", ALL) & t.plan.also("foundation", ALL),
-        jacobian=np.zeros_like(t.q),
-        coupled=np.zeros((2, t.n)),
-        before=np.zeros_like(t.q),
-    )
+    t.add_state("friction", Shear)
+    t.contact.grip = t.values["skin_friction"]
 
 
-def bounds(t: Trials, i: Index) -> tuple[Array, Array]:
+def stiffness(t: Trials) -> float:
+    """Newtons a metre of the skin along the face."""
+    return t.scene.setting("friction", "shear_n_m")
+
+
+def bounds(t: Trials) -> tuple[Array, Array]:
     """The lower and the upper limit of the pull under the present load."""
-    force = pick(t.loads[0], i)
-    fits = pick(t.states["friction"].fits, i)
-    limit = pick(t.values["skin_friction"], i) * force
-    tilt = pick(t.y_frame[1], i)
-    normal = np.where(fits, -force * tilt / np.sqrt(1.0 - tilt * tilt), 0.0)
+    contact = t.contact
+    force = contact.loads[0]
+    limit = contact.grip * force
+    tilt = contact.y_frame[1]
+    normal = -force * tilt / np.sqrt(1.0 - tilt * tilt) * contact.fits
     return normal - limit, normal + limit
 
 
-def reach_along(t: Trials, i: Index) -> None:
+def reach_along(t: Trials) -> None:
     """Find how the joints move the skin along the face."""
-    state = t.states["friction"]
-    skin = pick(t.point, i) + t.skin.radius_m * pick(t.normal, i)
-    turned = cross(pick(t.along_face, i)[:, None], pick(t.axes, i))
-    lever = dot(skin[:, None] - pick(t.origins, i), turned)
-    compliance = pick(t.give, i) * lever
-    state.jacobian[:, i], state.give[i] = lever, total(lever * compliance)
-    state.coupled[:, i] = total(pick(t.jacobian, i) * compliance[:, None])
+    shear = t.states["friction"]
+    contact = t.contact
+    skin = t.arm.point + t.scene.skin.radius_m * contact.normal
+    turned = cross(contact.along_face[:, None], t.arm.axes)
+    lever = dot(skin[:, None] - t.arm.origins, turned)
+    compliance = t.arm.step_compliance * lever
+    shear.jacobian = lever
+    shear.give = total(lever * compliance)
+    shear.coupled = total(contact.jacobian * compliance[:, None])
 
 
-def predict(t: Trials, i: Index) -> None:
+def predict(t: Trials) -> None:
     """Choose the pull of this step, and let arm and contact give way to it."""
-    state = t.states["friction"]
-    q = pick(t.q, i)
-    q_free = pick(t.q_free, i)
-    loads = pick(t.loads, i)
-    jacobian = pick(state.jacobian, i)
-    coupled = pick(state.coupled, i)
-    drawn = (
-        total(jacobian * (q_free - q)) - coupled[0] * loads[0] - coupled[1] * loads[1]
-    )
-    stuck = state.stiffness * (pick(state.stretch, i) + drawn)
-    stuck = stuck / (1.0 + state.stiffness * pick(state.give, i))
-    pull = np.clip(stuck, *bounds(t, i))
-    state.before[:, i] = q
-    state.pull[i] = pull
-    t.q_free[:, i] = q_free - pick(t.give, i) * jacobian * pull
-    t.y[:, i] = pick(t.y, i) - coupled * pull
+    shear = t.states["friction"]
+    q = t.arm.q
+    q_free = t.arm.q_free
+    force, moment = t.contact.loads
+    jacobian = shear.jacobian
+    coupled = shear.coupled
+    drawn = total(jacobian * (q_free - q)) - coupled[0] * force - coupled[1] * moment
+    k = stiffness(t)
+    stuck = k * (shear.stretch + drawn) / (1.0 + k * shear.give)
+    pull = np.clip(stuck, *bounds(t))
+    shear.before = q
+    t.contact.pull = pull
+    t.arm.q_free = q_free - t.arm.step_compliance * jacobian * pull
+    t.contact.y -= coupled * pull
 
 
-def drag(t: Trials, i: Index) -> None:
-    """Add the shear to the weight of an object that slides."""
-    i = np.arange(t.n)[i][t.plan.also("sliding", i)]
-    if i.size:
-        lifts = pick(t.states["friction"].pull, i) * pick(t.along_face[2], i)
-        weight = pick(t.values["mass_kg"], i) * GRAVITY
-        t.states["sliding"].weight[i] = np.maximum(weight - lifts, 0.0)
+def drag(t: Trials) -> None:
+    """The pull lifts the object, or presses it down."""
+    t.contact.lift = t.contact.pull * t.contact.along_face[2]
 
 
-def settle(t: Trials, i: Index) -> None:
+def settle(t: Trials) -> None:
     """Update the stretch; the skin slips where friction cannot hold it."""
-    state = t.states["friction"]
-    way = total(pick(state.jacobian, i) * (pick(t.q, i) - pick(state.before, i)))
-    low, high = bounds(t, i)
-    stretch = pick(state.stretch, i) + way
-    state.stretch[i] = np.clip(stretch, low / state.stiffness, high / state.stiffness)
+    shear = t.states["friction"]
+    way = total(shear.jacobian * (t.arm.q - shear.before))
+    low, high = bounds(t)
+    k = stiffness(t)
+    shear.stretch = np.clip(shear.stretch + way, low / k, high / k)
 
 
-def lean(t: Trials, i: Index) -> None:
+def lean(t: Trials) -> None:
     """Add the shear's component along the normal of skin that lies askew."""
-    i = np.arange(t.n)[i][t.plan.also("tilt", i)]
-    force = pick(t.force, i)
-    pull = pick(t.states["friction"].pull, i)
-    leant = np.maximum(force - pull * pick(t.depth[1], i), 0.0)
-    t.force[i] = np.where(force > 0.0, leant, 0.0)
+    force = t.touch.force
+    leant = np.maximum(force - t.contact.pull * t.contact.depth[1], 0.0)
+    t.touch.force = np.where(force > 0.0, leant, 0.0)

@@ -13,12 +13,10 @@ shorter when a touch is near and for a while after each jolt, and of the scene's
 elsewhere.
 """
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
-from train.simulate.trials import Array, Index, Trials, pick, total
+from train.simulate.contact import total
+from train.simulate.trials import Array, Group, PerJoint, Trials
 
 FINER = 8
 """Steps of a frame near a jolt, as a multiple of the usual number."""
@@ -31,22 +29,19 @@ NEAR = 1.5
 """A touch is near if it comes within so many frames at the present speed."""
 
 
-@dataclass
-class Momentum:
+class Momentum(Group):
     """The arm's motion, and the state that decides how finely it is followed.
 
     Attributes:
-        inertia: (dof, 1) kg m^2 of each joint.
         speed, before: (dof, n) rad/s of each joint, and its angle before the step.
         weight: (dof, n) I / h.
         left: (n,) number of further frames with finer steps.
         depth, force, change, peak: (n,) of the last frame, and the peak of all so far.
     """
 
-    inertia: Array
-    speed: Array
-    before: Array
-    weight: Array
+    speed: PerJoint
+    before: PerJoint
+    weight: PerJoint
     left: Array
     depth: Array
     force: Array
@@ -54,61 +49,55 @@ class Momentum:
     peak: Array
 
 
-def swing(t: Trials, i: Index) -> None:
+def swing(t: Trials) -> None:
     """Begin with the joints at the speed of the equilibrium point."""
-    inertia = np.array(t.scene.inertia)[:, None]
-    speed = np.repeat(t.rate, t.n, axis=1)
-    before, weight = np.zeros((2, *t.q.shape))
-    t.keep(
-        "inertia", Momentum, inertia=inertia, speed=speed, before=before, weight=weight
-    )
+    t.add_state("inertia", Momentum, speed=np.repeat(t.joints.rate, len(t), axis=1))
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Add the dashpot beside the skin's springs."""
-    t.states["viscous"].loss_s[i] = t.scene.setting("inertia", "loss_s")
+    t.states["viscous"].loss_s = t.scene.setting("inertia", "loss_s")
 
 
-def pace(t: Trials, i: Index) -> None:
+def pace(t: Trials) -> None:
     """Shorten the steps when a touch is near, and for a while after a jolt."""
-    state = t.states["inertia"]
-    depth = pick(t.inside, i)
-    force = pick(t.force, i)
-    closing = np.maximum(depth - pick(state.depth, i), 0.0)
-    change = force - pick(state.force, i)
-    peak = np.maximum(pick(state.peak, i), force)
-    jolts = np.abs(change - pick(state.change, i)) > JOLT * peak
-    frames_left = np.where(jolts, math.ceil(LASTS_S * t.rate_hz), pick(state.left, i))
+    last = t.states["inertia"]
+    depth = t.touch.inside
+    force = t.touch.force
+    closing = np.maximum(depth - last.depth, 0.0)
+    change = force - last.force
+    peak = np.maximum(last.peak, force)
+    jolts = np.abs(change - last.change) > JOLT * peak
+    frames_left = np.where(jolts, np.ceil(LASTS_S * t.scene.rate_hz), last.left)
     approaching = (force == 0.0) & (depth + NEAR * closing > 0.0)
-    state.depth[i] = depth
-    state.force[i] = force
-    state.change[i] = change
-    state.peak[i] = peak
-    t.steps[i] = np.where(approaching | (frames_left > 0), FINER, 1) * pick(t.usual, i)
-    state.left[i] = np.maximum(frames_left - 1, 0)
+    finer = approaching | (frames_left > 0)
+    last.depth = depth
+    last.force = force
+    last.change = change
+    last.peak = peak
+    last.left = np.maximum(frames_left - 1, 0)
+    t.clock.steps = np.where(finer, FINER, 1) * t.clock.usual
 
 
-def tune(t: Trials, i: Index) -> None:
+def tune(t: Trials) -> None:
     """Add inertia to the joint's stiffness within a step."""
-    state = t.states["inertia"]
-    h = pick(t.h, i)
-    weight = state.inertia / h
-    step_stiffness = pick(t.held, i) + weight / h
-    state.weight[:, i] = weight
-    t.held[:, i] = step_stiffness
-    t.give[:, i] = 1.0 / (step_stiffness + t.joint_k)
+    weight = np.array(t.scene.inertia)[:, None] / t.clock.h
+    step_stiffness = t.arm.step_stiffness + weight / t.clock.h
+    t.states["inertia"].weight = weight
+    t.arm.step_stiffness = step_stiffness
+    t.arm.step_compliance = 1.0 / (step_stiffness + t.joints.stiffness)
 
 
-def predict(t: Trials, i: Index) -> None:
+def predict(t: Trials) -> None:
     """Add the joints' speed to their position without load."""
-    state = t.states["inertia"]
-    further = pick(state.weight, i) * pick(state.speed, i) * pick(t.give, i)
-    state.before[:, i] = pick(t.q, i)
-    t.q_free[:, i] = pick(t.q_free, i) + further
-    t.y[:, i] = pick(t.y, i) + total(pick(t.jacobian, i) * further[:, None])
+    momentum = t.states["inertia"]
+    further = momentum.weight * momentum.speed * t.arm.step_compliance
+    momentum.before = t.arm.q
+    t.arm.q_free += further
+    t.contact.y += total(t.contact.jacobian * further[:, None])
 
 
-def settle(t: Trials, i: Index) -> None:
+def settle(t: Trials) -> None:
     """Update the speed at the end of the step."""
-    state = t.states["inertia"]
-    state.speed[:, i] = (pick(t.q, i) - pick(state.before, i)) / pick(t.h, i)
+    momentum = t.states["inertia"]
+    momentum.speed = (t.arm.q - momentum.before) / t.clock.h

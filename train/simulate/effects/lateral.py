@@ -22,8 +22,8 @@ bed stays convex and piecewise linear. The pressure is close to a half ellipse a
 
 import numpy as np
 
-from train.simulate.contact import share_out
-from train.simulate.trials import Array, Index, Trials, pick, total
+from train.simulate.contact import share_out, total
+from train.simulate.trials import Array, Trials
 
 MARGIN = 0.19
 """Load of the flat strip beyond the foundation under it, as a width over H."""
@@ -45,19 +45,18 @@ def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
     return gaps + delay(np.sqrt(depths * (2.0 * radius - depths)), depth) / radius
 
 
-def widen(t: Trials, i: Index) -> None:
+def widen(t: Trials) -> None:
     """Columns are touched at a larger depth."""
-    gaps = touched_at(
-        pick(t.column_gaps, i), t.skin.radius_m, pick(t.values["depth_m"], i)
+    t.bed.column_gaps = touched_at(
+        t.bed.column_gaps, t.scene.skin.radius_m, t.values["depth_m"]
     )
-    t.column_gaps[:, i] = gaps
 
 
-def fill(t: Trials, i: Index) -> None:
+def fill(t: Trials) -> None:
     """Add one spring to each row, touched first, for the foam beside the contact."""
-    width = 2.0 * MARGIN * pick(t.values["depth_m"], i) / t.skin.pitch[1]
-    beside = pick(t.taxel_k, i) * width * pick(t.reach, i).any(axis=0)
-    t.add_springs(i, np.zeros((1, len(beside))), beside[None])
+    width = 2.0 * MARGIN * t.values["depth_m"] / t.scene.skin.pitch[1]
+    beside = t.bed.taxel_k * width * t.bed.reach.any(axis=0)
+    t.add_springs(np.zeros((1, len(t))), beside[None])
 
 
 def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
@@ -75,7 +74,7 @@ def askew(depth: Array, weight: Array, pitch_m: float) -> Array:
     return out
 
 
-def row_loads(t: Trials, i: Index, wide: Array) -> Array:
+def row_loads(t: Trials, wide: Array) -> Array:
     """(rows, n) the load of each row up to a common factor, with `wide` (rows, n)
     columns touched.
 
@@ -87,38 +86,39 @@ def row_loads(t: Trials, i: Index, wide: Array) -> Array:
     within 10 % of that on an elastic block by finite elements, askew by 10 and 17
     degrees.
     """
-    depth = pick(t.line_depth, i)
-    weight = pick(t.weight, i)
-    gaps = pick(t.gaps, i)
-    stiffness = pick(t.stiffness, i)
+    depth = t.touch.line_depth
+    weight = t.bed.weight
+    gaps = t.bed.gaps
+    stiffness = t.bed.stiffness
     touched = (gaps < depth.max(axis=0)).any(axis=1)
     inside = np.maximum(depth - gaps[touched][:, None], 0.0)
     pressed = total(inside * stiffness[touched][:, None]) if touched.any() else 0.0
     borne = np.where(depth > 0.0, pressed, 0.0) * weight
-    margin = MARGIN * pick(t.values["depth_m"], i)
-    ends = askew(depth, weight, t.skin.pitch[0])
+    margin = MARGIN * t.values["depth_m"]
+    pitch = t.scene.skin.pitch[0]
+    ends = askew(depth, weight, pitch)
     slight = margin * total(ends)
     dips = slight > 0.0
     if dips.any():
-        edge = pick(t.taxel_k, i) * margin * margin / t.skin.pitch[0]
+        edge = t.bed.taxel_k * margin * margin / pitch
         part = np.clip(depth / np.where(dips, slight, 1.0) - 0.5, 0.0, 1.0)
         borne = np.where(dips, borne * part + edge * ends * wide, borne)
     return np.asarray(borne)
 
 
-def image(t: Trials, i: Index) -> None:
+def image(t: Trials) -> None:
     """Share the force among the rows by their loads, and within a row as a half
     ellipse: by the root of each column's depth beyond its touch."""
-    depth = pick(t.line_depth, i)
-    reach = pick(t.reach, i)
+    depth = t.touch.line_depth
+    reach = t.bed.reach
     # A touch so slight that it falls between two columns goes to the nearest.
-    gaps = pick(t.column_gaps, i)
+    gaps = t.bed.column_gaps
     gaps = gaps - gaps.min(axis=0)
     inside = np.where(depth > 0.0, depth - gaps[:, None], 0.0)
     touched = inside > 0.0
     loads = np.sqrt(np.where(touched, inside, 0.0)) * reach[:, None]
-    borne = row_loads(t, i, total(touched * reach[:, None]))
+    borne = row_loads(t, total(touched * reach[:, None]))
     ellipse = total(loads)
     loads *= borne / np.where(ellipse > 0.0, ellipse, 1.0)
-    share_out(pick(t.force, i), loads)
-    t.image[:, :, i] = loads.swapaxes(0, 1)
+    share_out(t.touch.force, loads)
+    t.touch.image = loads.swapaxes(0, 1)

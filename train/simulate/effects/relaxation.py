@@ -2,11 +2,11 @@
 relaxes it (`viscous`; Zener, Elasticity and anelasticity of metals, 1948). One time
 constant stands for the many of a real foam."""
 
-from train.simulate.trials import Index, Trials, pick
+from train.simulate.trials import Trials
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Make the second spring and its dashpot the contact's Maxwell element."""
     viscous = t.states["viscous"]
-    viscous.ratio[i] = pick(t.values["relax_ratio"], i)
-    viscous.relax_s[i] = pick(t.values["relax_s"], i)
+    viscous.ratio = t.values["relax_ratio"]
+    viscous.relax_s = t.values["relax_s"]

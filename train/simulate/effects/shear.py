@@ -16,31 +16,12 @@ around the forearm is left out, as the arm does not feel it either (`make matche
 its size). An object without `skin_friction` leaves no shear.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from train.simulate import streams
+from train.simulate.contact import total
 from train.simulate.readings import Readings
-from train.simulate.trials import Array, Index, Trials, pick, total
-
-
-@dataclass
-class Traction:
-    """Newtons on each taxel, (rows, C, n): along the rows, from elbow to wrist, and
-    around the columns."""
-
-    along: Array
-    around: Array
-
-
-IMAGES = ("along", "around")
-
-
-def stand(t: Trials, i: Index) -> None:
-    """Begin without load."""
-    empty = {name: np.zeros_like(t.image) for name in IMAGES}
-    t.keep("shear", Traction, **empty)
+from train.simulate.trials import Array, Trials
 
 
 def shared(pull: Array, limits: Array) -> Array:
@@ -71,27 +52,20 @@ def shared(pull: Array, limits: Array) -> Array:
     return np.asarray(np.where(pull > whole, limits * excess, borne))
 
 
-def traction(t: Trials, i: Index) -> None:
-    """Find the tangential load of each taxel from its normal load."""
-    state: Traction = t.states["shear"]
-    image = pick(t.image, i)
-    rubs = t.plan.also("friction", i)
-    friction = np.where(rubs, pick(t.values.get("skin_friction", t.force), i), 0.0)
-    limits = friction * image
-    pull = np.zeros(limits.shape[-1])
-    if rubs.any():
-        # The face draws the skin against the skin's own motion, and the rows run
-        # against the direction along the face.
-        pull = np.where(rubs, pick(t.states["friction"].pull, i), 0.0)
-        pull = np.where(total(total(image)) > 0.0, pull, 0.0)
-    flat = limits.reshape(-1, limits.shape[-1])
+def traction(t: Trials) -> Array:
+    """The tangential load of each taxel, from its normal load: along the rows, from
+    elbow to wrist, and around the columns."""
+    image = t.touch.image
+    limits = t.contact.grip * image
+    # The face draws the skin against the skin's own motion, and the rows run against
+    # the direction along the face.
+    pull = np.where(total(total(image)) > 0.0, t.contact.pull, 0.0)
+    flat = limits.reshape(-1, len(t))
     along = np.sign(pull) * shared(np.abs(pull), flat).reshape(limits.shape)
-    angle = pick(t.column_angle, i)
-    if "turning" in t.states:
-        angle = angle - pick(t.states["turning"].turned, i)
+    angle = t.bed.column_angle - t.contact.turned
     room = np.sqrt(np.maximum(limits * limits - along * along, 0.0))
-    state.along[:, :, i] = along
-    state.around[:, :, i] = np.clip(image * np.sin(angle), -room, room)
+    around = np.clip(image * np.sin(angle), -room, room)
+    return np.array([along, around])
 
 
 def sensor(readings: Readings) -> None:

@@ -5,16 +5,16 @@ A step first assumes that the object sticks. It moves where the push exceeds `ho
 stops exactly at rest.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from train.simulate.contact import GRAVITY
-from train.simulate.trials import Array, Index, Mask, Trials, pick
+from train.simulate.trials import Array, Group, Mask, Trials
+
+SWING_PART = 0.2
+"""A step of this part of sqrt(m / k) resolves how a mass m swings on a stiffness k."""
 
 
-@dataclass
-class Mover:
+class Mover(Group):
     """An object that can move along the push.
 
     Attributes:
@@ -45,88 +45,94 @@ class Mover:
     shifted: Array
 
 
-TRACES = {"slide_m": "slide"}
-
-
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Begin at rest, with the friction of the scene."""
-    t.keep(
+    t.add_state(
         "sliding",
         Mover,
-        inertia=t.values["mass_kg"].copy(),
-        static=t.values["friction_static"].copy(),
-        kinetic=t.values["friction_kinetic"].copy(),
-        weight=t.values["mass_kg"] * GRAVITY,
-        leans=np.zeros(t.n, dtype=bool),
-        lies=np.full(t.n, np.inf),
+        inertia=t.values["mass_kg"],
+        static=t.values["friction_static"],
+        kinetic=t.values["friction_kinetic"],
+        leans=False,
+        lies=np.inf,
     )
 
 
-def predict(t: Trials, i: Index) -> None:
+def resolve(t: Trials) -> None:
+    """Resolve how the object swings on the skin."""
+    t.clock.longest_s = SWING_PART * np.sqrt(t.values["mass_kg"] / t.bed.swing_k)
+
+
+def predict(t: Trials) -> None:
     """Take the object's way from the depth."""
-    t.y[0, i] = pick(t.y[0], i) - pick(t.states["sliding"].slide, i)
+    t.contact.free_depth -= t.states["sliding"].slide
 
 
-def drag(t: Trials, i: Index) -> None:
+def drag(t: Trials) -> None:
     """Coulomb's law of friction."""
     mover = t.states["sliding"]
-    weight = pick(mover.weight, i)
-    mover.hold[i] = pick(mover.static, i) * weight
-    mover.resist[i] = pick(mover.kinetic, i) * weight
+    weight = np.maximum(t.values["mass_kg"] * GRAVITY - t.contact.lift, 0.0)
+    mover.weight = weight
+    mover.hold = mover.static * weight
+    mover.resist = mover.kinetic * weight
 
 
-def give_way(t: Trials, i: Index) -> None:
+def give_way(t: Trials) -> None:
     """Let an object that moves give way to the load.
 
     Backward Euler: v+ = v + h/m (F+ - drag), s+ = s + h v+. To the contact this is one
     more compliance, h^2/m, and a shift, so the contact's solver still applies.
     """
     mover: Mover = t.states["sliding"]
-    h = pick(t.h, i)
-    speed = pick(mover.speed, i)
-    y = pick(t.y[0], i)
-    soft = h / pick(mover.inertia, i) * h
-    shifted = y - h * speed + soft * pick(mover.resist, i)
-    moving = pick(mover.leans, i) | (speed > 0.0)
-    mover.rest[i] = y
-    mover.shifted[i] = shifted
-    t.y[0, i] = np.where(moving, shifted, y)
-    t.soft[i] = np.where(moving, soft, 0.0)
+    h = t.clock.h
+    speed = mover.speed
+    y = t.contact.free_depth
+    soft = h / mover.inertia * h
+    shifted = y - h * speed + soft * mover.resist
+    moving = mover.leans | (speed > 0.0)
+    mover.rest = y
+    mover.shifted = shifted
+    t.contact.free_depth = np.where(moving, shifted, y)
+    t.contact.soft = np.where(moving, soft, 0.0)
 
 
-def move(t: Trials, i: Index) -> None:
-    """Move under the loads, and solve the loads of a few trials again."""
+def move(t: Trials) -> None:
+    """Move under the loads.
+
+    The loads are solved again where an object stops, at rest, or starts, in motion.
+    """
     mover: Mover = t.states["sliding"]
-    h = pick(t.h, i)
-    speed = pick(mover.speed, i)
-    resist = pick(mover.resist, i)
-    slide = pick(mover.slide, i)
-    leans = pick(mover.leans, i)
-    lies = pick(mover.lies, i)
-    gain = h / pick(mover.inertia, i)
-    force = pick(t.loads[0], i)
+    h = t.clock.h
+    speed = mover.speed
+    resist = mover.resist
+    slide = mover.slide
+    leans = mover.leans
+    lies = mover.lies
+    gain = h / mover.inertia
+    force = t.contact.loads[0]
     moving = leans | (speed > 0.0)
     after = np.where(moving, speed + gain * (force - resist), 0.0)
     ends = slide + h * after
     lands = leans & ((ends <= 0.0) | (ends >= lies))
     goes = moving & (leans | (after > 0.0)) & ~lands
     stops = moving & ~goes
-    again = np.flatnonzero(stops | (~moving & (force > pick(mover.hold, i))))
-    if again.size:
-        # An object that stops is solved again at rest, one that starts is solved again
-        # in motion.
-        trials = np.arange(t.n)[i][again]
-        rests = stops[again]
-        y = np.where(rests, mover.rest[trials], mover.shifted[trials])
-        soft = np.where(rests, 0.0, (gain * h)[again])
-        loads = t.ask(trials, y, t.compliance[0, trials] + soft)
-        off = np.where(rests, 0.0, gain[again] * (loads[0] - resist[again]))
-        right = rests | (off > 0.0)
-        t.loads[:, trials[right]] = loads[:, right]
-        after[again] = off
-        goes[again] = off > 0.0
+    again = stops | (~moving & (force > mover.hold))
+    if again.any():
+        y = np.where(stops, mover.rest, mover.shifted)
+        soft = np.where(stops, 0.0, gain * h)
+        loads = t.solve_loads(y, t.contact.compliance[0] + soft, where=again)
+        started = np.where(stops, 0.0, gain * (loads[0] - resist))
+        right = stops | (started > 0.0)
+        t.contact.loads = np.where(again & right, loads, t.contact.loads)
+        after = np.where(again, started, after)
+        goes = np.where(again, started > 0.0, goes)
     after = np.where(goes, after, 0.0)
     step = h * after
-    mover.speed[i] = after
-    mover.slide[i] = np.where(lands, np.clip(ends, 0.0, lies), slide) + step
-    t.y[0, i] = pick(mover.rest, i) - step
+    mover.speed = after
+    mover.slide = np.where(lands, np.clip(ends, 0.0, lies), slide) + step
+    t.contact.free_depth = mover.rest - step
+
+
+def trace(t: Trials) -> dict[str, Array]:
+    """The object's way."""
+    return {"slide_m": t.states["sliding"].slide}

@@ -6,12 +6,14 @@ On a slope of angle b, uphill along the push, m g (mu cos b + sin b) moves an ob
 
 import numpy as np
 
-from train.simulate.trials import Index, Trials, pick
+from train.simulate.trials import Trials
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Change the coefficients of friction by the slope; no object starts by itself."""
     mover = t.states["sliding"]
-    angle = np.radians(pick(t.values["slope_deg"], i))
-    for friction in (mover.static, mover.kinetic):
-        friction[i] = np.maximum(pick(friction, i) * np.cos(angle) + np.sin(angle), 0.0)
+    angle = np.radians(t.values["slope_deg"])
+    level = np.cos(angle)
+    uphill = np.sin(angle)
+    mover.static = np.maximum(mover.static * level + uphill, 0.0)
+    mover.kinetic = np.maximum(mover.kinetic * level + uphill, 0.0)

@@ -4,18 +4,15 @@ number here), damp, and slip off the forearm for good once bent too far.
 The cantilever is Euler and Bernoulli's; damping and slipping are a model of ours, which
 was fitted to nothing."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from train.simulate import streams
-from train.simulate.contact import bed_law
+from train.simulate.contact import bed_law, total
 from train.simulate.effects.base import FAR_M
-from train.simulate.trials import Array, Index, Places, Trials, pick, total
+from train.simulate.trials import Array, Group, Places, Trials
 
 
-@dataclass
-class Stems:
+class Stems(Group):
     """The stems of each trial; a trial of fewer stems has some of no stiffness.
 
     Attributes:
@@ -41,17 +38,15 @@ class Stems:
     drag: Array
 
 
-def lay(t: Trials, i: Index) -> None:
+def lay(t: Trials) -> None:
     """Lay stems instead of the bed's rows."""
-    trials = np.arange(t.n)[i]
-    scene = t.scene
     values = t.values
-    counts = values["stem_count"][trials].astype(np.int64)
-    shape = (int(counts.max()), t.n)
-    depth, along, around, stiffness = np.ones(shape), *np.zeros((3, *shape))
-    for trial, count in zip(trials.tolist(), counts.tolist(), strict=True):
-        spec = t.specs[trial]
-        generator = streams.stream(scene.seed, "stems", spec.key, spec.number)
+    counts = values["stem_count"].astype(np.int64)
+    shape = (int(counts.max()), len(t))
+    depth = np.ones(shape)
+    along, around, stiffness = np.zeros((3, *shape))
+    for trial, (spec, count) in enumerate(zip(t.specs, counts.tolist(), strict=True)):
+        generator = streams.stream(t.scene.seed, "stems", spec.key, spec.number)
         depth[:count, trial] = generator.random(count)
         along[:count, trial] = generator.random(count)
         around[:count, trial] = generator.integers(-1, 2, count)
@@ -59,14 +54,16 @@ def lay(t: Trials, i: Index) -> None:
         stiffness[:count, trial] = np.exp(deviation * generator.standard_normal(count))
     depth -= depth.min(axis=0)
     stiffness = np.where(stiffness > 0.0, stiffness * values["stem_n_m"], 0.0)
-    pitch = t.skin.pitch[0]
-    middle = (t.row_z[0] - t.z) / pitch
-    reach = 0.5 * np.minimum(values["width_m"], t.rows * pitch) / pitch
-    place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(t.rows - 1.001, 0.0))
+    rows, window, _ = t.touch.image.shape
+    pitch = t.scene.skin.pitch[0]
+    middle = (t.scene.skin.row_z[0] - t.contact.z) / pitch
+    reach = 0.5 * np.minimum(values["width_m"], rows * pitch) / pitch
+    place = np.clip(middle + (2.0 * along - 1.0) * reach, 0.0, max(rows - 1.001, 0.0))
     low = np.floor(place)
-    window = len(t.columns)
     damping = 2.0 * values["stem_damping"] * np.sqrt(stiffness * values["stem_kg"])
-    t.states["stems"] = Stems(
+    t.add_state(
+        "stems",
+        Stems,
         depth=depth * values["stem_spread_m"],
         stiffness=stiffness,
         damping=np.where(stiffness > 0.0, damping, 0.0),
@@ -75,78 +72,75 @@ def lay(t: Trials, i: Index) -> None:
         order=np.zeros(shape, dtype=np.intp),
         slopes=np.zeros(shape),
         intercepts=np.zeros(shape),
-        drag=np.zeros(t.n),
     )
 
 
-def law(t: Trials, i: Index) -> None:
+def law(t: Trials) -> None:
     """The law of the stems by depth."""
-    state = t.states["stems"]
-    state.order[:, i] = t.obey(i, pick(state.depth, i), pick(state.stiffness, i))
-    let_go(t, i)
+    stems = t.states["stems"]
+    stems.order = t.set_bed_law(stems.depth, stems.stiffness)
+    let_go(t)
 
 
-def let_go(t: Trials, i: Index) -> None:
+def let_go(t: Trials) -> None:
     """The law of the stems that are still held."""
-    state = t.states["stems"]
-    order = pick(t.states["stems"].order, i)
-    gaps, stiffness = (
-        np.take_along_axis(pick(a, i), order, 0) for a in (state.depth, state.stiffness)
-    )
-    state.slopes[:, i], state.intercepts[:, i] = bed_law(gaps, stiffness)
+    stems = t.states["stems"]
+    order = stems.order
+    gaps = np.take_along_axis(stems.depth, order, 0)
+    stiffness = np.take_along_axis(stems.stiffness, order, 0)
+    stems.slopes, stems.intercepts = bed_law(gaps, stiffness)
 
 
-def tune(t: Trials, i: Index) -> None:
+def hang(t: Trials) -> None:
+    """Add up the stems."""
+    t.bed.swing_k = total(t.states["stems"].stiffness)
+
+
+def tune(t: Trials) -> None:
     """The law of the next step: the stems still held, and implicitly the damping of
     bent ones."""
-    state = t.states["stems"]
-    drag = pick(state.drag, i) / pick(t.h, i)
-    stems = len(state.depth)
-    t.slopes[:stems, i] = pick(state.slopes, i) + drag
-    t.intercepts[:stems, i] = pick(state.intercepts, i) + drag * pick(t.depth[0], i)
+    stems = t.states["stems"]
+    drag = stems.drag / t.clock.h
+    t.set_lines(stems.slopes + drag, stems.intercepts + drag * t.contact.depth[0])
 
 
-def settle(t: Trials, i: Index) -> None:
+def settle(t: Trials) -> None:
     """Let stems slip off that are bent too far; the others damp the next step."""
-    state = t.states["stems"]
-    bent = pick(t.depth[0], i) - pick(state.depth, i)
-    slips = (bent > pick(t.values["stem_slip_m"], i)) & (pick(state.stiffness, i) > 0.0)
-    at = slips.any(axis=0).nonzero()[0]
-    if at.size:
-        trials = np.arange(t.n)[i][at]
-        bends = ~slips.take(at, -1)
-        state.stiffness[:, trials] *= bends
-        state.damping[:, trials] *= bends
-        let_go(t, trials)
-    state.drag[i] = total(np.where(bent > 0.0, pick(state.damping, i), 0.0))
-    tune(t, i)
+    stems = t.states["stems"]
+    bent = t.contact.depth[0] - stems.depth
+    slips = (bent > t.values["stem_slip_m"]) & (stems.stiffness > 0.0)
+    if slips.any():
+        stems.stiffness *= ~slips
+        stems.damping *= ~slips
+        let_go(t)
+    stems.drag = total(np.where(bent > 0.0, stems.damping, 0.0))
+    tune(t)
 
 
-def bear(t: Trials, i: Index) -> None:
+def bear(t: Trials) -> None:
     """The force on the skin, and how far the first stem is bent."""
-    state = t.states["stems"]
-    depth = pick(t.depth[0], i)
-    bends = pick(state.stiffness, i) > 0.0
-    bent = depth - pick(state.depth, i)
-    t.force[i] = pick(t.loads[0], i)
-    t.deepest[i] = np.where(bends, bent, 0.0).max(axis=0)
-    t.inside[i] = np.where(bends, bent, FAR_M).max(axis=0)
+    stems = t.states["stems"]
+    holds = stems.stiffness > 0.0
+    bent = t.contact.depth[0] - stems.depth
+    t.touch.force = t.contact.loads[0]
+    t.touch.deepest = np.where(holds, bent, 0.0).max(axis=0)
+    t.touch.inside = np.where(holds, bent, FAR_M).max(axis=0)
 
 
-def image(t: Trials, i: Index) -> None:
+def image(t: Trials) -> None:
     """Put each stem's load on the two rows that it lies between."""
-    state = t.states["stems"]
-    m = len(np.arange(t.n)[i])
-    bent = np.maximum(pick(t.depth[0], i) - pick(state.depth, i), 0.0)
-    loads = bent * pick(state.stiffness, i)
+    stems = t.states["stems"]
+    bent = np.maximum(t.contact.depth[0] - stems.depth, 0.0)
+    loads = bent * stems.stiffness
     borne = total(loads)
-    loads = loads * (pick(t.force, i) / np.where(borne > 0.0, borne, 1.0))
-    image = np.zeros((t.image[..., 0].size, m))
-    part = pick(state.part, i)
-    every = np.arange(m)
-    beside = len(t.columns) if t.rows > 1 else 0
-    shares = zip(pick(state.taxel, i), loads * (1.0 - part), loads * part, strict=True)
+    loads = loads * (t.touch.force / np.where(borne > 0.0, borne, 1.0))
+    rows, window, _ = t.touch.image.shape
+    image = np.zeros((rows * window, len(t)))
+    part = stems.part
+    every = np.arange(len(t))
+    beside = window if rows > 1 else 0
+    shares = zip(stems.taxel, loads * (1.0 - part), loads * part, strict=True)
     for taxel, first, second in shares:
         image[taxel, every] += first
         image[taxel + beside, every] += second
-    t.image[:, :, i] = image.reshape(*t.image.shape[:2], m)
+    t.touch.image = image.reshape(rows, window, -1)

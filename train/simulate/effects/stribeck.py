@@ -5,14 +5,13 @@ machines with friction, 1994)."""
 
 import numpy as np
 
-from train.simulate.trials import Index, Trials, pick
+from train.simulate.trials import Trials
 
 
-def drag(t: Trials, i: Index) -> None:
+def drag(t: Trials) -> None:
     """Friction at the present speed."""
     mover = t.states["sliding"]
-    static = pick(mover.static, i)
-    kinetic = pick(mover.kinetic, i)
-    part = pick(mover.speed, i) / pick(t.values["stribeck_m_s"], i)
-    now = kinetic + (static - kinetic) * np.exp(-(part * part))
-    mover.resist[i] = now * pick(mover.weight, i)
+    kinetic = mover.kinetic
+    part = mover.speed / t.values["stribeck_m_s"]
+    now = kinetic + (mover.static - kinetic) * np.exp(-(part * part))
+    mover.resist = now * mover.weight

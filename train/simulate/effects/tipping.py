@@ -11,16 +11,14 @@ energy, and the rest implicitly.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from train.simulate.contact import GRAVITY
-from train.simulate.trials import Array, Index, Mask, Trials, pick
+from train.simulate.trials import Array, Group, Mask, Trials
 
 
-@dataclass
-class Tipping:
+class Tipping(Group):
     """Which objects tip, and how.
 
     Attributes:
@@ -34,7 +32,7 @@ class Tipping:
     travel: Array
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Find the objects that tip.
 
     The object is modelled as a box twice as high as the contact: its moment of inertia
@@ -45,23 +43,23 @@ def stand(t: Trials, i: Index) -> None:
     mass = t.values["mass_kg"]
     foot = t.values["base_m"]
     height = t.values["height_m"]
-    tips = t.plan.calls["tipping"] & (mover.static > foot / (2.0 * height))
+    tips = mover.static > foot / (2.0 * height)
     force = mass * GRAVITY * foot / (2.0 * height)
     travel = height * np.arctan2(foot, 2.0 * height)
-    t.keep("tipping", Tipping, tips=tips, force=force, travel=travel)
+    t.add_state("tipping", Tipping, tips=tips, force=force, travel=travel)
     turned = mass * (foot * foot / (height * height) + 4.0) / 3.0
     mover.inertia = np.where(tips, turned, mover.inertia)
     mover.lies = np.where(tips, 0.5 * math.pi * height, mover.lies)
 
 
-def drag(t: Trials, i: Index) -> None:
+def drag(t: Trials) -> None:
     """Let only the lever of its weight hold an object that tips."""
     state = t.states["tipping"]
     mover = t.states["sliding"]
-    tips = pick(state.tips, i)
-    force = pick(state.force, i)
-    slide = pick(mover.slide, i)
-    mover.leans[i] = tips & (slide > 0.0)
-    mover.hold[i] = np.where(tips, force, pick(mover.hold, i))
-    leaning = force * (1.0 - slide / pick(state.travel, i))
-    mover.resist[i] = np.where(tips, leaning, pick(mover.resist, i))
+    tips = state.tips
+    force = state.force
+    slide = mover.slide
+    mover.leans = tips & (slide > 0.0)
+    mover.hold = np.where(tips, force, mover.hold)
+    leaning = force * (1.0 - slide / state.travel)
+    mover.resist = np.where(tips, leaning, mover.resist)

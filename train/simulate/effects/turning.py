@@ -10,63 +10,61 @@ forearm touch it.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from train.simulate.trials import Array, Index, Trials, pick
+from train.simulate.trials import Array, Group, Trials
 
 LEVER = 2.0 / 3.0
 """Moment of a disc's friction for each newton of it, as a part of its radius."""
-TRACES = {"turn_rad": "turned"}
 
 
-@dataclass
-class Turning:
-    """Radians for each metre of the contact's way, and radians turned so far; (n,)."""
+class Turning(Group):
+    """Radians for each metre of the contact's way, (n,)."""
 
     per_metre: Array
-    turned: Array
 
 
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Reduce friction and mass to those felt by an off-centre push."""
-    aside = pick(t.values["aside_m"], i)
-    radius = 0.5 * pick(t.values["foot_m"], i)
+    aside = t.values["aside_m"]
+    radius = 0.5 * t.values["foot_m"]
     lever = LEVER * radius
     mover = t.states["sliding"]
     easier = 1.0 / np.sqrt(1.0 + aside * aside / (lever * lever))
-    mover.static[i] = pick(mover.static, i) * easier
-    mover.kinetic[i] = pick(mover.kinetic, i) * easier
+    mover.static *= easier
+    mover.kinetic *= easier
     # A disc's own moment of inertia is m R^2 / 2.
-    heavier = 1.0 + 2.0 * aside * aside / (radius * radius)
-    mover.inertia[i] = pick(mover.inertia, i) / heavier
-    t.keep("turning", Turning).per_metre[i] = aside / (lever * lever + aside * aside)
+    mover.inertia /= 1.0 + 2.0 * aside * aside / (radius * radius)
+    per_metre = aside / (lever * lever + aside * aside)
+    t.add_state("turning", Turning, per_metre=per_metre)
 
 
-def pass_on(t: Trials, i: Index) -> None:
+def pass_on(t: Trials) -> None:
     """Move the image around the forearm with the face.
 
     A load between two columns is shared by them; a load beyond the window goes to its
     last column.
     """
-    state = t.states["turning"]
-    turned = pick(state.per_metre, i) * pick(t.states["sliding"].slide, i)
-    state.turned[i] = turned
-    columns = turned * (t.skin.cols / (2.0 * math.pi))
-    moving = (columns != 0.0).nonzero()[0]
-    if not moving.size:
+    turned = t.states["turning"].per_metre * t.states["sliding"].slide
+    t.contact.turned = turned
+    columns = turned * (t.scene.skin.cols / (2.0 * math.pi))
+    if not columns.any():
         return
-    further = np.floor(columns[moving])
-    part = columns[moving] - further
-    trials = np.arange(t.n)[i][moving]
-    last = len(t.columns) - 1
-    image = t.image.take(trials, -1)
+    further = np.floor(columns)
+    part = columns - further
+    image = t.touch.image
+    last = image.shape[1] - 1
     turned_image = np.zeros_like(image)
-    places = np.arange(len(moving))
+    places = np.arange(len(t))
     for beyond, share in ((0, 1.0 - part), (1, part)):
         shared = image * share
         for column in range(last + 1):
             to = np.clip(column + beyond + further, 0, last).astype(np.intp)
             turned_image[:, to, places] += shared[:, column]
-    t.image[:, :, trials] = turned_image
+    t.touch.image = turned_image
+
+
+def trace(t: Trials) -> dict[str, Array]:
+    """How far the face has turned."""
+    return {"turn_rad": t.contact.turned}

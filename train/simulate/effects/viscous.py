@@ -17,22 +17,19 @@ row holds that of the whole contact. The effects `relaxation` and `inertia` shar
 module.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from train.simulate.trials import Array, Index, Trials, pick
+from train.simulate.trials import Array, Group, PerRow, Trials
 
 
-@dataclass
-class Viscous:
+class Viscous(Group):
     """The Maxwell elements and dashpots.
 
     Attributes:
         loss_s, ratio, relax_s: (n,) T, r and tau.
-        kept, let_go, late, damped, gain: (n,) for the present step: e, r - s, s - e r,
-            T / h and 1 + s + T / h.
-        force, given, load: (rows, n) F, w and -L.
+        kept, let_go, late, damped: (n,) for the present step: e, r - s, s - e r and
+            T / h.
+        force, given: (rows, n) F and w.
     """
 
     loss_s: Array
@@ -42,65 +39,47 @@ class Viscous:
     let_go: Array
     late: Array
     damped: Array
-    gain: Array
-    force: Array
-    given: Array
-    load: Array
-
-    def set_step(self, i: Index, h: Array) -> None:
-        """Set the terms for a step of this length."""
-        ratio = pick(self.ratio, i)
-        damped = pick(self.loss_s, i) / h
-        part = h / pick(self.relax_s, i)
-        relaxes = ratio > 0.0
-        decay = np.where(relaxes, np.exp(-part), 0.0)
-        rise = np.where(relaxes, ratio * (-np.expm1(-part) / part), 0.0)
-        self.damped[i] = damped
-        self.kept[i] = decay
-        self.gain[i] = 1.0 + rise + damped
-        self.let_go[i] = ratio - rise
-        self.late[i] = rise - decay * ratio
-        self.bear_on(i)
-
-    def bear_on(self, i: Index) -> None:
-        """Set the load with which each row's next step begins."""
-        pushed = pick(self.given, i)
-        force = pick(self.force, i)
-        late = pick(self.late, i) + pick(self.damped, i)
-        self.load[:, i] = -(pick(self.kept, i) * pushed + late * force)
-
-    def move_on(self, i: Index, borne: Array) -> None:
-        """Update the state by a step's forces (rows, n of i).
-
-        Where no force is borne, the surface recovers by itself with gain F = L.
-        """
-        elastic = np.maximum((borne - pick(self.load, i)) / pick(self.gain, i), 0.0)
-        pushed = pick(self.kept, i) * pick(self.given, i)
-        pushed = pushed + pick(self.late, i) * pick(self.force, i)
-        self.given[:, i] = pushed + pick(self.let_go, i) * elastic
-        self.force[:, i] = elastic
-        self.bear_on(i)
+    force: PerRow
+    given: PerRow
 
 
-def begin(rows: int, n: int) -> Viscous:
-    """The state of n trials without an element or a dashpot."""
-    state = Viscous(*[*np.zeros((8, n)), *np.zeros((3, rows, n))])
-    state.relax_s[:] = state.gain[:] = 1.0
-    return state
-
-
-def stand(t: Trials, i: Index) -> None:
+def stand(t: Trials) -> None:
     """Begin without any; the effects that share this module add theirs next."""
-    t.states["viscous"] = begin(t.rows, t.n)
+    t.add_state("viscous", Viscous, relax_s=1.0)
 
 
-def tune(t: Trials, i: Index) -> None:
+def tune(t: Trials) -> None:
     """Set the law for steps of this length."""
-    t.states["viscous"].set_step(i, pick(t.h, i))
+    viscous = t.states["viscous"]
+    ratio = viscous.ratio
+    damped = viscous.loss_s / t.clock.h
+    part = t.clock.h / viscous.relax_s
+    relaxes = ratio > 0.0
+    decay = np.where(relaxes, np.exp(-part), 0.0)
+    rise = np.where(relaxes, ratio * (-np.expm1(-part) / part), 0.0)
+    viscous.damped = damped
+    viscous.kept = decay
+    viscous.let_go = ratio - rise
+    viscous.late = rise - decay * ratio
+    t.bed.gain = 1.0 + rise + damped
+    bear_on(t)
 
 
-def settle(t: Trials, i: Index) -> None:
-    """Update each row by the step's forces."""
-    upright = np.arange(t.n)[i][~t.plan.also("tilt", i)]
-    t.row_force[0, upright] = pick(t.loads[0], upright)
-    t.states["viscous"].move_on(i, pick(t.row_force, i))
+def bear_on(t: Trials) -> None:
+    """Set the load with which each row's next step begins."""
+    viscous = t.states["viscous"]
+    late = viscous.late + viscous.damped
+    t.bed.load = -(viscous.kept * viscous.given + late * viscous.force)
+
+
+def settle(t: Trials) -> None:
+    """Update each row by the step's forces.
+
+    Where no force is borne, the surface recovers by itself with gain F = -load.
+    """
+    viscous = t.states["viscous"]
+    elastic = np.maximum((t.bed.row_force - t.bed.load) / t.bed.gain, 0.0)
+    pushed = viscous.kept * viscous.given + viscous.late * viscous.force
+    viscous.given = pushed + viscous.let_go * elastic
+    viscous.force = elastic
+    bear_on(t)
