@@ -180,23 +180,21 @@ def run_physics(
     batch = begin(scene, specs, plan=plan)
     frames = frame_count(scene)
     log = _Log.of(batch, frames, images=images)
-    active = batch.everyone
+    active = starts = batch.everyone
     while len(active):
-        starting = active.clock.left == 0
-        if starting.any():
-            start_frames(active.only(starting))
+        if len(starts):
+            start_frames(starts)
         active.run(*STEP)
         active.clock.left -= 1
-        ending = active.clock.left == 0
-        if not ending.any():
-            continue
-        ends = active.only(ending)
-        ends.clock.frame += 1
-        # A frame ends at its own time: sums of steps would drift from it.
-        ends.clock.t = ends.clock.frame / scene.rate_hz
-        ends.run(*SAMPLE)
-        log.take(ends)
-        active = active.only(active.clock.frame < frames - 1)
+        ends = active.only(active.clock.left == 0)
+        if len(ends):
+            ends.clock.frame += 1
+            # A frame ends at its own time: sums of steps would drift from it.
+            ends.clock.t = ends.clock.frame / scene.rate_hz
+            ends.run(*SAMPLE)
+            log.take(ends)
+            active = active.only(active.clock.frame < frames - 1)
+        starts = ends.only(ends.clock.frame < frames - 1)
     lost = np.count_nonzero(batch.bed.lost)
     if lost:
         raise EdgeError(

@@ -352,6 +352,7 @@ class Trials:
         self.values = Gathered(batch.values, places)
         self.states = Gathered(batch.states, at)
         self._parts: dict[int, Trials | None] = {}
+        self._callers: dict[tuple[str, ...], list[tuple[Call, Trials | None]]] = {}
         self._gathered: RowSprings | None = None
 
     def __len__(self) -> int:
@@ -372,20 +373,31 @@ class Trials:
 
     def calls(self, *stages: str) -> Iterator[tuple[Call, "Trials"]]:
         """The hooks of stages, each with those of these trials that call for it."""
+        if stages not in self._callers:
+            self._callers[stages] = self._find_callers(stages)
+        for call, part in self._callers[stages]:
+            yield call, self if part is None else part
+
+    def _find_callers(
+        self, stages: tuple[str, ...]
+    ) -> list[tuple[Call, "Trials | None"]]:
+        """The hooks of stages that any of these trials call for, each with its part."""
+        callers = []
         for stage in stages:
             for call in self.batch.plan.stages[stage]:
-                callers = self._part(call.which)
-                if len(callers.places):
-                    yield call, callers
+                part = self._part(call.which)
+                if part is None or len(part):
+                    callers.append((call, part))
+        return callers
 
-    def _part(self, which: Mask) -> "Trials":
-        """Those of these trials that a mask (n,) of the plan names."""
+    def _part(self, which: Mask) -> "Trials | None":
+        """Those of these trials that a mask (n,) of the plan names; None for all, since
+        trials that held themselves would outlive their use."""
         key = id(which)
         if key not in self._parts:
             part = self.only(which[self.places])
             self._parts[key] = None if part is self else part
-        kept = self._parts[key]
-        return self if kept is None else kept
+        return self._parts[key]
 
     def run(self, *stages: str) -> None:
         """Run the hooks of stages."""
