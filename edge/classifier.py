@@ -15,7 +15,7 @@ from edge.events import Aside, Decided, Event, Onset, Release
 from edge.model.model import Decision, Model
 from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import frame_doubts
+from edge.touch.doubts import flags_of, frame_doubts
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -446,11 +446,6 @@ class Classifier:
             return False
         score = decisions[novelty.task].novelty
         return novelty.rate(point, score) <= self.novelty_rate
-
-
-def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
-    """The names of the doubts that hold."""
-    return tuple(flag for flag, holds in doubts.items() if holds)
 
 
 def _milliseconds_since(began: float) -> float:

@@ -287,7 +287,6 @@ class Choosing:
         """
         other_folds = self._other_folds if repeated else []
         grids = [grid for candidate in tried for grid in candidate.grids]
-        answers = partial(evaluate, jobs=self._jobs)
         total = fits(self._folds, nested)
         total += sum(fits(folds, False) for folds in other_folds)
         if self._groups is not None:
@@ -296,7 +295,7 @@ class Choosing:
         with bar(
             total=total, desc=what, unit=" fits", disable=not self._progress
         ) as progress:
-            answers = partial(answers, progress=progress.update)
+            answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
             trials = answers(vectors, self._folds, grids, nested=nested)
             others = [
                 answers(vectors, folds, grids, nested=False) for folds in other_folds

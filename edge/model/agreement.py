@@ -69,12 +69,20 @@ def factors_fit(
     pairs = list(zip(*factors.values(), strict=True))
     if sorted(pairs) != list(product(*ranges)):
         return False
-    # Labels that are made of their factors' labels, as `rigid-fixed` is, stand for
-    # these. Labels may have other names.
     first, second = (labels[factor] for factor in factors)
+    return _named_after(pairs, first, second, labels[task])
+
+
+def _named_after(
+    pairs: Sequence[tuple[int, int]],
+    first: Sequence[str],
+    second: Sequence[str],
+    names: tuple[str, ...],
+) -> bool:
+    """Whether names stand for their pairs of labels, where they are made of these, as
+    `rigid-fixed` is. Other names stand for any pair."""
     forward = [f"{first[a]}-{second[b]}" for a, b in pairs]
     backward = [f"{second[b]}-{first[a]}" for a, b in pairs]
     return all(
-        tuple(names) == labels[task] or set(names) != set(labels[task])
-        for names in (forward, backward)
+        tuple(made) == names or set(made) != set(names) for made in (forward, backward)
     )

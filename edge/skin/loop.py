@@ -168,7 +168,8 @@ class Loop:
         self.skin = skin
         self.joints = joints
         self.schedule = Schedule(skin.clock, skin.period_s)
-        self._lasts, self._stop = lasts_s, stop or Stop()
+        self._lasts = lasts_s
+        self._stop = stop or Stop()
 
     def frames(self) -> Iterator[Frame]:
         """Read until the time is over or a stop is asked for."""

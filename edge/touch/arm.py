@@ -262,7 +262,8 @@ def _moved(
 def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
     """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y,
     z."""
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
+    cr, cp, cy = map(math.cos, rpy)
+    sr, sp, sy = map(math.sin, rpy)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],

@@ -1,4 +1,4 @@
-"""What a feature is, and the three of the paper."""
+"""The record of a feature type, and the three features of the paper."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What is measured of each frame for the features of a model, and nothing else."""
+"""Measures of each frame that the features of a model need, and no others."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def features(names: Sequence[str]) -> tuple[Feature, ...]:
 
 
 class Measurer:
-    """What some features need of each frame of a skin.
+    """The measures of a skin's frames that some features need.
 
     Attributes:
         layout: the skin.
