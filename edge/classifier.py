@@ -422,7 +422,7 @@ class Classifier:
         return answers
 
     def _answer(self, blank: Decided, decision: Decision, unknown: bool) -> Decided:
-        """The model's answer; its confidence is in millionths."""
+        """The model's answer, with its confidence rounded to millionths."""
         confidence = decision.confidence
         doubts = {
             AS_TRAINED: decision.distances[0] == 0.0,

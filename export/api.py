@@ -20,9 +20,9 @@ from edge.touch.track import DEBOUNCE
 from edge.writing import write_whole
 from export import golden
 from export.graph import to_onnx
-from train.choose import TRIAL
 from train.dataset import DataSet
 from train.fitting import Fitted
+from train.groups import TRIAL
 from train.labels import NO_CONTACT
 from train.pipeline import ContactClassifier
 from train.report.summary import names

@@ -22,10 +22,11 @@ from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
 from edge.writing import check_writable
 from export.api import measure, save
-from train.choose import LEAVE_OUT, TRIAL
 from train.dataset import read
+from train.decision_points import MOST_TRIALS
 from train.feature_sets import SETS
-from train.fitting import MOST_TRIALS, Fitted, fit
+from train.fitting import Fitted, fit
+from train.groups import LEAVE_OUT, TRIAL
 from train.projection import KINDS
 from train.report.summary import summary
 from train.scaling import SCALINGS

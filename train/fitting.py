@@ -18,26 +18,17 @@ from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, candidates
-from train.choose import LEAVE_OUT, Choosing, Chosen, EarlySettings, kinds_of
+from train.choose import Choosing, Chosen
 from train.dataset import DataSet, Recordings, Untouched, load_trials, read
+from train.decision_points import MOST_TRIALS, usual_points
 from train.feature_sets import expand
+from train.groups import LEAVE_OUT, kinds_of
 from train.mix import mix
-from train.novelty import MOST_COMPONENTS
-from train.pipeline import Choice, ContactClassifier
+from train.pipeline import ContactClassifier
+from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
 from train.vectors import Labels
 
-STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
-"""Steps between decision points. The first one that keeps the weights below
-`LARGEST_BYTES` is taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s,
-at the same error (cody18, household)."""
-FIRST_S = 0.2
-"""The first decision point."""
-MOST_TRIALS = 2000
-"""With more trials early decisions take minutes to calibrate, so their decision points
-must be asked for."""
-LARGEST_BYTES = 1_150_000
-"""Bytes of weights with which a model stays below 1.2 MB."""
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
 more than this share of the remainder."""
@@ -169,59 +160,6 @@ class Loaded:
     dataset: DataSet
     windows: tuple[float, ...]
     notes: list[str]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """The settings that a fit has chosen.
-
-    Attributes:
-        chosen: {task: its settings}.
-        folds: (n,) of the accuracies.
-        without: [fold]{task: the choice made without the fold's trials}.
-        tried: the candidates that they were chosen among.
-        window_s: of the full decision.
-        notes: sentences that a user should read.
-        early: settings of earlier decision points; None where those of the full window
-            serve for all.
-    """
-
-    chosen: dict[str, Chosen]
-    folds: NDArray[np.int64]
-    without: list[dict[str, Choice]]
-    tried: Sequence[Candidate]
-    window_s: float
-    notes: list[str]
-    early: EarlySettings | None = None
-
-    @property
-    def choices(self) -> dict[str, Choice]:
-        """{task: its choice}."""
-        return {task: settled.choice for task, settled in self.chosen.items()}
-
-    @property
-    def tested(self) -> int:
-        """Number of trials that calibrate."""
-        return int((self.folds >= 0).sum())
-
-    def taken(self, *, folds: bool = False) -> set[str]:
-        """The names of the features that the settings take.
-
-        Args:
-            folds: count those chosen without each fold too.
-        """
-        settings: list[Mapping[str, Choice]] = [self.choices]
-        settings += self.without if folds else []
-        if self.early is not None:
-            early = self.early.settings
-            settings.append(early.choices)
-            settings += early.by_fold if folds else []
-        return {
-            name
-            for choices in settings
-            for choice in choices.values()
-            for name in choice.features
-        }
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
@@ -628,49 +566,17 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
 
 
 def _decision_points(
-    dataset: DataSet, settings: Settings, options: FitOptions, notes: list[str]
+    measured: DataSet, settings: Settings, options: FitOptions, notes: list[str]
 ) -> tuple[float, ...]:
-    """The decision points asked for, or the usual ones; none without calibration."""
-    if options.decision_points_s is not None:
-        if not options.decision_points_s:
-            notes.append(
-                "decisions carry no confidence, as the model has no decision points"
-            )
-        return tuple(options.decision_points_s)
-    tested = settings.tested
-    if tested < FEWEST:
+    """The decision points asked for, or the usual ones."""
+    asked_s = options.decision_points_s
+    if asked_s is None:
+        return usual_points(measured, settings, options.samples, notes)
+    if not asked_s:
         notes.append(
-            "decisions carry no confidence and none is early: calibration needs at "
-            f"least {FEWEST} trials, not {tested}"
+            "decisions carry no confidence, as the model has no decision points"
         )
-        return ()
-    if tested > MOST_TRIALS:
-        notes.append(
-            f"no decision points before the full window: {tested} trials are more than "
-            f"the {MOST_TRIALS} for which they are made by default; --decision-points "
-            "asks for them"
-        )
-        return (settings.window_s,)
-    dataset = dataset.of(sorted(settings.taken()))
-    sizes = _Sizes.of(dataset, settings, options.samples)
-    points: list[float] = []
-    for every_s in STEPS_S:
-        # A long window has as many decision points as the usual one.
-        step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
-        points = _rising(step_s, settings.window_s)
-        if sizes.total(len(points)) <= LARGEST_BYTES:
-            if every_s > STEPS_S[0]:
-                notes.append(
-                    f"{len(points)} decision points, one every {step_s:g} s, so that "
-                    "the model stays below 1.2 MB; --decision-points asks for more"
-                )
-            return tuple(points)
-    megabytes = sizes.total(len(points)) / 1e6
-    notes.append(
-        "no decision points before the full window: they would make the model about "
-        f"{megabytes:.1f} MB; --decision-points asks for them"
-    )
-    return (settings.window_s,)
+    return tuple(asked_s)
 
 
 def _has_early_points(settings: Settings, options: FitOptions) -> bool:
@@ -678,65 +584,3 @@ def _has_early_points(settings: Settings, options: FitOptions) -> bool:
     if options.decision_points_s is not None:
         return len(options.decision_points_s) > 1
     return FEWEST <= settings.tested <= MOST_TRIALS
-
-
-@dataclass(frozen=True)
-class _Sizes:
-    """Bytes of a model's constants.
-
-    Attributes:
-        once: of those that all decision points share.
-        early: of each decision point before the full window.
-        full: of the full window.
-    """
-
-    once: int
-    early: int
-    full: int
-
-    @classmethod
-    def of(cls, dataset: DataSet, settings: Settings, samples: int) -> _Sizes:
-        """The sizes of the model that some settings give."""
-        columns = sum(dataset.widths(samples))
-        trials = len(dataset.trials)
-        novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
-        novelty += 8 * columns + 8 * trials
-        early = settings.choices
-        if settings.early is not None:
-            early = {**early, **settings.early.settings.choices}
-        return cls(
-            once=2 * MOST_COMPONENTS * columns,
-            early=novelty + _bytes_of(early, dataset, samples),
-            full=novelty + _bytes_of(settings.choices, dataset, samples),
-        )
-
-    def total(self, points: int) -> int:
-        """Bytes of a model with so many decision points."""
-        return self.once + (points - 1) * self.early + self.full
-
-
-def _bytes_of(choices: Mapping[str, Choice], dataset: DataSet, samples: int) -> int:
-    """Bytes of the constants that project and compare at a decision point.
-
-    A column has a mean, a gain, and a weight for each coordinate; a trial its
-    coordinates and their length.
-    """
-    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-    trials = len(dataset.trials)
-    size = 0
-    for task, choice in choices.items():
-        columns = sum(widths[name] for name in choice.features)
-        classes = len(set(dataset.labels(task).tolist()))
-        components = min(choice.components, 2 * classes, trials)
-        size += columns * (16 + 4 * components) + trials * (8 + 4 * components)
-    return size
-
-
-def _rising(step_s: float, window_s: float) -> list[float]:
-    """Decision points one every `step_s`, up to the window."""
-    points = []
-    point_s = round(max(FIRST_S, step_s), 6)
-    while point_s < window_s:
-        points.append(point_s)
-        point_s = round(max(FIRST_S, step_s) + len(points) * step_s, 6)
-    return [*points, window_s]

@@ -17,16 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from train.choose import (
-    FEWEST_GROUPS,
-    TRIAL,
-    Chosen,
-    decided_together,
-    fold_count,
-    promised,
-)
+from train.choose import Chosen, decided_together, promised
 from train.dataset import DataSet
 from train.evaluate import AnswerTable, evaluate, finest, group_folds, stratified_folds
+from train.groups import FEWEST_GROUPS, TRIAL, fold_count
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid

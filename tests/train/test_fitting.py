@@ -11,13 +11,9 @@ from edge.saving import save
 from train.dataset import load_trials
 from train.evaluate import VARIANCE, stratified_folds
 from train.fitting import (
-    FitOptions,
-    Settings,
-    _decision_points,
     _leaks,
     windows_of,
 )
-from train.pipeline import Choice
 
 
 @pytest.fixture(scope="module")
@@ -135,45 +131,6 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
     assert train.fit.__module__ == "train.fitting"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = train.nothing
-
-
-@pytest.mark.parametrize(
-    ("trials", "objects", "components", "points"),
-    [
-        (140, 18, 99, (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)),
-        (1400, 18, 17, (0.3, 0.6, 0.9, 1.2)),
-        (600, 68, 67, (0.3, 0.6, 0.9, 1.2)),
-        # no more coordinates than trials
-        (120, 100, 999, (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)),
-        (2000, 90, 89, (1.2,)),
-    ],
-)
-def test_a_model_has_the_decision_points_that_keep_it_small(
-    trials, objects, components, points
-):
-    labels = np.array([f"object {i % objects}" for i in range(trials)])
-    data = SimpleNamespace(
-        trials=range(trials),
-        names=("max_force",),
-        widths=lambda samples: (150,),
-        labels=lambda task: labels,
-    )
-    data.of = lambda names: data
-    choice = Choice("IV", components, 3, features=("max_force",))
-    settings = Settings(
-        chosen={"object": SimpleNamespace(choice=choice)},
-        folds=np.zeros(trials),
-        without=[],
-        tried=(),
-        window_s=1.2,
-        notes=[],
-    )
-    notes: list[str] = []
-    found = _decision_points(data, settings, FitOptions(), notes)
-    assert found == pytest.approx(points)
-    assert [note.split(" decision points")[0] for note in notes] == (
-        [] if len(points) == 11 else ["no" if len(points) == 1 else str(len(points))]
-    )
 
 
 def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are_two_warnings():

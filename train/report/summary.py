@@ -11,10 +11,11 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.errors import printable
 from edge.touch import measures
-from train.choose import TRIAL, Chosen
+from train.choose import Chosen
 from train.dataset import DataSet
 from train.feature_sets import SETS, expand, moves
 from train.fitting import Fitted
+from train.groups import TRIAL
 from train.labels import NO_CONTACT
 from train.pipeline import Choice, squared_distances
 from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS

@@ -7,11 +7,12 @@ from typing import Any
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.candidates import candidates
-from train.choose import TRIAL, Chosen, kinds_of
+from train.choose import Chosen
 from train.dataset import DataSet, Recordings, load_trials
 from train.evaluate import Result
 from train.feature_sets import expand
 from train.fitting import FitOptions, fit, trials_of, windows_of
+from train.groups import TRIAL, kinds_of
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.model.stopping import Stopping, StoppingRule
-from train.choose import TRIAL, groupable
 from train.dataset import DataSet
 from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
 from train.fitting import fit
+from train.groups import TRIAL, groupable
 from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates

@@ -1,0 +1,138 @@
+"""The trials that are left out together to choose settings: folds of trials, and entire
+groups of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.recording import Recording
+from train.agreement import families
+from train.dataset import DataSet
+from train.evaluate import FOLDS, SEED, group_folds, stratified_folds
+from train.search import SearchGrid
+from train.vectors import Labels
+
+FEWEST_GROUPS = 3
+"""Objects that a class needs before entire objects can be left out."""
+LEAVE_OUT = "object"
+KIND = "kind"
+"""Left out in place of an object where `kinds_of` names the kinds."""
+TRIAL = "trial"
+QUICK_FOLDS = 5
+GROUP_FOLDS = 20
+FEW = 300
+MANY = 2000
+"""Most folds of groups with at most `FEW` trials; with more trials there are ten folds,
+and five with more than `MANY`: four fifths of so many trials teach nearly as much as
+all."""
+REPEATS = 3
+FEW_TO_REPEAT = 200
+"""How often the trials are divided into folds where there are fewer than
+`FEW_TO_REPEAT`. The fits of more trials take longer, and their choice depends less on
+the division."""
+UNSEEN_SHRINKAGE = 0.1
+"""Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
+differences that are small beside the features' spread, which do not carry over to new
+objects."""
+
+
+def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
+    """(n,) kind of thing in each, where all are simulated and some kind has several
+    objects.
+
+    A `[[family]]` of a scene names its objects by the kind and a number. None for all
+    other recordings.
+    """
+    if any("simulation" not in recording.meta for recording in recordings):
+        return None
+    objects = [recording.labels.get(LEAVE_OUT, "") for recording in recordings]
+    kinds = [re.sub(r" \d+$", "", name) for name in objects]
+    return np.array(kinds) if len(set(kinds)) < len(set(objects)) else None
+
+
+def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
+    """Whether every class has enough groups that entire groups can be left out."""
+    classes = set(labels.tolist())
+    return len(classes) > 1 and all(
+        len(set(groups[labels == label].tolist())) >= FEWEST_GROUPS for label in classes
+    )
+
+
+def fold_count(trials: int, quick: bool = False) -> int:
+    """Folds for so many trials."""
+    return QUICK_FOLDS if quick or trials > MANY else FOLDS
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Trials that are left out together.
+
+    Attributes:
+        name: of the label that tells the groups.
+        members: (n,) the group of each trial.
+        tasks: those for which entire groups are left out.
+        folds: (n,) of entire groups.
+    """
+
+    name: str
+    members: NDArray[np.str_]
+    tasks: frozenset[str]
+    folds: NDArray[np.int64]
+
+    def count(self, labels: NDArray[np.str_]) -> int:
+        """Number of groups among the trials that have a label (n,)."""
+        return len(set(self.members[labels != ""].tolist()))
+
+    def unseen(self, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
+        """The candidates for groups that are left out: with more shrinkage, and without
+        discriminants of these groups."""
+        unseen = []
+        for grid in grids:
+            if self.name not in grid.targets:
+                enough = [s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE]
+                unseen.append(replace(grid, shrinkages=tuple(enough)))
+        return unseen
+
+    def labels(self, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
+        """The labels that answers to left-out groups need: of all tasks where a grid
+        has targets, else of those with groups and of the tasks that agree with them."""
+        if any(grid.targets for grid in grids):
+            return y
+        together = [family for family in families(y) if self.tasks & {*family}]
+        tasks = self.tasks.union(*together)
+        return {task: y[task] for task in y if task in tasks}
+
+
+def groups_of(
+    dataset: DataSet, y: Labels, leave_out: str, quick: bool
+) -> Groups | None:
+    """The kinds of things, or else the groups of a label, where some task has enough of
+    them."""
+    if leave_out == TRIAL:
+        return None
+    members_of = {leave_out: dataset.groups(leave_out)}
+    if leave_out == LEAVE_OUT:
+        kinds = kinds_of([trial.recording for trial in dataset.trials])
+        members_of = {KIND: kinds, **members_of}
+    for name, members in members_of.items():
+        if members is None:
+            continue
+        tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
+        if tasks:
+            few = len(members) <= FEW and not quick
+            count = GROUP_FOLDS if few else fold_count(len(members), quick)
+            folds = group_folds(members, count)
+            return Groups(name, members, frozenset(tasks), folds)
+    return None
+
+
+def divisions(labels: NDArray[np.str_], quick: bool) -> list[NDArray[np.int64]]:
+    """(n,) folds of the trials; several divisions where there are few trials."""
+    count = fold_count(len(labels), quick)
+    repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
+    return [stratified_folds(labels, count, SEED + i) for i in range(repeats)]
