@@ -185,6 +185,8 @@ def test_a_damaged_recording_is_named_and_left_out(folder_page):
 def test_the_last_action_is_undone(folder_page, tmp_path, action):
     before = (tmp_path / "a.npz").read_bytes()
     folder_page._act({"do": action, "file": "a.npz", "labels": {"object": "x"}})
+    path = tmp_path / "a.npz"
+    assert not path.exists() or edge.load(path).labels["object"] == "x"
     folder_page._act({"do": "undo"})
     assert (tmp_path / "a.npz").read_bytes() == before
     assert "a.npz" in folder_page._trials

@@ -206,8 +206,14 @@ def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
         ([], "give --label TASK=LABEL"),
         (["--web", "127.0.0.1:0", "--out", "one.npz"], "give --label TASK=LABEL"),
         (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
-        (["--label", "a=b", "--out", "a" * 300 + ".npz"], "File name too long"),
-        (["--label", "a=b", "--out", "a" * 300], "File name too long"),
+        (
+            ["--label", "a=b", "--out", "a" * 300 + ".npz"],
+            "cannot be written: File name too long",
+        ),
+        (
+            ["--label", "a=b", "--out", "a" * 300],
+            "cannot be written: File name too long",
+        ),
         (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
     ],
 )

@@ -72,44 +72,73 @@ def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path)
     assert Model(tmp_path / "taught" / "model.onnx").info.trials[-1] == r"c\udcff"
 
 
-def test_a_new_object_is_taught_and_known_again_in_the_same_and_a_further_model(
-    teach, edge, exported, make_touch, tmp_path
-):
-    names = ("cup 0", "cup 1", "cup 2", "mug")
-    recordings = [tmp_path / f"{name}.npz" for name in names]
-    for seed, path in enumerate(recordings):
+@pytest.fixture
+def touches(make_touch, tmp_path):
+    """Recordings of three touches of a cup and of one of a mug, both soft and
+    movable."""
+    paths = [tmp_path / f"{name}.npz" for name in ("cup 0", "cup 1", "cup 2", "mug")]
+    for seed, path in enumerate(paths):
         labels = {"category": "soft-movable", "object": path.stem.split()[0]}
         touch = make_touch(seed=70 + seed)
         save(path, labelled(replace(touch, frames=touch.frames // 3 * 4), **labels))
-    status, lines, messages = teach("--new-labels", *recordings[:3])
+    return paths
+
+
+@pytest.fixture
+def with_cup(teach, touches, tmp_path):
+    """The path of a model that was taught the cup."""
+    assert teach("--new-labels", *touches[:3])[0] == 0
+    return tmp_path / "taught" / "model.onnx"
+
+
+@pytest.fixture
+def with_mug(edge, with_cup, touches, tmp_path):
+    """The path of the same that was then taught the mug."""
+    path = tmp_path / "again" / "model.onnx"
+    given = ["--out", path.parent, "--new-labels", touches[3]]
+    assert edge("teach", "--model", with_cup, *given)[0] == 0
+    return path
+
+
+def test_new_labels_are_counted_and_named(teach, touches):
+    status, lines, messages = teach("--new-labels", *touches[:3])
     assert status == 0
     assert of_tasks(lines) == {"category": 3, "object": 3}
     new = {"category": {"soft-movable": 3}, "object": {"cup": 3}}
     assert of_tasks(lines, "new_labels") == new
     assert "object: 3 trials of the new label 'cup'\n" in messages
     assert "'soft-movable'; did you mean 'soft-fixed'?" not in messages
-    model = tmp_path / "taught" / "model.onnx"
-    before = Model(exported / "model.onnx")
-    after = Model(model)
-    for task, labels in new.items():
-        known = before.info.tasks[task].labels
-        assert after.info.tasks[task].labels == (*known, *labels)
-    for path in recordings[:3]:
-        _, series = first_series(load(path), after)
-        decision = after.decide(after.info.vector(series))["object"]
+
+
+def test_new_labels_stand_behind_the_known_ones(exported, with_cup):
+    before = Model(exported / "model.onnx").info.tasks
+    after = Model(with_cup).info.tasks
+    assert after["category"].labels == (*before["category"].labels, "soft-movable")
+    assert after["object"].labels == (*before["object"].labels, "cup")
+
+
+def test_labels_can_be_added_again(with_mug):
+    assert Model(with_mug).info.tasks["object"].labels[-2:] == ("cup", "mug")
+
+
+def test_a_new_object_is_known_again(with_cup, touches):
+    model = Model(with_cup)
+    for path in touches[:3]:
+        _, series = first_series(load(path), model)
+        decision = model.decide(model.info.vector(series))["object"]
         assert decision.label == "cup"
         assert len(decision.scores) == 5
-    again = tmp_path / "again" / "model.onnx"
-    given = ["--out", again.parent, "--new-labels", recordings[3]]
-    assert edge("teach", "--model", model, *given)[0] == 0
-    assert Model(again).info.tasks["object"].labels[-2:] == ("cup", "mug")
-    for path in (model, again):
-        golden = path.with_name("golden.npz")
-        assert edge("verify", "--model", path, "--golden", golden)[0] == 0
-        assert edge("explain", path, recordings[0])[0] == 0
-        _, lines, _ = edge("run", "--model", path, "--fake", recordings[0])
-        assert decided(lines, "task") == ["category", "object"]
-        assert decided(lines, "label")[1] == "cup"
+
+
+@pytest.mark.parametrize("name", ["with_cup", "with_mug"])
+def test_every_command_takes_a_model_with_new_labels(name, edge, touches, request):
+    path = request.getfixturevalue(name)
+    golden = path.with_name("golden.npz")
+    assert edge("verify", "--model", path, "--golden", golden)[0] == 0
+    assert edge("explain", path, touches[0])[0] == 0
+    _, lines, _ = edge("run", "--model", path, "--fake", touches[0])
+    assert decided(lines, "task") == ["category", "object"]
+    assert decided(lines, "label")[1] == "cup"
 
 
 def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_path):
@@ -129,8 +158,14 @@ def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_
             lambda t: labelled(t, object="sotf 1"),
             "label it, or teach it with --new-labels; did you mean 'soft 1'?",
         ),
-        (lambda t: replace(t, frames=0 * t.frames), "holds no contact; leave it out"),
-        (everywhere, "lies far outside the trials that the model was fitted on"),
+        (
+            lambda t: replace(t, frames=0 * t.frames),
+            "odd.npz: holds no contact; leave it out",
+        ),
+        (
+            everywhere,
+            "odd.npz: lies far outside the trials that the model was fitted on",
+        ),
     ],
 )
 def test_what_cannot_be_taught_is_one_sentence_and_writes_nothing(
