@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -172,7 +173,7 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     stages = {
         "region": timed(
             lambda image: largest_region(image, limit, wraps=layout.wraps),
-            (counts * rounds)[:rounds],
+            islice(cycle(counts), rounds),
         ),
         "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
         "features": timed(lambda _: info.vector(series), calls),

@@ -167,12 +167,15 @@ def delete(paths: Sequence[Path]) -> None:
     """
     for folder in sorted({path.parent for path in paths}):
         with refusing(f"{folder}: its recordings cannot be deleted"):
+            of_folder = [path for path in paths if path.parent == folder]
+            # What cannot be deleted takes no former change away.
+            for path in of_folder:
+                path.lstat()
             shutil.rmtree(folder / DELETED, ignore_errors=True)
             (folder / DELETED).mkdir()
             (folder / UNDO).unlink(missing_ok=True)
-            for path in paths:
-                if path.parent == folder:
-                    path.rename(folder / DELETED / path.name)
+            for path in of_folder:
+                path.rename(folder / DELETED / path.name)
 
 
 def undo(data: Sequence[str], output: Output) -> int:
@@ -274,10 +277,10 @@ def _agreed(arguments: argparse.Namespace, output: Output, count: int) -> bool:
         return True
     if output.as_json or not sys.stdin.isatty():
         raise InputError(f"{recordings} would change, as shown; add --yes to do it")
-    agreed = input(f"Change {recordings}? [y/N] ").lower() == "y"
-    if not agreed:
-        output.text("nothing is changed")
-    return agreed
+    if input(f"Change {recordings}? [y/N] ").lower() == "y":
+        return True
+    output.text("nothing is changed")
+    return False
 
 
 def _text(labels: Mapping[str, str]) -> str:

@@ -126,8 +126,8 @@ class Trials:
             self._saved = contact
             self._frames = list(self._before)
         over = contact is None or contact.ended
-        lasts_s = math.inf if self._saved is None else frame.t - self._saved.onset_s
-        return self.rest() if over or lasts_s >= self._length else None
+        age_s = math.inf if self._saved is None else frame.t - self._saved.onset_s
+        return self.rest() if over or age_s >= self._length else None
 
     @property
     def under_way(self) -> bool:

@@ -230,8 +230,9 @@ def within_reach(graph: Graph, task: str, z: Floats) -> NDArray[np.bool_]:
     `train.projection.coordinate_bits`.
     """
     nodes = graph.path(coordinates_of(graph, task))
-    *_, clip = (node for node in nodes if node.operator == "Clip")
-    limits = [_value(graph, clip.inputs[2], point) for point in range(len(z))]
+    clips = [node for node in nodes if node.operator == "Clip"]
+    highest = clips[-1].inputs[2]
+    limits = [_value(graph, highest, point) for point in range(len(z))]
     longest = 0.5 * np.reshape(limits, (len(z), 1))
     lengths = (z**2).sum(axis=2)
     return np.asarray((lengths <= longest**2).all(axis=0))

@@ -250,14 +250,14 @@ class WebServer:
 
     async def _stream(self, reader: StreamReader, writer: StreamWriter) -> None:
         """Send a browser every new picture until it goes."""
-        sent = None
+        former = None
         while not reader.at_eof():
             self._asked_at = time.monotonic()
             latest = self._picture
-            if latest is not sent:
+            if latest is not former:
                 data = json.dumps(latest, allow_nan=False, separators=(",", ":"))
                 await _send(writer, f"data: {data}\n\n".encode())
-                sent = latest
+                former = latest
             await asyncio.sleep(PICTURE_S / 2)
 
 

@@ -65,11 +65,11 @@ def against(note):
         for place in np.ndindex(seconds.shape):
             function = functions[place[1]]
             seconds[place] = timeit.timeit(function, number=calls, timer=timer) / calls
-        *medians, mine = np.median(seconds, axis=0)
+        medians = np.median(seconds, axis=0)
         ratios = np.median(seconds[:, -1:] / seconds, axis=0)
         for i, (name, (_, most)) in enumerate(rivals.items()):
             bound = "-" if most is None else f"at most {most:.3g}"
-            note(name, ratios[i], bound, mine, medians[i])
-        return mine
+            note(name, ratios[i], bound, medians[-1], medians[i])
+        return medians[-1]
 
     return run

@@ -96,12 +96,12 @@ def measured(frames, shear, force, moved_m):
     onset = int(np.argmax(frames.max(axis=(1, 2)) > 60))
     window = slice(onset + round(FROM_S * RATE_HZ), onset + round(TO_S * RATE_HZ))
     counts = frames[window]
-    along, around = np.moveaxis(shear[window].astype(float), -1, 0)
+    pulls = shear[window].astype(float)
     areas = (counts > THRESHOLD_COUNTS).sum(axis=(1, 2))
     return {
         "total force, N": force[window].mean(),
-        "pull along, N": along.sum(axis=(1, 2)).mean() / 1e3,
-        "shear around, N": np.abs(around).sum(axis=(1, 2)).mean() / 1e3,
+        "pull along, N": pulls[..., 0].sum(axis=(1, 2)).mean() / 1e3,
+        "shear around, N": np.abs(pulls[..., 1]).sum(axis=(1, 2)).mean() / 1e3,
         "peak taxel, N": counts.max(axis=(1, 2)).mean() / 1e3,
         "area, taxels": areas[areas > 0].mean(),
         "motion, mm": 1e3 * moved_m[window.stop],

@@ -32,8 +32,8 @@ RATE_DEG_S = 20.0
 LEAD_S = 0.3
 TOUCH_S = 1.8
 RATE_HZ = 100
-G = 9.81
 """Seconds before the arm meets a rigid thing, and after that at the usual speed."""
+G_M_S2 = 9.81
 PLACE_M = 0.10
 COUNTS_PER_NEWTON = 1000.0
 THRESHOLD_COUNTS = 40
@@ -253,7 +253,9 @@ def model_of(touch):
         "pad_n_m": k,
         "pad_loss": PAD_LOSS_S * k,
         "pad_kg": PAD_KG,
-        "gravity": joined((*(G * math.sin(slope) * ahead[:2]), -G * math.cos(slope))),
+        "gravity": joined(
+            (*(G_M_S2 * math.sin(slope) * ahead[:2]), -G_M_S2 * math.cos(slope))
+        ),
         "contact": RIGID,
         "dimensions": 3,
         "turn_rad": heading + touch.yaw_rad,
@@ -273,9 +275,7 @@ def model_of(touch):
     return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
 
 
-def simulate(
-    touch,
-):
+def simulate(touch):
     """One touch, as the board would have recorded it.
 
     Returns:

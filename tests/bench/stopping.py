@@ -102,8 +102,9 @@ def extra_trees(X, labels, folds):
     sure = once_certain(shares.max(axis=2), right, THRESHOLDS)
     evidence = np.log(np.maximum(shares, 1e-3)).cumsum(axis=0)
     right = classes[evidence.argmax(axis=2)] == labels
-    second, first = np.moveaxis(np.sort(evidence)[..., -2:], -1, 0)
-    return sure, once_certain(first - second, right, MARGINS)
+    ordered = np.sort(evidence, axis=2)
+    lead = ordered[..., -1] - ordered[..., -2]
+    return sure, once_certain(lead, right, MARGINS)
 
 
 def halts(known, new, waiting):

@@ -3,42 +3,67 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from edge.classifier import Classifier
 from edge.events import Decided
 from edge.model.model import Model
 
 
-def test_a_stream_without_contact_is_decided_at_its_end_where_training_had_such_recordings(
-    exported, make_touch
-):
+@pytest.fixture
+def model(exported):
+    """A model whose training had recordings without contact, of the object "none"."""
     model = Model(exported / "model.onnx")
-    touch = make_touch()
-    quiet = replace(touch, frames=np.zeros_like(touch.frames))
-    assert list(Classifier(model).classify(quiet)) == []
     model.info.tasks["object"] = replace(model.info.tasks["object"], no_contact="none")
-    (said,) = Classifier(model).classify(quiet)
-    assert said.task == "object"
-    assert said.label == "none"
-    assert said.confidence == 1.0
-    assert said.window_s == 0.0
-    assert said.onset_s == quiet.t[-1]
-    assert said.flags == ("no_contact",)
-    lacking = replace(quiet, valid=np.arange(384).reshape(16, 24) > 0)
-    (said,) = Classifier(model).classify(lacking)
-    assert said.flags == ("no_contact", "missing_taxels")
-    assert said.strongest == 0.0
-    weak = quiet.frames.copy()
-    weak[30, 4, 5] = (model.info.layout.threshold_counts + model.info.layout.onset) // 2
-    (said,) = Classifier(model).classify(replace(quiet, frames=weak))
-    assert said.flags == ("no_contact", "near_contact")
-    assert (
-        said.to_dict()["strongest"]
-        == round(weak.max() / model.info.layout.onset, 3)
-        < 1.0
-    )
-    events = Classifier(model).classify(touch)
+    return model
+
+
+@pytest.fixture
+def still(make_touch):
+    """A recording without contact."""
+    touch = make_touch()
+    return replace(touch, frames=np.zeros_like(touch.frames))
+
+
+def test_a_stream_without_contact_is_decided_at_its_end(model, still):
+    (decision,) = Classifier(model).classify(still)
+    assert decision.task == "object"
+    assert decision.label == "none"
+    assert decision.confidence == 1.0
+    assert decision.window_s == 0.0
+    assert decision.onset_s == still.t[-1]
+    assert decision.flags == ("no_contact",)
+
+
+def test_it_is_not_decided_where_training_had_no_such_recordings(exported, still):
+    model = Model(exported / "model.onnx")
+    assert list(Classifier(model).classify(still)) == []
+
+
+def test_a_taxel_that_cannot_be_read_is_flagged(model, still):
+    lacking = replace(still, valid=np.arange(384).reshape(16, 24) > 0)
+    (decision,) = Classifier(model).classify(lacking)
+    assert decision.flags == ("no_contact", "missing_taxels")
+    assert decision.strongest == 0.0
+
+
+def test_a_touch_too_weak_to_be_a_contact_is_flagged(model, still):
+    layout = model.info.layout
+    weak = still.frames.copy()
+    weak[30, 4, 5] = (layout.threshold_counts + layout.onset) // 2
+    (decision,) = Classifier(model).classify(replace(still, frames=weak))
+    assert decision.flags == ("no_contact", "near_contact")
+    strongest = decision.to_dict()["strongest"]
+    assert strongest == round(weak.max() / layout.onset, 3)
+    assert strongest < 1.0
+
+
+def test_a_contact_is_decided_as_ever(model, make_touch):
+    events = Classifier(model).classify(make_touch())
     decided = [event for event in events if isinstance(event, Decided)]
     assert [event.task for event in decided] == ["category", "object"]
     assert all(event.label != "none" for event in decided)
-    assert Classifier(model).finish() == []  # no frame at all says nothing
+
+
+def test_no_frame_at_all_says_nothing(model):
+    assert Classifier(model).finish() == []

@@ -84,11 +84,7 @@ def coordinates(vectors, p, components):
     return projected(vectors, p).units[:, :components]
 
 
-def unrounded(
-    vectors,
-    mean,
-    weights,
-):
+def unrounded(vectors, mean, weights):
     """(n, c) whole numbers proportional to (x - mean) @ weights, without any
     rounding."""
     bit = smallest_bit(np.concatenate([vectors.ravel(), mean]))

@@ -240,14 +240,7 @@ def few_error(n, classes, same):
     return ours.wrong(np.concatenate([X[:5], features(3, 1)]))
 
 
-def answers(
-    name,
-    error,
-    hazard,
-    around,
-    ladder=None,
-    usual=None,
-):
+def answers(name, error, hazard, around, ladder=None, usual=None):
     """A row whose answers whole numbers judge."""
     around = around | {"seed": SEEDS} if "seed" in hazard[0] else around
     key = f"neighbours: {name}"

@@ -194,6 +194,16 @@ def test_the_last_action_is_undone(folder_page, tmp_path, action):
         folder_page._act({"do": "undo"})
 
 
+def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path):
+    before = (tmp_path / "a.npz").read_bytes()
+    folder_page._act({"do": "relabel", "file": "a.npz", "labels": {"object": "x"}})
+    (tmp_path / "b.npz").unlink()
+    with pytest.raises(InputError, match="cannot be deleted: No such file"):
+        folder_page._act({"do": "delete", "file": "b.npz"})
+    folder_page._act({"do": "undo"})
+    assert (tmp_path / "a.npz").read_bytes() == before
+
+
 def test_a_recording_of_several_contacts_is_relabelled_no_more_than_by_label(
     folder_page, tmp_path
 ):

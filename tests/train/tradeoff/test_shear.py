@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.train.tradeoff.made import chosen
+from tests.train.tradeoff.examples import chosen
 from train.tradeoff import shear
 from train.tradeoff.shear import KNOWN, UNMET, Answers, Compared
 from train.tradeoff.wires import microcontroller, waited_s

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.browser import chromium
-from tests.train.tradeoff.made import chosen, measured
+from tests.train.tradeoff.examples import chosen, measured
 from train.evaluate import Promise
 from train.report.page import write
 from train.report.section import Section

@@ -19,7 +19,7 @@ from edge.touch.layout import SkinLayout
 from export.__main__ import main
 from tests import browser
 from tests.conftest import export, rows_of, save_touches
-from tests.train.tradeoff.made import chosen, measured
+from tests.train.tradeoff.examples import chosen, measured
 from train.commands.tradeoff import cost
 from train.dataset import read
 from train.rules import Course
