@@ -16,7 +16,7 @@ from edge.early import stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
-from edge.model.verify import first_series, verify
+from edge.model.verify import first_series, renew, verify
 from edge.saving import save
 from edge.tools.teaching import taught
 from edge.touch.features import FEATURES
@@ -381,7 +381,7 @@ def add_trials(sequential, more, labels):
 
 @pytest.mark.parametrize("new", [False, True])
 def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
-    early, tmp_path, new
+    early, folder, tmp_path, new
 ):
     """Two tasks; two labels of the further trials are new.
 
@@ -413,3 +413,38 @@ def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
         expected = oracle.run(vectors, point)
         for key, values in model.run(vectors, point).items():
             assert (values == expected[key]).all(), key
+
+    assert model.info.rows == 48
+    assert model.info.taught == 3
+    tasks = model.info.tasks
+    assert {task: (tasks[task].labels[2:], tasks[task].k) for task in tasks} == (
+        {"t": (("c", "d"), 2), "u": (("z",), 1)}
+        if new
+        else {"t": (("c",), 3), "u": ((), 1)}
+    )
+    renew(folder / "out" / "golden.npz", tmp_path / "golden.npz", model, more)
+    golden = np.load(tmp_path / "golden.npz")
+    assert (golden["decision_point_vectors"][:, -3:] == more).all()
+    assert (golden["vectors"][-3:] == more[-1]).all()
+    with pytest.raises(
+        InputError, match=r"taught 3 trials after its error rates were certified"
+    ):
+        stopping_rules(model, 0.2)
+
+
+def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):
+    rng = np.random.default_rng(4)
+    X = rng.normal(size=(3, 60, early.info.width))
+    labels = np.repeat(["a", "b", "c"], 20)
+    choices = {"t": Choice("none", 4, 3)}
+    path = tmp_path / "model.onnx"
+    sequential, _ = fitted_model(path, early.info, choices, X, {"t": labels})
+    vectors = rng.normal(size=(9, early.info.width))
+    vectors *= 10.0 ** np.arange(-2, 7)[:, None]
+    scores = sequential.space_.scores(np.stack([vectors] * 3))
+    assert scores.min() > 0.0
+    for engine in ("onnxruntime", "numpy"):
+        loaded = Model(path, engine)
+        for point, expected in enumerate(scores.tolist()):
+            seen = [float(loaded.run(v[None], point)["novelty"][0]) for v in vectors]
+            assert seen == expected
