@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.errors import InputError, about
 from edge.files import parsing
 from edge.recording import Recording
 from edge.saving import save
@@ -35,15 +36,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Cut and write."""
     raw = read(arguments.data, progress=True)
-    count = 0
+    contacts: dict[Path, Recording] = {}
     pairs = list(zip(raw.paths, raw.recordings, strict=True))
     for path, recording in bar(pairs, desc="splitting", unit=" recordings"):
-        with parsing(str(path), "a recording to split"):
-            contacts = split(recording)
-        for i, contact in enumerate(contacts):
-            save(arguments.out / f"{path.stem}-{i:02d}.npz", contact)
-        count += len(contacts)
-    print(f"recordings written to {arguments.out}: {count}")
+        with parsing(str(path), "a recording to split"), about(str(path)):
+            for i, contact in enumerate(split(recording)):
+                file = arguments.out / f"{path.stem}-{i:02d}.npz"
+                if file in contacts:
+                    raise InputError(
+                        f"{file} is that of another recording too; rename one of them"
+                    )
+                contacts[file] = contact
+    for path, contact in contacts.items():
+        save(path, contact)
+    print(f"recordings written to {arguments.out}: {len(contacts)}")
     return 0
 
 

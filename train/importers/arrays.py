@@ -213,6 +213,8 @@ def trials_of(
         of_trial: Arrays = {}
         for name, values in entries.items():
             value = np.asarray(values[i])
+            if value.dtype.names:  # a structure within it is no value
+                continue
             if value.size == 1:  # without the array that MATLAB puts around a value
                 value = np.asarray(value.item())
             if value.ndim == 0 or value.dtype.kind in "US":
@@ -234,6 +236,8 @@ def _entries(path: Path, arrays: Arrays) -> Arrays:
         else:
             entries[name] = array
     sizes = {name: len(values) for name, values in entries.items()}
+    if not any(sizes.values()):
+        raise InputError(f"{path}: {EMPTY}")
     if len(set(sizes.values())) != 1:
         raise InputError(
             f"{path}: its arrays have {shown(sizes)} trials; leave out the arrays "

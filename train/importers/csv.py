@@ -46,6 +46,7 @@ from train.importers.reading import (
     read_frame,
     read_parquet,
     read_text,
+    require_filled,
     suffix_of,
 )
 from train.json_files import read_json
@@ -247,9 +248,12 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    labels = {}
+    require_filled(table, "trial")
+    labels: dict[str, dict[str, str]] = {}
     for row in data.to_dict("records"):
         trial = row.pop("trial")
+        if trial in labels:
+            raise InputError(f"{path}: {trial} has two rows; remove one of them")
         labels[trial] = {task: label for task, label in row.items() if label}
     return labels
 
@@ -335,12 +339,16 @@ def _of_frames(
 def _frame(file: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a file."""
     if suffix_of(file) == ".npy":
-        return np.atleast_2d(arrays.read_arrays(file)[""]).astype(np.float64)
+        frame = np.atleast_2d(arrays.read_arrays(file)[""])
+        with parsing(str(file), "a frame"):
+            return frame.astype(np.float64)
     return read_frame(file)
 
 
 def _trials_in(table: Table) -> Iterator[Source]:
     """The trials of a long table."""
+    for name in {"trial", "taxel"} & set(table.names):
+        require_filled(table, name)
     by_trial = table.data.groupby("trial", sort=False)
     labels = [
         name
@@ -353,13 +361,14 @@ def _trials_in(table: Table) -> Iterator[Source]:
     for trial, rows in by_trial:
         of_trial = {}
         for name in labels:
-            (text, *others) = map(str, rows[name].unique())
-            if others:
+            texts = rows[name].astype(object).fillna("").astype(str).unique()
+            if len(texts) > 1:
                 raise InputError(
                     f"{table.path}: {name} changes within trial {trial}, from "
-                    f"{shown(text)} to {shown(others[0])}"
+                    f"{shown(texts[0])} to {shown(texts[1])}"
                 )
-            of_trial[name] = text
+            if texts[0]:
+                of_trial[name] = texts[0]
         data = rows.drop(columns=["trial", *labels]).reset_index(drop=True)
         part = replace(table, data=data, file_names=tuple(table.names))
         if "taxel" in data:
@@ -452,7 +461,6 @@ def _understood(
     """The numbers of a trial."""
     table = source.table
     if axes is None:
-        table = source.table
         sense = meaning(table, options)
         values = _columns(table, sense.taxels)
     else:

@@ -25,9 +25,12 @@ from edge.touch.arm import Chain
 from train.importers import counts
 from train.importers.axes import Axes
 from train.importers.counts import Trial, rest_of, skin_shape
-from train.importers.reading import read_parquet
+from train.importers.reading import Table, numbers_of, read_parquet
 from train.json_files import read_json
 from train.progress import say
+
+LARGEST_INDEX = 1 << 53
+"""Larger whole numbers are not told apart as floats."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -139,15 +142,36 @@ def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
         raise InputError(f"{path}: holds no data/**/*.parquet; fetch it again")
     tasks = task_names(path)
     for file in files:
-        data = read_parquet(file).data
+        table = read_parquet(file)
+        data = table.data
         for column in ("episode_index", "timestamp", options.taxels, options.joints):
             if column is not None and column not in data.columns:
                 raise InputError(
                     f"{file}: has no column {column}; it has {shown(list(data.columns))}"
                 )
+        for column in {"episode_index", "task_index"} & set(data.columns):
+            data[column] = indices(table, column)
+        data["timestamp"] = numbers_of(table, "timestamp")
         for number, rows in data.groupby("episode_index", sort=True):
-            where = f"{file}: episode {int(number)}"
+            where = f"{file}: episode {number}"
             yield _episode(where, rows, tasks, options)
+
+
+def indices(table: Table, name: str) -> pd.Series:
+    """A column of whole numbers from 0.
+
+    Raises:
+        InputError: a cell holds none; the sentence names its row.
+    """
+    numbers = numbers_of(table, name)
+    is_index = (numbers % 1.0 == 0.0) & numbers.between(0, LARGEST_INDEX)
+    if not is_index.all():
+        row = np.flatnonzero(~is_index)[0] + 1
+        raise InputError(
+            f"{table.path}: row {row} has no {name}, which is a whole number from 0; "
+            "fetch the data set again"
+        )
+    return numbers.astype(np.int64)
 
 
 def _episode(

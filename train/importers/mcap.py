@@ -5,13 +5,14 @@ Needs the dependency group `ros`, which `make venv` installs: pip install --grou
 """
 
 import argparse
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from edge.errors import printable
-from edge.files import parsing
+from edge.files import open_regular, parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers.reading import needs
@@ -34,7 +35,7 @@ def trials(
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (
         parsing(str(path), "a complete MCAP file", "; copy it again"),
-        path.open("rb") as file,
+        open_regular(path, sys.maxsize) as file,
     ):
         for schema, channel, message in make_reader(
             file, validate_crcs=True

@@ -347,6 +347,20 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     return numbers
 
 
+def require_filled(table: Table, name: str) -> None:
+    """Refuse a table with an empty cell in a column that tells its rows apart.
+
+    Raises:
+        InputError: a cell is empty; the sentence names its row.
+    """
+    empty = np.flatnonzero(table.data[name].isna())
+    if len(empty):
+        raise InputError(
+            f"{table.path}: row {empty[0] + 1} has no {name}; enter it, or leave the "
+            "row out"
+        )
+
+
 def is_text(table: Table, name: str) -> bool:
     """Whether a column holds texts that are no numbers."""
     column = table.data[name]

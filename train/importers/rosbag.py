@@ -5,10 +5,11 @@ Needs the dependency group `ros`, which `make venv` installs: pip install --grou
 """
 
 import argparse
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from edge.files import parsing
+from edge.files import open_regular, parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers.reading import needs
@@ -24,6 +25,9 @@ def trials(
     with needs("rosbags", "this"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
+    if not path.is_dir():
+        with open_regular(path, sys.maxsize):  # a FIFO would be waited for
+            pass
     log = Log.of(path, arm, options)
     # ROS 2 bags from before 2024 do not contain the definitions of their types.
     types = get_typestore(Stores.ROS2_HUMBLE)

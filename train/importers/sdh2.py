@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from edge.config import shown
 from edge.errors import InputError
-from edge.files import parsing
+from edge.files import open_regular, parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
@@ -73,7 +73,8 @@ def grasp(file: Path) -> Recording:
     """
     with (
         parsing(str(file), "a grasp of an SDH-2 hand", "; fetch it again"),
-        bz2.open(file) as packed,
+        open_regular(file, LARGEST_BYTES) as raw,
+        bz2.open(raw) as packed,
     ):
         text = packed.read(LARGEST_BYTES + 1)
         if len(text) > LARGEST_BYTES:

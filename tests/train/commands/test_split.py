@@ -10,6 +10,28 @@ from train.__main__ import main
 from train.dataset import contacts
 
 
+def test_labels_for_too_many_contacts_stop_before_anything_is_written(
+    make_touch, tmp_path, refusal
+):
+    touch = make_touch(seconds=0.6)
+    three = [{"object": "cup"}] * 3
+    save(tmp_path / "a.npz", touch)
+    save(tmp_path / "b.npz", replace(touch, meta={**touch.meta, "contacts": three}))
+    said = refusal("split", tmp_path, "--out", tmp_path / "out")
+    assert "b.npz: meta.contacts labels 3 contacts, 1 are found" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_recordings_of_one_name_do_not_overwrite_each_other(
+    make_touch, tmp_path, refusal
+):
+    for folder in ("monday", "tuesday"):
+        save(tmp_path / folder / "a.npz", make_touch(seconds=0.6))
+    said = refusal("split", tmp_path, "--out", tmp_path / "out")
+    assert "a-00.npz is that of another recording too; rename one of them" in said
+    assert not (tmp_path / "out").exists()
+
+
 def test_each_contact_becomes_a_recording_with_its_own_labels(
     make_touch, tmp_path, capsys
 ):

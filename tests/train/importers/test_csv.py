@@ -274,6 +274,11 @@ RATE = ("--rate", "1")
         ),
         ({"a/0.csv": "1 0.5\n"}, ("--frames",), "a: 0.5 to 1 are no counts"),
         (
+            {"a/0.npy": stored(np.array(["x"]))},
+            ("--frames",),
+            "0.npy: not a frame: could not convert string to float",
+        ),
+        (
             {"1.txt": "1 2\n", "skin.json": "[1]"},
             RATE,
             "skin.json: the file must be a table",
@@ -294,6 +299,16 @@ RATE = ("--rate", "1")
             "labels.csv: needs a col",
         ),
         ({"1.txt": "1 2\n", "labels.csv": ""}, RATE, f"labels.csv: {EMPTY}"),
+        (
+            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n,cup\n"},
+            RATE,
+            "labels.csv: row 2 has no trial; enter it",
+        ),
+        (
+            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
+            RATE,
+            "labels.csv: 1 has two rows; remove one of them",
+        ),
         ({"1.txt": "1 2\n", "1.csv": "1 2\n"}, RATE, "in: two trials are named 1"),
         (
             {"all.csv": "trial,p1\n../1,2\n"},
@@ -446,6 +461,18 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
             "object changes within trial a, from 'box' to 'cup'",
         ),
+        (
+            text([("a", "", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
+            "object changes within trial a, from '' to 'cup'",
+        ),
+        (
+            text([("a", 0, 1), ("", 1, 1), ("", 2, 1)], head="trial,t,p1"),
+            "all.csv: row 2 has no trial; enter it, or leave the row out",
+        ),
+        (
+            text([("a", 0, 1, 5), ("a", 1, "", 6)], head="trial,t,taxel,value"),
+            "all.csv: row 2 has no taxel; enter it, or leave the row out",
+        ),
     ],
 )
 def test_a_long_table_that_contradicts_itself_is_refused(
@@ -454,3 +481,12 @@ def test_a_long_table_that_contradicts_itself_is_refused(
     path = folder / "all.csv"
     path.write_text(table)
     assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out")
+    assert not (folder.parent / "out").exists()
+
+
+def test_a_trial_whose_label_is_empty_has_none(folder):
+    rows = [("a", "", 0, 1), ("a", "", 1, 2), ("b", "cup", 0, 1), ("b", "cup", 1, 3)]
+    put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
+    _, recordings = imported(folder, "--time-unit", "s")
+    assert recordings["a"].labels == {}
+    assert recordings["b"].labels == {"object": "cup"}

@@ -135,6 +135,26 @@ RAGGED = [[1.0] * TAXELS] * (N - 1) + [[1.0, 2.0]]
             (),
             "episode 2 stands in two files",
         ),
+        (
+            rewritten(episode_index=[2.0] * (N - 1) + [np.nan]),
+            (),
+            f"episode_000002.parquet: row {N} has no episode_index, which is a whole",
+        ),
+        (
+            rewritten(episode_index=2.5),
+            (),
+            "episode_000002.parquet: row 1 has no episode_index",
+        ),
+        (
+            rewritten(task_index=np.nan),
+            (),
+            "episode_000002.parquet: row 1 has no task_index",
+        ),
+        (
+            rewritten(timestamp="noon"),
+            (),
+            "episode_000002.parquet: 'noon' in column timestamp is no number",
+        ),
     ],
 )
 def test_what_does_not_suit_is_one_sentence(
