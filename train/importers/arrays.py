@@ -225,10 +225,20 @@ def trials_of(
         yield f"{path.stem}_{i:03}", labels, of_trial
 
 
+def _of_structures(cells: NDArray[Any]) -> NDArray[Any]:
+    """Cells as one array of structures, where each is a structure of equal fields."""
+    structures = [np.ravel(cell) for cell in cells.flat]
+    names = {structure.dtype.names for structure in structures}
+    if len(names) != 1 or None in names or any(len(s) != 1 for s in structures):
+        return cells
+    return np.concatenate(structures)
+
+
 def _entries(path: Path, arrays: Arrays) -> Arrays:
     """The entries of each array or field, one for each trial."""
     entries: Arrays = {}
-    for name, array in arrays.items():
+    for name, stored in arrays.items():
+        array = _of_structures(stored) if stored.dtype == object else stored
         if array.dtype.names:
             entries |= {field: array[field].ravel() for field in array.dtype.names}
         elif array.dtype == object or _is_vector(array):

@@ -44,6 +44,7 @@ from train.importers.reading import (
     is_text,
     numbers_of,
     read_frame,
+    read_labels,
     read_parquet,
     read_text,
     require_filled,
@@ -242,15 +243,14 @@ def _labelled(
 
 def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
     """{trial: {task: label}} of a labels.csv."""
-    table = read_text(path)
-    data = table.data.astype(str).where(table.data.notna(), "")
+    data = read_labels(path)
     if "trial" not in data or not data["trial"].isin(trials).any():
         raise InputError(
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
-    require_filled(table, "trial")
+    require_filled(path, data, "trial")
     labels: dict[str, dict[str, str]] = {}
-    for row in data.to_dict("records"):
+    for row in data.fillna("").to_dict("records"):
         trial = row.pop("trial")
         if trial in labels:
             raise InputError(f"{path}: {trial} has two rows; remove one of them")
@@ -348,7 +348,7 @@ def _frame(file: Path) -> NDArray[np.float64]:
 def _trials_in(table: Table) -> Iterator[Source]:
     """The trials of a long table."""
     for name in {"trial", "taxel"} & set(table.names):
-        require_filled(table, name)
+        require_filled(table.path, table.data, name)
     by_trial = table.data.groupby("trial", sort=False)
     labels = [
         name

@@ -9,7 +9,7 @@ import lzma
 import re
 import zipfile
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -156,6 +156,15 @@ def read_text(path: Path) -> Table:
         return Table(path, data, header.named, form=(*form, *header.form))
 
 
+def read_labels(path: Path) -> pd.DataFrame:
+    """The columns of a text file with a header; each cell is text as it stands."""
+    with parsing(str(path), "a table", "; save it as text"):
+        text = _text(path)
+        header = _header(text)
+        _check_names(path, header.names)
+        return _named(_texts(text, header, range(len(header.names))), header)
+
+
 def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
     with parsing(str(path), "a table", "; save it as text"):
@@ -242,23 +251,55 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 
 def _parsed(text: _Text, header: _Header, decimal: str) -> pd.DataFrame:
-    """The columns of a text, without those that have neither a name nor a value."""
-    names = header.names
-    _check_widths(text, len(names))
+    """The columns of a text, without those that have neither a name nor a value.
+
+    Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
+    trial 007 is not trial 7. In a column of numbers such words are empty cells.
+    """
+    columns = range(len(header.names))
+    table = _cells(text, header, columns, decimal=decimal)
+    is_number = pd.api.types.is_numeric_dtype
+    texts = [
+        i for i in columns if header.names[i] == "trial" or not is_number(table[i])
+    ]
+    if texts:
+        table[texts] = _texts(text, header, texts)
+    return _named(table, header)
+
+
+def _texts(text: _Text, header: _Header, columns: Sequence[int]) -> pd.DataFrame:
+    """Columns of a text whose cells are texts, and NaN where they are empty."""
+    empty = {"keep_default_na": False, "na_values": [""]}
+    return _cells(text, header, columns, dtype=str, **empty)
+
+
+def _cells(
+    text: _Text, header: _Header, columns: Sequence[int], **options: Any
+) -> pd.DataFrame:
+    """Columns of a text, which are named by their places."""
+    width = len(header.names)
+    _check_widths(text, width)
     table = pd.read_csv(
         io.BytesIO(text.body),
         sep=text.mark or r"\s+",
-        decimal=decimal,
         header=None,
         skiprows=header.rows,
-        names=range(len(names)),
-        usecols=range(len(names)),
+        names=range(width),
+        usecols=columns,
         index_col=False,
         skipinitialspace=True,
         low_memory=False,
+        **options,
     )
     if table.empty:
         raise InputError(f"{text.path}: {EMPTY}")
+    return table
+
+
+def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
+    """The columns by their names, without those that have neither a name nor a
+    value."""
+    names = header.names
     used = [i for i in table if names[i] or table[i].notna().any()]
     # Further columns without a name are told apart by their places.
     unique = [name or f"column {place}" for place, name in enumerate(names, 1)]
@@ -334,12 +375,11 @@ def numbers_of(table: Table, name: str) -> pd.Series:
         InputError: a cell is no number.
     """
     column = table.data[name]
-    try:
-        numbers = pd.to_numeric(column, errors="coerce").astype("float64")
-    except OverflowError:
+    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
+    if np.isinf(numbers).any():
         raise InputError(
             f"{table.path}: column {name} has a number beyond measure; mend or leave it out"
-        ) from None
+        )
     bad = numbers.isna() & column.notna()
     if bad.any():
         cell = str(column[bad].iloc[0])
@@ -347,17 +387,16 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     return numbers
 
 
-def require_filled(table: Table, name: str) -> None:
+def require_filled(path: Path, data: pd.DataFrame, name: str) -> None:
     """Refuse a table with an empty cell in a column that tells its rows apart.
 
     Raises:
         InputError: a cell is empty; the sentence names its row.
     """
-    empty = np.flatnonzero(table.data[name].isna())
+    empty = np.flatnonzero(data[name].isna())
     if len(empty):
         raise InputError(
-            f"{table.path}: row {empty[0] + 1} has no {name}; enter it, or leave the "
-            "row out"
+            f"{path}: row {empty[0] + 1} has no {name}; enter it, or leave the row out"
         )
 
 

@@ -490,3 +490,21 @@ def test_a_trial_whose_label_is_empty_has_none(folder):
     _, recordings = imported(folder, "--time-unit", "s")
     assert recordings["a"].labels == {}
     assert recordings["b"].labels == {"object": "cup"}
+
+
+def test_labels_and_the_names_of_trials_stand_as_they_are(folder):
+    labels = {"007": "None", "7": "NA", "8": "cup"}
+    rows = [(trial, label, t, t) for trial, label in labels.items() for t in (0, 1)]
+    put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
+    _, recordings = imported(folder, "--time-unit", "s")
+    assert {
+        name: trial.labels["object"] for name, trial in recordings.items()
+    } == labels
+
+
+def test_a_label_that_is_a_number_stands_as_it_is(folder):
+    table = "trial,object,softness\n1,012,\n2,None,1\n"
+    put(folder, {"1.txt": "1 2\n1 3\n", "2.txt": "1 2\n1 3\n", "labels.csv": table})
+    _, recordings = imported(folder, *RATE)
+    assert recordings["1"].labels == {"object": "012"}
+    assert recordings["2"].labels == {"object": "None", "softness": "1"}
