@@ -9,7 +9,9 @@ import argparse
 import hashlib
 import logging
 import os
+import re
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
@@ -74,8 +76,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def counted_warnings() -> Iterator[None]:
-    """Print the first of many recordings' warnings, and how many there were."""
-    logger = logging.getLogger("edge.recording")
+    """Print the first of the recordings' warnings that differ in names and numbers
+    alone, and how many more there were."""
+    logger = logging.getLogger("edge")
     kept = BufferingHandler(capacity=sys.maxsize)
     logger.addHandler(kept)
     logger.propagate = False
@@ -84,10 +87,17 @@ def counted_warnings() -> Iterator[None]:
     finally:
         logger.propagate = True
         logger.removeHandler(kept)
-        if kept.buffer:
-            (first, *others) = kept.buffer
-            more = f" ({len(others)} more recordings are like it)" if others else ""
-            LOG.warning(printable(f"{first.getMessage()}{more}"))
+        messages = [record.getMessage() for record in kept.buffer]
+        kinds = Counter(map(kind_of, messages))
+        firsts = {kind_of(message): message for message in reversed(messages)}
+        for kind, count in kinds.items():
+            more = f" (and {count - 1} more like it)" if count > 1 else ""
+            LOG.warning(printable(f"{firsts[kind]}{more}"))
+
+
+def kind_of(message: str) -> str:
+    """A recording's warning without the recording's name and without numbers."""
+    return re.sub(r"[\d.e+-]*\d", "#", message.partition(": ")[2])
 
 
 def write(

@@ -28,8 +28,10 @@ TIME = re.compile(
 )
 """Names of a column of times, with its unit if they tell it."""
 ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
-RUNNING = re.compile(r"(?P<stem>.*?)(?P<first>\d{1,9})(?:[_x,](?P<second>\d{1,9}))?")
-"""A name with a number at its end, or with a row and a column."""
+RUNNING = re.compile(
+    r"(?P<stem>.*?)(?P<first>\d{1,9})(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?"
+)
+"""A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2]."""
 EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 """The least time since 1970 in each unit that a log of today has."""
 SECONDS_AT_MOST = 0.75

@@ -33,11 +33,19 @@ def test_taxels_are_those_of_a_stem_with_running_numbers():
     assert found.taxels == tuple(f"s{i}" for i in range(1, 11))
 
 
-def test_taxels_with_a_row_and_a_column_tell_the_shape():
-    names = [f"taxel_{row}_{col}" for col in range(3) for row in range(2)]
+@pytest.mark.parametrize(
+    "form", ["taxel_{}_{}", "taxel{}x{}", "taxel[{}][{}]", "taxel[{}, {}]"]
+)
+def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
+    names = [form.format(row, col) for col in range(3) for row in range(2)]
     found = taken(table(*names), rate=10)
     assert found.shape == (2, 3)
-    assert found.taxels[:3] == ("taxel_0_0", "taxel_0_1", "taxel_0_2")
+    assert found.taxels[:3] == tuple(form.format(0, col) for col in range(3))
+
+
+def test_numbers_of_taxels_may_stand_in_brackets():
+    names = [f"tactile[{i}]" for i in (10, *range(10))]
+    assert taken(table(*names), rate=10).taxels == (*names[1:], names[0])
 
 
 @pytest.mark.parametrize(
