@@ -80,13 +80,14 @@ def counted_warnings() -> Iterator[None]:
     alone, and how many more there were."""
     logger = logging.getLogger("edge")
     kept = BufferingHandler(capacity=sys.maxsize)
-    logger.addHandler(kept)
+    handlers = logger.handlers
+    logger.handlers = [kept]
     logger.propagate = False
     try:
         yield
     finally:
+        logger.handlers = handlers
         logger.propagate = True
-        logger.removeHandler(kept)
         messages = [record.getMessage() for record in kept.buffer]
         kinds = Counter(map(kind_of, messages))
         firsts = {kind_of(message): message for message in reversed(messages)}
