@@ -17,14 +17,13 @@ from train.evaluate import (
     AnswerTable,
     Promise,
     Result,
+    Rule,
     averaged,
-    choose,
     evaluate,
-    finest,
     fits,
 )
 from train.feature_sets import expand
-from train.groups import LEAVE_OUT, TRIAL, divisions, groups_of
+from train.groups import TRIAL, Divisions
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
@@ -101,24 +100,19 @@ class Choosing:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
         tried: the candidates, those of early decision points among them.
+        divisions: the trials that are left out together.
         samples: values of a feature.
-        leave_out: label whose groups are left out for a task, where each of its classes
-            has several of them; `TRIAL` for none. In place of an object its entire kind
-            is left out where `kinds_of` names the kinds: accuracy on other objects of
-            the same kinds says nothing of how a simulator's model does elsewhere.
-        quick: fewer folds.
         jobs: processes.
         progress: show progress bars on stderr.
     """
 
-    def __init__(  # noqa: PLR0913 - the data, and how to choose
+    def __init__(
         self,
         dataset: DataSet,
         y: Labels,
         tried: Sequence[Candidate],
+        divisions: Divisions,
         samples: int,
-        leave_out: str = LEAVE_OUT,
-        quick: bool = False,
         jobs: int = 1,
         progress: bool = False,
     ) -> None:
@@ -126,12 +120,12 @@ class Choosing:
         self._y = y
         self.tried = [candidate for candidate in tried if candidate.full]
         self._tried_early = [candidate for candidate in tried if candidate.early]
+        self._divisions = divisions
+        self._groups = divisions.groups
         self._samples = samples
         self._jobs = jobs
         self._progress = progress
         self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
-        self._folds, *self._other_folds = divisions(y[finest(y)], quick)
-        self._groups = groups_of(dataset, y, leave_out, quick)
 
     def _is_grouped(self, task: str) -> bool:
         """Whether entire groups are left out for a task."""
@@ -160,10 +154,11 @@ class Choosing:
 
         Without groups, both are the answers to left-out trials.
         """
-        other_folds = self._other_folds if repeated else []
+        folds = self._divisions.folds
+        other_folds = self._divisions.others if repeated else ()
         grids = [grid for candidate in tried for grid in candidate.grids]
-        total = fits(self._folds, nested)
-        total += sum(fits(folds, False) for folds in other_folds)
+        total = fits(folds, nested)
+        total += sum(fits(other, False) for other in other_folds)
         if self._groups is not None:
             total += fits(self._groups.folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
@@ -171,9 +166,9 @@ class Choosing:
             total=total, desc=what, unit=" fits", disable=not self._progress
         ) as progress:
             answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
-            trials = answers(vectors, self._folds, grids, nested=nested)
+            trials = answers(vectors, folds, grids, nested=nested)
             others = [
-                answers(vectors, folds, grids, nested=False) for folds in other_folds
+                answers(vectors, other, grids, nested=False) for other in other_folds
             ]
             trials = replace(trials, repeated=tuple(others))
             if self._groups is None:
@@ -193,20 +188,18 @@ class Choosing:
         for task in self._y:
             table = groups if self._is_grouped(task) else trials
             answers = table.held_out(task)[:, table.tested[task]]
-            right[task] = answers[choose(answers)]
+            right[task] = answers[Rule().choose(answers)]
         return right
 
     def accuracy(self, window_s: float) -> float:
         """Mean accuracy of the tasks in plain cross-validation; missed touches count as
         wrong."""
-        results = [
-            promised(
-                Result(round(right.sum()), len(right)),
-                self._dataset.untouched_labels(task),
-            )
-            for task, right in self._right(window_s).items()
-        ]
-        return sum(result.accuracy for result in results) / len(results)
+        accuracies = []
+        for task, right in self._right(window_s).items():
+            result = Result(round(right.sum()), len(right))
+            untouched = self._dataset.untouched_labels(task)
+            accuracies.append(promised(result, untouched).accuracy)
+        return sum(accuracies) / len(accuracies)
 
     def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
         """The shortest of some windows at which every task is about as accurate as at
@@ -220,24 +213,19 @@ class Choosing:
         if len(windows) == 1:
             return windows[0], []
         by_window = [self._right(window_s) for window_s in windows]
-        right = {task: [answers[task] for answers in by_window] for task in self._y}
-        order = np.arange(len(windows))
-        places = [
-            choose(np.array(each), order, margin=WINDOW_MARGIN)
-            for each in right.values()
-        ]
-        best = windows[max(places)]
-        shares = "; ".join(
-            f"{task} "
-            + ", ".join(
-                f"{a.mean():.0%} at {w:g} s" for a, w in zip(each, windows, strict=True)
-            )
-            for task, each in right.items()
-        )
-        return best, [
-            f"the window is {best:g} s, as the touches last longer than {windows[0]:g} "
-            "s; in "
-            f"cross-validation {shares} (--window sets it)"
+        shortest = Rule(np.arange(len(windows)), margin=WINDOW_MARGIN)
+        place = 0
+        shares = []
+        for task in self._y:
+            right = np.array([answers[task] for answers in by_window])
+            place = max(place, shortest.choose(right))
+            accuracies = zip(right.mean(axis=1), windows, strict=True)
+            of_task = [f"{share:.0%} at {w:g} s" for share, w in accuracies]
+            shares.append(f"{task} {', '.join(of_task)}")
+        return windows[place], [
+            f"the window is {windows[place]:g} s, as the touches last longer than "
+            f"{windows[0]:g} s; in cross-validation {'; '.join(shares)} (--window sets "
+            "it)"
         ]
 
     def choose(
@@ -251,22 +239,17 @@ class Choosing:
         """
         vectors = self._vectors(self._features(window_s))
         trials, groups = self._tables(vectors, self.tried, "choosing", nested=True)
-        settled = {task: self._settle(task, trials, groups) for task in self._y}
-        chosen = {task: settings.chosen for task, settings in settled.items()}
-        without = _by_fold(
-            trials, {task: settings.without for task, settings in settled.items()}
-        )
-        without_groups = _by_fold(
-            groups,
-            {
-                task: settings.without_groups
-                for task, settings in settled.items()
-                if settings.without_groups
-            },
-        )
+        chosen = {}
+        of_task = {}
+        for task in self._y:
+            chosen[task], of_task[task] = self._settle(task, trials, groups)
+        without = _by_fold(of_task)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
         if self._groups is not None:
-            plans[self._groups.name] = groups.folds, without_groups
+            by_group = {
+                task: self._without_groups(task, groups) for task in groups.right
+            }
+            plans[self._groups.name] = groups.folds, _by_fold(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
         return together, trials.folds, without
 
@@ -284,7 +267,7 @@ class Choosing:
         usual = {}
         for task in self._y:
             k = chosen[task].choice.k
-            known[task] = self._settle_early(task, trials, k, 0.0)
+            known[task] = self._settle_early(task, trials, k)
             usual[task] = known[task]
             if self._is_grouped(task):
                 usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
@@ -302,104 +285,102 @@ class Choosing:
         return self._tables(vectors, tried, what, nested=False, repeated=False)
 
     def _settle_early(
-        self, task: str, table: AnswerTable, k: int, margin: float
+        self, task: str, table: AnswerTable, k: int, margin: float = 0.0
     ) -> list[Choice]:
         """A task's settings by a table, and those chosen without each fold of the
         trials.
 
-        The graph has one number of neighbours, `k`, for all decision points. The fits
-        behind the answers may have seen the fold's trials, which take no part in the
-        choice otherwise.
+        The graph has one number of neighbours, `k`, for all decision points.
         """
         choices = table.choices[task]
-        rule = Rule(
-            prices=costs(choices, self._widths),
-            margin=margin,
-            allowed=np.flatnonzero([choice.k == k for choice in choices]),
-        )
-        answers = table.held_out(task)
-        places = [rule(answers)]
-        for fold in range(int(self._folds.max()) + 1):
-            places.append(rule(answers[:, self._folds != fold]))
+        allowed = np.flatnonzero([choice.k == k for choice in choices])
+        rule = replace(self._rule(task, table, margin), allowed=allowed)
+        folds = self._divisions.folds
+        places = [table.chosen(task, rule), *table.by_other_fold(task, folds, rule)]
         return [choices[place] for place in places]
 
-    def _settle(self, task: str, trials: AnswerTable, groups: AnswerTable) -> _Settled:
-        """A task's settings, by the answers to left-out trials and to left-out
-        groups."""
-        left_out = self._groups if self._is_grouped(task) else None
-        table = trials if left_out is None else groups
-        margin = 0.0 if left_out is None else UNSEEN_MARGIN
+    def _rule(self, task: str, table: AnswerTable, margin: float = 0.0) -> Rule:
+        """The rule that chooses among a table's candidates."""
+        return Rule(costs(table.choices[task], self._widths), margin=margin)
+
+    def _settle(
+        self, task: str, trials: AnswerTable, groups: AnswerTable
+    ) -> tuple[Chosen, list[Choice]]:
+        """A task's settings, by the answers to left-out trials and to left-out groups;
+        and [fold] those chosen without the trials of a fold.
+
+        These too are chosen by answers to left-out groups, where the settings are.
+        """
+        if self._groups is None or not self._is_grouped(task):
+            left_out = TRIAL
+            count = 0
+            table = trials
+            rule = self._rule(task, trials)
+            places = trials.by_fold(task, rule)
+        else:
+            left_out = self._groups.name
+            count = self._groups.count(self._y[task])
+            table = groups
+            rule = self._rule(task, groups, UNSEEN_MARGIN)
+            places = groups.by_other_fold(task, trials.folds, rule)
         choices = table.choices[task]
-        prices = costs(choices, self._widths)
-        places = [places_of(candidate, choices) for candidate in self.tried]
-        without = without_folds(task, trials, table, Rule(prices, margin))
-        without_groups = []
-        if task in groups.right:
-            unseen = groups.choices[task]
-            unseen_prices = costs(unseen, self._widths)
-            by_fold = groups.by_fold(task, unseen_prices, margin=margin)
-            without_groups = [unseen[place] for place in by_fold]
+        without = [choices[place] for place in places]
         picked = [trials.choices[task].index(choice) for choice in without]
-        nested = table.by_fold(task, prices, margin=margin)
         untouched = self._dataset.untouched_labels(task)
-        count = 0 if left_out is None else left_out.count(self._y[task])
-        by_candidate = [table.nested(task, prices, allowed) for allowed in places]
-        picks = [table.chosen(task, prices, allowed) for allowed in places]
+        of_trials = promised(trials.answered(task, picked), untouched)
+        promise = partial(promised, untouched=untouched, groups=count)
+        candidates = self._candidate_rules(task, table)
         chosen = Chosen(
-            choice=choices[table.chosen(task, prices, margin=margin)],
-            accuracy=promised(table.answered(task, nested), untouched, count),
-            by_trial=promised(trials.answered(task, picked), untouched),
-            left_out=TRIAL if left_out is None else left_out.name,
-            candidates=tuple(promised(r, untouched, count) for r in by_candidate),
-            picks=tuple(choices[place] for place in picks),
+            choice=choices[table.chosen(task, rule)],
+            accuracy=promise(table.nested(task, rule)),
+            by_trial=of_trials,
+            left_out=left_out,
+            candidates=tuple(
+                promise(table.nested(task, alone)) for alone in candidates
+            ),
+            picks=tuple(choices[table.chosen(task, alone)] for alone in candidates),
             folds=table.folds,
         )
-        if left_out is not None:
+        if table is not trials:
             chosen = self._with_known(chosen, task, trials)
-        return _Settled(chosen, without, without_groups)
+        return chosen, without
+
+    def _candidate_rules(self, task: str, table: AnswerTable) -> list[Rule]:
+        """For each candidate, the rule that chooses among its settings alone."""
+        choices = table.choices[task]
+        rule = self._rule(task, table)
+        return [
+            replace(rule, allowed=places_of(candidate, choices))
+            for candidate in self.tried
+        ]
 
     def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:
         """A task's settings, with those that are best for recorded objects."""
         choices = trials.choices[task]
-        prices = costs(choices, self._widths)
-        places = trials.by_fold(task, prices)
+        rule = self._rule(task, trials)
         return replace(
             chosen,
-            known=choices[trials.chosen(task, prices)],
-            known_by_fold=tuple(choices[place] for place in places),
+            known=choices[trials.chosen(task, rule)],
+            known_by_fold=tuple(choices[i] for i in trials.by_fold(task, rule)),
         )
 
+    def _without_groups(self, task: str, groups: AnswerTable) -> list[Choice]:
+        """[fold] a task's settings chosen without the groups of a fold."""
+        margin = UNSEEN_MARGIN if self._is_grouped(task) else 0.0
+        places = groups.by_fold(task, self._rule(task, groups, margin))
+        return [groups.choices[task][place] for place in places]
 
-@dataclass(frozen=True)
-class _Settled:
-    """A task's settings, and those chosen without each fold.
 
-    Attributes:
-        chosen: the settings.
-        without: [fold] the choice made without a fold's trials.
-        without_groups: the same of the folds of groups; empty where the task has no
-            answers to left-out groups.
-    """
-
-    chosen: Chosen
-    without: list[Choice]
-    without_groups: list[Choice]
+def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:
+    """[fold]{task: its choice} from {task: [fold] its choice}."""
+    folds = zip(*choices.values(), strict=True)
+    return [dict(zip(choices, of_fold, strict=True)) for of_fold in folds]
 
 
 def _early(window_s: float, settled: Mapping[str, Sequence[Choice]]) -> Early:
     """Early settings from {task: its choice, and the choice made without each fold}."""
-    choices = {task: all_choices[0] for task, all_choices in settled.items()}
-    folds = zip(*(all_choices[1:] for all_choices in settled.values()), strict=True)
-    by_fold = [dict(zip(settled, of_fold, strict=True)) for of_fold in folds]
+    choices, *by_fold = _by_fold(settled)
     return Early(window_s, choices, by_fold)
-
-
-def _by_fold(
-    table: AnswerTable, choices: Mapping[str, Sequence[Choice]]
-) -> list[dict[str, Choice]]:
-    """[fold]{task: its choice} from {task: [fold] its choice}."""
-    folds = range(int(table.folds.max()) + 1)
-    return [{task: choices[task][fold] for task in choices} for fold in folds]
 
 
 def decided_together(
@@ -420,35 +401,30 @@ def decided_together(
             trials}}.
         jobs: processes.
     """
-    family_of = {task: family for family in families(vectors.y) for task in family}
-    right: dict[tuple[str, str], NDArray[np.bool_]] = {}
-    for family in dict.fromkeys(family_of.values()):
-        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
-            plan = plans[left_out]
-            for task, hits in _right_together(family, vectors, plan, jobs).items():
-                right[left_out, task] = hits
-
-    def counted(task: str, left_out: str, result: Promise) -> Promise:
-        if task not in family_of:
-            return result
-        folds, _ = plans[left_out]
-        tested = (folds >= 0) & (vectors.y[task] != "")
-        hits = right[left_out, task][tested]
-        assert result.hits is not None
-        more = int(hits.sum()) - int(result.hits.sum())
-        return replace(result, right=result.right + more, hits=hits)
-
     together = {}
     for task, settings in chosen.items():
-        members = family_of.get(task, (task,))
-        _, by_fold = plans[settings.left_out]
-        together[task] = replace(
-            settings,
-            accuracy=counted(task, settings.left_out, settings.accuracy),
-            by_trial=counted(task, TRIAL, settings.by_trial),
-            by_fold=tuple(_of_tasks(by_task, members) for by_task in by_fold),
-        )
+        together[task] = _planned(settings, plans, (task,))
+    for family in families(vectors.y):
+        right = {}
+        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
+            right[left_out] = _right_together(family, vectors, plans[left_out], jobs)
+        for task in family:
+            settings = _planned(chosen[task], plans, family)
+            together[task] = replace(
+                settings,
+                accuracy=_recounted(settings.accuracy, right[settings.left_out][task]),
+                by_trial=_recounted(settings.by_trial, right[TRIAL][task]),
+            )
     return together
+
+
+def _planned(
+    settings: Chosen, plans: Mapping[str, Plan], tasks: Sequence[str]
+) -> Chosen:
+    """A task's settings with `by_fold`, of the tasks that are decided together."""
+    _, by_fold = plans[settings.left_out]
+    of_tasks = [_of_tasks(by_task, tasks) for by_task in by_fold]
+    return replace(settings, by_fold=tuple(of_tasks))
 
 
 def _of_tasks(choices: Mapping[str, Choice], tasks: Sequence[str]) -> dict[str, Choice]:
@@ -456,11 +432,18 @@ def _of_tasks(choices: Mapping[str, Choice], tasks: Sequence[str]) -> dict[str, 
     return {task: choices[task] for task in tasks}
 
 
+def _recounted(result: Promise, hits: NDArray[np.bool_]) -> Promise:
+    """A result with other answers to the same trials."""
+    assert result.hits is not None
+    more = int(hits.sum()) - int(result.hits.sum())
+    return replace(result, right=result.right + more, hits=hits)
+
+
 def _right_together(
     family: Sequence[str], vectors: Vectors, plan: Plan, jobs: int
 ) -> dict[str, NDArray[np.bool_]]:
-    """{task: (n,) whether the label named without a trial's fold is right} of tasks
-    that are decided together."""
+    """{task: whether the label named without a trial's fold is right} of tasks that are
+    decided together, for the trials with a fold and a label."""
     folds, choices = plan
     at_end = replace(vectors, X=vectors.X[None])
     of_family = [[_of_tasks(by_task, family)] for by_task in choices]
@@ -469,44 +452,10 @@ def _right_together(
         in_fold = folds == fold
         for task, (labels, _) in answers.items():
             right[task][in_fold] = labels[0] == vectors.y[task][in_fold]
-    return right
-
-
-@dataclass(frozen=True)
-class Rule:
-    """How one of some candidates is chosen; see `train.evaluate.choose`."""
-
-    prices: NDArray[np.int64]
-    margin: float
-    allowed: NDArray[np.int64] | None = None
-
-    def __call__(self, right: NDArray[np.float64]) -> int:
-        """The candidate chosen by answers (candidates, n)."""
-        return choose(right, self.prices, self.allowed, self.margin)
-
-
-def without_folds(
-    task: str, trials: AnswerTable, table: AnswerTable, rule: Rule
-) -> list[Choice]:
-    """[fold] the settings chosen without a fold's trials, by the rule that chooses them
-    with all.
-
-    By answers to left-out groups, where the settings are chosen so; the fits behind
-    these answers may have seen the fold's trials, of other groups.
-
-    Args:
-        task: the task.
-        trials: the candidates' answers to left-out trials.
-        table: the answers that choose; `trials`, or those to left-out groups.
-        rule: that chooses.
-    """
-    if table is trials:
-        places = trials.by_fold(task, rule.prices, rule.allowed, rule.margin)
-    else:
-        answers = table.held_out(task)
-        folds = range(int(trials.folds.max()) + 1)
-        places = [rule(answers[:, trials.folds != fold]) for fold in folds]
-    return [table.choices[task][place] for place in places]
+    return {
+        task: hits[(folds >= 0) & (vectors.y[task] != "")]
+        for task, hits in right.items()
+    }
 
 
 def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:

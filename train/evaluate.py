@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,18 @@ class _Fit:
     train: NDArray[np.int64]
     test: NDArray[np.int64]
 
+    @classmethod
+    def of(
+        cls,
+        vectors: Vectors,
+        classes: Mapping[str, NDArray[np.int64]],
+        left_out: NDArray[np.bool_],
+    ) -> _Fit:
+        """The fit without some trials, by a mask (n,), which answers these."""
+        return cls(
+            vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out)
+        )
+
     def counted(self, grid: SearchGrid) -> list[tuple[list[str], NDArray[np.int64]]]:
         """A grid's tasks, by how often each of the `train` trials counts for them."""
         by_counts: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
@@ -210,10 +223,50 @@ def _directions(
 
 
 @dataclass(frozen=True)
+class Rule:
+    """How one of several candidates is chosen: the cheapest within one standard error
+    of the best in cross-validation.
+
+    The error is that of the difference to the best one on the same trials, which is
+    smaller than the errors of the two accuracies, as candidates often err on the same
+    trials.
+
+    Attributes:
+        prices: (candidates,) of each. At equal price the most accurate counts, then the
+            first. Without prices the most accurate of all is taken.
+        allowed: the candidates to choose from; all where None.
+        margin: loss of accuracy that is accepted for a lower price, whatever the
+            standard error.
+    """
+
+    prices: NDArray[np.int64] | None = None
+    allowed: NDArray[np.int64] | None = None
+    margin: float = 0.0
+
+    def choose(self, right: NDArray[np.bool_] | NDArray[np.float64]) -> int:
+        """The candidate chosen by answers (candidates, n): whether they are right, or
+        what share of them."""
+        candidates = np.arange(len(right)) if self.allowed is None else self.allowed
+        means = right[candidates].mean(axis=1)
+        if self.prices is None:
+            return int(candidates[means.argmax()])
+        prices = self.prices[candidates]
+        best = np.array(
+            [np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)]
+        )
+        answers = right[candidates[best]].astype(np.float64)
+        worse = answers[means[best].argmax()] - answers
+        error = worse.std(axis=1) / np.sqrt(right.shape[1])
+        within = worse.mean(axis=1) <= np.maximum(error, self.margin)
+        return int(candidates[best[within.argmax()]])
+
+
+MOST_ACCURATE = Rule()
+
+
+@dataclass(frozen=True)
 class AnswerTable:
     """Every candidate's answers to every trial, by fits without that trial.
-
-    The `rule` of its methods is the `cost`, `allowed` and `margin` of `choose`.
 
     Attributes:
         folds: (n,) the fold of each trial.
@@ -233,6 +286,37 @@ class AnswerTable:
     tested: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
     repeated: tuple[AnswerTable, ...] = ()
 
+    @classmethod
+    def empty(
+        cls,
+        folds: NDArray[np.int64],
+        choices: dict[str, list[Choice]],
+        classes: Mapping[str, NDArray[np.int64]],
+    ) -> AnswerTable:
+        """A table without answers, for `enter`; see `_Fit` for the classes."""
+        right = {}
+        tested = {}
+        for task, labels in classes.items():
+            tested[task] = (labels >= 0) & (folds >= 0)
+            shape = (len(fold_numbers(folds)), len(choices[task]), 1)
+            right[task] = np.tile(~tested[task], shape)
+        return cls(folds, choices, right, tested)
+
+    def enter(
+        self, pair: tuple[int, int], answers: Mapping[str, NDArray[np.bool_]]
+    ) -> None:
+        """Take in the answers {task: (candidates, tests)} of the fit without a pair of
+        folds to the trials of both."""
+        folds = self.folds[np.isin(self.folds, pair)]
+        for task, right in answers.items():
+            # For the one fold these are answers to the other, and the other way round.
+            for without, other in {pair, pair[::-1]}:
+                in_fold = self.folds == other
+                tested = self.tested[task][in_fold]
+                self.right[task][without][:, in_fold] = (
+                    right[:, folds == other] | ~tested
+                )
+
     def held_out(self, task: str) -> NDArray[np.float64]:
         """(candidates, n) share of right answers to each trial, by the fits without its
         fold in this table and in the `repeated` ones."""
@@ -242,21 +326,32 @@ class AnswerTable:
             shares += table.held_out(task)
         return shares / (1 + len(self.repeated))
 
-    def chosen(self, task: str, *rule: Any, **more: Any) -> int:
+    def chosen(self, task: str, rule: Rule = MOST_ACCURATE) -> int:
         """The candidate chosen by all trials."""
-        return choose(self.held_out(task), *rule, **more)
+        return rule.choose(self.held_out(task))
 
-    def by_fold(self, task: str, *rule: Any, **more: Any) -> list[int]:
+    def by_fold(self, task: str, rule: Rule = MOST_ACCURATE) -> list[int]:
         """[fold] the candidate chosen without the trials of a fold."""
         return [
-            choose(right[:, self.folds != fold], *rule, **more)
+            rule.choose(right[:, self.folds != fold])
             for fold, right in enumerate(self.right[task])
         ]
 
-    def nested(self, task: str, *rule: Any) -> Result:
+    def by_other_fold(
+        self, task: str, folds: NDArray[np.int64], rule: Rule
+    ) -> list[int]:
+        """[fold] the candidate chosen without the trials of one of other folds (n,).
+
+        The fits behind the answers may have seen these trials, which take no part in
+        the choice otherwise.
+        """
+        answers = self.held_out(task)
+        return [rule.choose(answers[:, folds != fold]) for fold in fold_numbers(folds)]
+
+    def nested(self, task: str, rule: Rule = MOST_ACCURATE) -> Result:
         """The accuracy of the choice itself, with the numbers that it most often
         takes."""
-        return self.answered(task, self.by_fold(task, *rule))
+        return self.answered(task, self.by_fold(task, rule))
 
     def answered(self, task: str, picked: Sequence[int]) -> Result:
         """The accuracy where the candidate `picked` for a fold answers the trials of
@@ -274,52 +369,28 @@ def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
     """A table with the mean share of right answers of several, of the same candidates
     and folds."""
     first = tables[0]
-    right = {
-        task: np.mean([table.right[task] for table in tables], axis=0)
-        for task in first.right
-    }
+    right = {}
+    for task in first.right:
+        right[task] = np.mean([table.right[task] for table in tables], axis=0)
     return replace(first, right=right)
 
 
-def choose(
-    right: NDArray[np.bool_] | NDArray[np.float64],
-    cost: NDArray[np.int64] | None = None,
-    allowed: NDArray[np.int64] | None = None,
-    margin: float = 0.0,
-) -> int:
-    """The cheapest candidate within one standard error of the best in cross-validation.
+def fold_numbers(folds: NDArray[np.int64]) -> range:
+    """The numbers of the folds (n,), from 0."""
+    return range(int(folds.max()) + 1)
 
-    The error is that of the difference to the best one on the same trials, which is
-    smaller than the errors of the two accuracies, as candidates often err on the same
-    trials.
 
-    Args:
-        right: (candidates, n) whether the answers of each are right, or what share.
-        cost: (candidates,) of each. At equal cost the most accurate counts, then the
-            first. Without costs the most accurate of all is taken.
-        allowed: the candidates to choose from; all where None.
-        margin: loss of accuracy that is accepted for less cost, whatever the standard
-            error.
-    """
-    candidates = np.arange(len(right)) if allowed is None else allowed
-    means = right[candidates].mean(axis=1)
-    if cost is None:
-        return int(candidates[means.argmax()])
-    prices = cost[candidates]
-    best = np.array(
-        [np.where(prices == p, means, -1.0).argmax() for p in np.unique(prices)]
-    )
-    answers = right[candidates[best]].astype(np.float64)
-    worse = answers[means[best].argmax()] - answers
-    error = worse.std(axis=1) / np.sqrt(right.shape[1])
-    within = worse.mean(axis=1) <= np.maximum(error, margin)
-    return int(candidates[best[within.argmax()]])
+def _pairs(folds: NDArray[np.int64], nested: bool) -> list[tuple[int, int]]:
+    """The folds that the fits leave out: each alone, and each two where `nested`."""
+    numbers = fold_numbers(folds)
+    if nested:
+        return list(combinations_with_replacement(numbers, 2))
+    return list(zip(numbers, numbers, strict=True))
 
 
 def fits(folds: NDArray[np.int64], nested: bool) -> int:
     """How many fits `evaluate` makes."""
-    count = int(folds.max()) + 1
-    return count * (count + 1) // 2 if nested else count
+    return len(_pairs(folds, nested))
 
 
 def evaluate(
@@ -345,38 +416,26 @@ def evaluate(
     Raises:
         InputError: there are fewer than three folds, or the vectors are not finite.
     """
-    count = int(folds.max()) + 1
+    count = len(fold_numbers(folds))
     if count < 3:
         raise InputError(
             f"nested accuracy needs at least 3 folds, not {count}; record more"
         )
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
-    pairs = [(i, j) for i in range(count) for j in range(i, count if nested else i + 1)]
-    tests = [np.flatnonzero((folds == i) | (folds == j)) for i, j in pairs]
-    everything = np.arange(len(folds))
-    fits_of = (
-        _Fit(vectors, classes, np.delete(everything, test), test) for test in tests
-    )
-    work = (delayed(_answers)(fit, grids) for fit in fits_of)
-    results = Parallel(n_jobs=jobs, return_as="generator")(work)
     choices = {task: _choices(task, grids, classes) for task in classes}
-    right = {
-        task: np.zeros((count, len(choices[task]), len(folds)), dtype=bool)
-        for task in classes
-    }
-    for pair, test, result in zip(pairs, tests, results, strict=True):
+    table = AnswerTable.empty(folds, choices, classes)
+    pairs = _pairs(folds, nested)
+    work = (
+        delayed(_answers)(_Fit.of(vectors, classes, np.isin(folds, pair)), grids)
+        for pair in pairs
+    )
+    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    for pair, answers in zip(pairs, results, strict=True):
         if progress is not None:
             progress()
-        for task, answers in result.items():
-            # For fold i these are answers to fold j, and the other way round.
-            for without, other in {pair, pair[::-1]}:
-                places = folds[test] == other
-                right[task][without][:, test[places]] = answers[:, places]
-    tested = {task: (labels >= 0) & (folds >= 0) for task, labels in classes.items()}
-    for task, of_task in right.items():
-        of_task[:, :, ~tested[task]] = True
-    return AnswerTable(folds, choices, right, tested)
+        table.enter(pair, answers)
+    return table
 
 
 def _classes(labels: NDArray[np.str_]) -> NDArray[np.int64]:

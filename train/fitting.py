@@ -22,7 +22,7 @@ from train.choose import Choosing, Chosen
 from train.dataset import DataSet, Recordings, Untouched, load_trials, read
 from train.decision_points import MOST_TRIALS, usual_points
 from train.feature_sets import expand
-from train.groups import LEAVE_OUT, kinds_of
+from train.groups import LEAVE_OUT, Divisions, kinds_of
 from train.mix import mix
 from train.pipeline import ContactClassifier
 from train.settings import Settings
@@ -135,15 +135,9 @@ class FitOptions:
             shear=dataset.layout.axes is not None,
             drawn=drawn,
         )
+        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
         return Choosing(
-            dataset,
-            y,
-            tried,
-            self.samples,
-            self.leave_out,
-            self.quick,
-            self.processes,
-            self.progress,
+            dataset, y, tried, divisions, self.samples, self.processes, self.progress
         )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from edge.recording import Recording
 from train.agreement import families
 from train.dataset import DataSet
-from train.evaluate import FOLDS, SEED, group_folds, stratified_folds
+from train.evaluate import FOLDS, SEED, finest, group_folds, stratified_folds
 from train.search import SearchGrid
 from train.vectors import Labels
 
@@ -94,8 +94,8 @@ class Groups:
         unseen = []
         for grid in grids:
             if self.name not in grid.targets:
-                enough = [s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE]
-                unseen.append(replace(grid, shrinkages=tuple(enough)))
+                enough = tuple(s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE)
+                unseen.append(replace(grid, shrinkages=enough))
         return unseen
 
     def labels(self, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
@@ -113,26 +113,67 @@ def groups_of(
 ) -> Groups | None:
     """The kinds of things, or else the groups of a label, where some task has enough of
     them."""
-    if leave_out == TRIAL:
-        return None
-    members_of = {leave_out: dataset.groups(leave_out)}
-    if leave_out == LEAVE_OUT:
-        kinds = kinds_of([trial.recording for trial in dataset.trials])
-        members_of = {KIND: kinds, **members_of}
-    for name, members in members_of.items():
-        if members is None:
-            continue
+    for name, members in _memberships(dataset, leave_out).items():
         tasks = [t for t in y if t != leave_out and groupable(y[t], members)]
         if tasks:
-            few = len(members) <= FEW and not quick
-            count = GROUP_FOLDS if few else fold_count(len(members), quick)
+            count = fold_count(len(members), quick)
+            if len(members) <= FEW and not quick:
+                count = GROUP_FOLDS
             folds = group_folds(members, count)
             return Groups(name, members, frozenset(tasks), folds)
     return None
 
 
-def divisions(labels: NDArray[np.str_], quick: bool) -> list[NDArray[np.int64]]:
-    """(n,) folds of the trials; several divisions where there are few trials."""
-    count = fold_count(len(labels), quick)
-    repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
-    return [stratified_folds(labels, count, SEED + i) for i in range(repeats)]
+def _memberships(dataset: DataSet, leave_out: str) -> dict[str, NDArray[np.str_]]:
+    """{name: (n,) the group of each trial}, those that are left out first if they can
+    be first."""
+    if leave_out == TRIAL:
+        return {}
+    members_of = {leave_out: dataset.groups(leave_out)}
+    if leave_out == LEAVE_OUT:
+        kinds = kinds_of([trial.recording for trial in dataset.trials])
+        members_of = {KIND: kinds, **members_of}
+    return {name: groups for name, groups in members_of.items() if groups is not None}
+
+
+@dataclass(frozen=True)
+class Divisions:
+    """The trials that are left out together, to choose and to measure.
+
+    Attributes:
+        folds: (n,) of single trials.
+        others: further ones, where there are few trials.
+        groups: entire groups; None where no task has enough of them.
+    """
+
+    folds: NDArray[np.int64]
+    others: tuple[NDArray[np.int64], ...]
+    groups: Groups | None
+
+    @classmethod
+    def of(
+        cls,
+        dataset: DataSet,
+        y: Labels,
+        leave_out: str = LEAVE_OUT,
+        quick: bool = False,
+    ) -> Divisions:
+        """The divisions of some trials.
+
+        Args:
+            dataset: the trials.
+            y: {task: (n,) labels}.
+            leave_out: label whose groups are left out for a task, where each of its
+                classes has several of them; `TRIAL` for none. In place of an object its
+                entire kind is left out where `kinds_of` names the kinds: accuracy on
+                other objects of the same kinds says nothing of how a simulator's model
+                does elsewhere.
+            quick: fewer folds.
+        """
+        labels = y[finest(y)]
+        count = fold_count(len(labels), quick)
+        repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
+        folds, *others = (
+            stratified_folds(labels, count, SEED + i) for i in range(repeats)
+        )
+        return cls(folds, tuple(others), groups_of(dataset, y, leave_out, quick))

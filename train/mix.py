@@ -19,7 +19,14 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from train.choose import Chosen, decided_together, promised
 from train.dataset import DataSet
-from train.evaluate import AnswerTable, evaluate, finest, group_folds, stratified_folds
+from train.evaluate import (
+    AnswerTable,
+    Rule,
+    evaluate,
+    finest,
+    group_folds,
+    stratified_folds,
+)
 from train.groups import FEWEST_GROUPS, TRIAL, fold_count
 from train.labels import ENOUGH
 from train.pipeline import Choice
@@ -187,10 +194,10 @@ class Scores:
         # The first within a standard error of the best, as ten trials hardly tell them
         # apart; fewer than that choose nothing.
         rank = np.arange(len(table.choices[task]))
-        rule = rank, (rank[:1] if mixing.labelled(task) < ENOUGH else None)
-        best = table.choices[task][table.chosen(task, *rule)]
+        rule = Rule(rank, rank[:1] if mixing.labelled(task) < ENOUGH else None)
+        best = table.choices[task][table.chosen(task, rule)]
         for left_out, answers in ((leave_out, self.by_group), (TRIAL, self.by_trial)):
-            places = answers.by_fold(task, *rule)
+            places = answers.by_fold(task, rule)
             for by_task, place in zip(plans[left_out][1], places, strict=True):
                 by_task[task] = answers.choices[task][place]
         single = table is self.by_trial
@@ -198,9 +205,9 @@ class Scores:
             settled,
             choice=best,
             accuracy=promised(
-                table.nested(task, *rule), groups=0 if single else self.groups
+                table.nested(task, rule), groups=0 if single else self.groups
             ),
-            by_trial=promised(self.by_trial.nested(task, *rule)),
+            by_trial=promised(self.by_trial.nested(task, rule)),
             left_out=TRIAL if single else leave_out,
             folds=table.folds,
         )

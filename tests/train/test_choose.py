@@ -10,10 +10,11 @@ import train
 from edge.saving import save
 from edge.statistics import wilson
 from train.candidates import candidates
-from train.choose import Choosing, Chosen, Rule, decided_together, without_folds
+from train.choose import Choosing, Chosen, decided_together
 from train.dataset import load_trials
 from train.evaluate import AnswerTable, Promise
 from train.feature_sets import expand
+from train.groups import Divisions, Groups
 from train.pipeline import Choice, ContactClassifier, vote
 from train.vectors import Vectors
 
@@ -34,7 +35,7 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
     names = [name for candidate in tried for name in candidate.sets]
     dataset = load_trials([tmp_path], features=expand(names))
     y = {"softness": dataset.labels("softness")}
-    choosing = Choosing(dataset, y, tried, samples=40)
+    choosing = Choosing(dataset, y, tried, Divisions.of(dataset, y), samples=40)
     k = 3
     chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
     settings = choosing.early(1.2, chosen)
@@ -49,20 +50,56 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
     assert settings.known == early
 
 
-def test_without_a_fold_the_choice_is_made_by_left_out_groups_as_it_is_with_all_trials():
-    """One candidate is right on other trials of known objects, the other on new
+@pytest.fixture
+def settled():
+    """The function that gives a task's settings, and those chosen without each fold, of
+    two candidates: one right on other trials of known objects, the other on new
     objects."""
     near = Choice("IV", 1, 1, "lda")
     far = Choice("IV", 1, 3, "lda")
+    choices = {"t": [near, far]}
     folds = np.arange(12) % 3
-    rule = Rule(np.zeros(2, dtype=np.int64), margin=0.0)
     right = np.repeat([[True], [False]], 12, axis=1)
-    by_trial = AnswerTable(folds, {"t": [near, far]}, {"t": np.stack([right] * 3)})
-    by_group = AnswerTable(
-        folds // 2, {"t": [near, far]}, {"t": np.stack([~right] * 2)}
+    trials = AnswerTable(folds, choices, {"t": np.stack([right] * 3)})
+    unseen = AnswerTable(folds // 2, choices, {"t": np.stack([~right] * 2)})
+    objects = Groups("object", folds.astype(str), frozenset({"t"}), unseen.folds)
+    dataset = SimpleNamespace(
+        names=("max_force",), widths=lambda samples: (1,), untouched_labels=lambda t: ()
     )
-    assert without_folds("t", by_trial, by_trial, rule) == [near] * 3
-    assert without_folds("t", by_trial, by_group, rule) == [far] * 3
+
+    def settle(grouped):
+        divisions = Divisions(folds, (), objects if grouped else None)
+        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
+        chosen, without = choosing._settle("t", trials, unseen if grouped else trials)
+        return {
+            "chosen": chosen.choice.k,
+            "without a fold": [choice.k for choice in without],
+            "accuracy": chosen.accuracy.accuracy,
+            "by trial": chosen.by_trial.accuracy,
+            "known": chosen.known and chosen.known.k,
+        }
+
+    return settle
+
+
+def test_settings_are_chosen_by_left_out_trials(settled):
+    assert settled(grouped=False) == {
+        "chosen": 1,
+        "without a fold": [1, 1, 1],
+        "accuracy": 1.0,
+        "by trial": 1.0,
+        "known": None,
+    }
+
+
+def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(settled):
+    assert settled(grouped=True) == {
+        "chosen": 3,
+        "without a fold": [3, 3, 3],
+        "accuracy": 1.0,
+        "by trial": 0.0,
+        "known": 1,
+    }
 
 
 def test_tasks_that_agree_are_scored_as_they_are_decided_together():

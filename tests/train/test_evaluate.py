@@ -11,8 +11,8 @@ from train.evaluate import (
     AnswerTable,
     Promise,
     Result,
+    Rule,
     averaged,
-    choose,
     evaluate,
     fits,
     group_folds,
@@ -190,11 +190,12 @@ def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
     right = np.ones((3, 100), dtype=bool)
     right[0, :20] = False  # 20 worse than the best, with an error of 4
     right[1, 20:23] = right[2, 98:] = False  # 1 worse, with an error of 2.2
-    assert choose(right) == 2
-    assert choose(right, np.array([0, 1, 2])) == 1
-    assert choose(right, np.array([0, 2, 1])) == 2
-    assert choose(right, np.array([0, 1, 2]), margin=0.2) == 0
-    assert choose(right, np.array([0, 1, 2]), np.array([0, 2])) == 2
+    rising = np.arange(3)
+    assert Rule().choose(right) == 2
+    assert Rule(rising).choose(right) == 1
+    assert Rule(np.array([0, 2, 1])).choose(right) == 2
+    assert Rule(rising, margin=0.2).choose(right) == 0
+    assert Rule(rising, allowed=np.array([0, 2])).choose(right) == 2
 
 
 def test_further_divisions_count_in_the_choice_by_all_trials_alone():
@@ -235,7 +236,7 @@ def test_of_candidates_that_cost_the_same_the_best_is_chosen():
     right = np.ones((4, 100), dtype=bool)
     right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
     right[3, 50:] = False
-    assert choose(right, np.array([1, 1, 1, 0])) == 1
+    assert Rule(np.array([1, 1, 1, 0])).choose(right) == 1
 
 
 def test_folds_spread_each_class_evenly():
