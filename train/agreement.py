@@ -1,13 +1,11 @@
 """Which tasks' labels are the pairs of two others', as the training labels show."""
 
-from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-Labels = Mapping[str, NDArray[np.str_]]
-"""{task: (n,) labels}; empty where a trial has none."""
+from train.vectors import Labels
 
 
 def products(y: Labels) -> dict[str, tuple[str, str]]:
@@ -18,13 +16,11 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     """
     pairs: dict[str, tuple[str, str]] = {}
     for task, labels in y.items():
-        factors = [
-            other
-            for other in y
-            if other != task
-            and _determines(labels, y[other])
-            and not _determines(y[other], labels)
-        ]
+        factors = []
+        for other in y:
+            follows = _determines(labels, y[other])
+            if other != task and follows and not _determines(y[other], labels):
+                factors.append(other)
         for a, b in combinations(factors, 2):
             joined = np.char.add(np.char.add(y[a], "\0"), y[b])
             if task not in pairs and _determines(joined, labels):
@@ -44,20 +40,21 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
 
     No task belongs to two products.
     """
-    out: dict[str, dict[str, tuple[int, ...]]] = {}
+    products_of: dict[str, dict[str, tuple[int, ...]]] = {}
     used_tasks: set[str] = set()
     for task, factors in products(y).items():
-        met = set(zip(*(y[t].tolist() for t in (task, *factors)), strict=True))
-        pairs = sorted(labels for labels in met if all(labels))
-        names = {factor: sorted(set(y[factor].tolist()) - {""}) for factor in factors}
-        if used_tasks & {task, *factors} or len(pairs) != np.prod(
-            list(map(len, names.values()))
-        ):
-            continue
-        used_tasks |= {task, *factors}
-        indices = zip(factors, list(zip(*pairs, strict=True))[1:], strict=True)
-        out[task] = {f: tuple(map(names[f].index, labels)) for f, labels in indices}
-    return out
+        tasks = (task, *factors)
+        met = set(zip(*(y[t].tolist() for t in tasks), strict=True))
+        pairs = sorted(filter(all, met))
+        names = [sorted({*y[factor].tolist()} - {""}) for factor in factors]
+        complete = 0 < len(pairs) == len(names[0]) * len(names[1])
+        if complete and used_tasks.isdisjoint(tasks):
+            used_tasks.update(tasks)
+            _, *columns = zip(*pairs, strict=True)
+            products_of[task] = {}
+            for factor, labels, column in zip(factors, names, columns, strict=True):
+                products_of[task][factor] = tuple(map(labels.index, column))
+    return products_of
 
 
 def families(y: Labels) -> list[tuple[str, ...]]:

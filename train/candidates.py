@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,53 +111,28 @@ def known_products(y: Labels) -> dict[str, tuple[str, str]]:
     }
 
 
-def candidates(  # noqa: PLR0913 - each option of `export` that fixes a choice
-    y: Labels,
-    features: Sequence[str] | None = None,
-    projection: str | None = None,
-    scaling: str | None = None,
-    components: int | None = None,
-    k: int | None = None,
-    *,
-    joints: bool = False,
-    shear: bool = False,
-    drawn: bool = False,
-    quick: bool = False,
-) -> list[Candidate]:
-    """Every candidate; arguments you pass are held fixed.
-
-    Features of several units need scaling by Method IV. Principal components of the
-    paper's three features are tried with more scalings and numbers where you ask for
-    these features only. Beside other candidates the best of so many settings would win
-    by chance. Methods II and III are left out, as Method I and no scaling have the same
-    neighbours. The discriminants of all tasks side by side tell known things best, so
-    they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
-    only what carries over to other skins and arms is tried.
-    """
-    fixed = Fixed(features, projection, scaling, components, k)
-    mode = Mode.of(drawn=drawn, quick=quick)
-    full = _combinations(fixed, mode, joints=joints, shear=shear)
-    early = _early_combinations(fixed, mode, joints=joints, shear=shear)
-    combinations = []
-    for sets in dict.fromkeys((*full, *early)):
-        for kind in KINDS if projection is None else (projection,):
-            if fixed.asks or mode.tries(kind, sets):
-                grid = _grid(sets, kind, fixed, mode)
-                grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
-                candidate = Candidate(sets, kind, grids, sets in full, sets in early)
-                combinations.append(candidate)
-    return combinations
+def features_of(tried: Sequence[Candidate]) -> tuple[str, ...]:
+    """The features of some candidates, each once."""
+    return expand([name for candidate in tried for name in candidate.sets])
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """Settings that are not to be chosen; see `candidates`."""
+    """Settings that are not to be chosen; those that are None are.
 
-    features: Sequence[str] | None
-    projection: str | None
-    scaling: str | None
-    components: int | None
-    k: int | None
+    Attributes:
+        features: names of sets and of single features.
+        projection: one of `train.projection.KINDS`.
+        scaling: one of `train.scaling.SCALINGS`.
+        components: coordinates.
+        k: neighbours.
+    """
+
+    features: Sequence[str] | None = None
+    projection: str | None = None
+    scaling: str | None = None
+    components: int | None = None
+    k: int | None = None
 
     @property
     def asks(self) -> bool:
@@ -168,14 +144,52 @@ class Fixed:
         return self.features is not None and kind == "pca"
 
 
+CHOOSE_ALL = Fixed()
+
+
+def candidates(
+    y: Labels,
+    fixed: Fixed = CHOOSE_ALL,
+    *,
+    joints: bool = False,
+    shear: bool = False,
+    drawn: bool = False,
+    quick: bool = False,
+) -> list[Candidate]:
+    """Every candidate with the settings that are held fixed.
+
+    Features of several units need scaling by Method IV. Principal components of the
+    paper's three features are tried with more scalings and numbers where you ask for
+    these features only. Beside other candidates the best of so many settings would win
+    by chance. Methods II and III are left out, as Method I and no scaling have the same
+    neighbours. The discriminants of all tasks side by side tell known things best, so
+    they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
+    only what carries over to other skins and arms is tried.
+    """
+    mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
+    full = mode.full
+    if fixed.features is not None:
+        full = [tuple(fixed.features)]
+    early = [] if fixed.asks else mode.early
+    projections = KINDS if fixed.projection is None else (fixed.projection,)
+    combinations = []
+    for sets, kind in product(dict.fromkeys((*full, *early)), projections):
+        if fixed.asks or mode.tries(kind, sets):
+            grid = _grid(sets, kind, fixed, mode)
+            grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
+            candidate = Candidate(sets, kind, grids, sets in full, sets in early)
+            combinations.append(candidate)
+    return combinations
+
+
 @dataclass(frozen=True)
 class Mode:
     """The candidates that are tried by default.
 
     Attributes:
-        combinations, with_joints: feature sets without and with joint angles.
-        with_shear: further ones of a skin of three axes.
-        early: those of early decision points, with joint angles.
+        full: feature sets that are tried together at the full window.
+        early: those of early decision points; none where these have the settings of the
+            full window.
         shrinkages: of discriminants.
         components: numbers of coordinates.
         most_directions: of discriminants; None for all.
@@ -183,37 +197,37 @@ class Mode:
         together: try the discriminants of all tasks side by side.
     """
 
-    combinations: Sequence[tuple[str, ...]]
-    with_joints: Sequence[tuple[str, ...]]
-    with_shear: Sequence[tuple[str, ...]]
+    full: Sequence[tuple[str, ...]]
     early: Sequence[tuple[str, ...]]
-    shrinkages: Sequence[float]
-    components: Sequence[int]
+    shrinkages: tuple[float, ...]
+    components: tuple[int, ...]
     most_directions: int | None
     components_alone: bool
     together: bool
 
     @classmethod
-    def of(cls, *, drawn: bool, quick: bool) -> Mode:
-        """The mode of things that a scene drew from kinds, or of a quick choice."""
-        if drawn:
-            return cls(
-                combinations=(DRAWN,),
-                with_joints=(DRAWN_WITH_JOINTS,),
-                with_shear=(),
-                early=(),
-                shrinkages=DRAWN_SHRINKAGES,
-                components=DRAWN_COMPONENTS,
-                most_directions=DRAWN_COMPONENTS[-1],
-                components_alone=False,
-                together=False,
-            )
-        number = QUICK if quick else None
+    def drawn(cls, joints: bool) -> Mode:
+        """The mode of things that a scene drew from kinds."""
         return cls(
-            combinations=PLAIN[:number],
-            with_joints=WITH_JOINTS[:number],
-            with_shear=WITH_SHEAR,
-            early=() if quick else EARLY_WITH_JOINTS,
+            full=[DRAWN_WITH_JOINTS if joints else DRAWN],
+            early=[],
+            shrinkages=DRAWN_SHRINKAGES,
+            components=DRAWN_COMPONENTS,
+            most_directions=DRAWN_COMPONENTS[-1],
+            components_alone=False,
+            together=False,
+        )
+
+    @classmethod
+    def usual(cls, joints: bool, shear: bool, quick: bool) -> Mode:
+        """The mode of all others, or of a quick choice."""
+        usual = WITH_JOINTS if joints else PLAIN
+        angles = ("joints",) if joints else ()
+        sheared = [(*sets, *angles) for sets in WITH_SHEAR] if shear else []
+        has_early = joints and not quick
+        return cls(
+            full=[*usual[: QUICK if quick else None], *sheared],
+            early=[*EARLY_WITH_JOINTS, *sheared] if has_early else [],
             shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
             components=COMPONENTS,
             most_directions=None,
@@ -234,32 +248,6 @@ class Mode:
         return kind == "lda" or self.components_alone
 
 
-def _combinations(
-    fixed: Fixed, mode: Mode, *, joints: bool, shear: bool
-) -> Sequence[tuple[str, ...]]:
-    """The feature sets that are tried together."""
-    if fixed.features is not None:
-        return [tuple(fixed.features)]
-    usual = mode.with_joints if joints else mode.combinations
-    return [*usual, *_sheared(mode, joints=joints, shear=shear)]
-
-
-def _early_combinations(
-    fixed: Fixed, mode: Mode, *, joints: bool, shear: bool
-) -> Sequence[tuple[str, ...]]:
-    """The feature sets that are tried together at early decision points; none where
-    they have the settings of the full window."""
-    if fixed.asks or not joints or not mode.early:
-        return []
-    return [*mode.early, *_sheared(mode, joints=joints, shear=shear)]
-
-
-def _sheared(mode: Mode, *, joints: bool, shear: bool) -> Sequence[tuple[str, ...]]:
-    """The feature sets of a skin of three axes."""
-    angles = ("joints",) if joints else ()
-    return [(*sets, *angles) for sets in mode.with_shear] if shear else []
-
-
 def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:
     """The numbers that are tried for some feature sets and a projection."""
     neighbours = NEIGHBOURS if fixed.thorough(kind) else FEW_NEIGHBOURS
@@ -267,8 +255,8 @@ def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchG
     return SearchGrid(
         projection=kind,
         features=expand(sets),
-        components=tuple(components),
-        shrinkages=tuple(mode.shrinkages),
+        components=components,
+        shrinkages=mode.shrinkages,
         most_directions=mode.most_directions,
         neighbours=neighbours if fixed.k is None else (fixed.k,),
     )
@@ -276,16 +264,15 @@ def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchG
 
 def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
     """A grid, and those of discriminants of several tasks side by side."""
-    if grid.projection == "pca":
-        pairs: dict[str, tuple[str, str]] = {}
-    else:
-        pairs = known_products(y)
     grids = [grid]
+    if grid.projection == "pca":
+        return grids
+    pairs = known_products(y)
     for task, factors in pairs.items():
         grids.append(replace(grid, targets=factors, tasks=(task,)))
     complete = [task for task in sorted(y) if (y[task] != "").all()]
     together = tuple(task for task in complete if task not in pairs)
-    if grid.projection == "lda" and mode.together and len(together) > 1:
+    if mode.together and len(together) > 1:
         grids.append(replace(grid, targets=together))
     return grids
 
@@ -299,11 +286,8 @@ def _scaled(
         methods = (fixed.scaling,)
     elif sets == ("paper",) and fixed.thorough(grids[0].projection):
         methods = PAPER_SCALINGS
-    scaled = []
-    for method in methods:
-        for grid in grids:
-            scaled.append(replace(grid, scaling=method))
-    return tuple(scaled)
+    scaled = product(methods, grids)
+    return tuple(replace(grid, scaling=method) for method, grid in scaled)
 
 
 def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
@@ -321,15 +305,10 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
     sizes: dict[tuple[object, ...], int] = {}
     kinds = [(choice.features, choice.projection, choice.targets) for choice in choices]
     for kind, choice in zip(kinds, choices, strict=True):
-        weights = choice.components * sum(
-            widths[name] for name in choice.features or widths
-        )
-        sizes[kind] = max(sizes.get(kind, 0), weights)
-    ranks = {
-        kind: rank
-        for rank, kind in enumerate(sorted(sizes, key=lambda kind: sizes[kind]))
-    }
-    return np.array([ranks[kind] for kind in kinds], dtype=np.int64)
+        columns = sum(widths[name] for name in choice.features or widths)
+        sizes[kind] = max(sizes.get(kind, 0), choice.components * columns)
+    ranking = sorted(sizes, key=sizes.__getitem__)
+    return np.array([ranking.index(kind) for kind in kinds])
 
 
 def places_of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:

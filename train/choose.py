@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from train.agreement import families
-from train.candidates import Candidate, costs, places_of
+from train.candidates import Candidate, costs, features_of, places_of
 from train.dataset import DataSet
 from train.evaluate import (
     VARIANCE,
@@ -22,7 +22,6 @@ from train.evaluate import (
     evaluate,
     fits,
 )
-from train.feature_sets import expand
 from train.groups import TRIAL, Divisions
 from train.labels import NO_CONTACT
 from train.pipeline import Choice
@@ -276,8 +275,7 @@ class Choosing:
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
         """The answers of the candidates for early decision points at one of them."""
         tried = self._tried_early
-        sets = [name for candidate in tried for name in candidate.sets]
-        dataset = self._dataset.of(expand(sets))
+        dataset = self._dataset.of(features_of(tried))
         X = dataset.features(window_s, self._samples)
         widths = tuple(dataset.widths(self._samples))
         vectors = Vectors(X, self._y, dataset.names, widths)

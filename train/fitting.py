@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from edge.errors import InputError
+from edge.recording import Recording
 from edge.tools.slips import slips
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
-from train.candidates import Candidate, candidates
+from train.candidates import Candidate, Fixed, candidates, features_of
 from train.choose import Choosing, Chosen
 from train.dataset import DataSet, Recordings, Untouched, load_trials, read
 from train.decision_points import MOST_TRIALS, usual_points
-from train.feature_sets import expand
 from train.groups import LEAVE_OUT, Divisions, kinds_of
 from train.mix import mix
 from train.pipeline import ContactClassifier
@@ -78,14 +78,9 @@ class Fitted:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitOptions:
+class FitOptions(Fixed):
     """The settings that a fit holds fixed; it chooses the others. See `fit`."""
 
-    features: Sequence[str] | None = None
-    projection: str | None = None
-    scaling: str | None = None
-    components: int | None = None
-    k: int | None = None
     window_s: float | None = None
     samples: int = SAMPLES
     tasks: Sequence[str] | None = None
@@ -110,34 +105,24 @@ class FitOptions:
             return self.decision_points_s[-1]
         return self.window_s
 
-    def candidates(
-        self, y: Labels, *, joints: bool, shear: bool, drawn: bool
-    ) -> list[Candidate]:
-        """The candidates for some labels."""
+    def tried(self, dataset: DataSet, y: Labels, *, drawn: bool) -> list[Candidate]:
+        """The candidates for some trials."""
+        joints = dataset.joints > 0
+        shear = dataset.layout.axes is not None
         return candidates(
-            y,
-            self.features,
-            self.projection,
-            self.scaling,
-            self.components,
-            self.k,
-            joints=joints,
-            shear=shear,
-            drawn=drawn,
-            quick=self.quick,
+            y, self, joints=joints, shear=shear, drawn=drawn, quick=self.quick
         )
 
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
         """The choice of the settings of some trials."""
-        tried = self.candidates(
-            y,
-            joints=dataset.joints > 0,
-            shear=dataset.layout.axes is not None,
-            drawn=drawn,
-        )
-        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
         return Choosing(
-            dataset, y, tried, divisions, self.samples, self.processes, self.progress
+            dataset,
+            y,
+            self.tried(dataset, y, drawn=drawn),
+            Divisions.of(dataset, y, self.leave_out, self.quick),
+            self.samples,
+            self.processes,
+            self.progress,
         )
 
 
@@ -272,11 +257,14 @@ def _with_thresholds(
     notes: list[str],
 ) -> DataSet:
     """The trials, by thresholds that are given, saved, proposed or chosen."""
-    drawn = recordings.mixed or kinds_of(recordings.recordings) is not None
-    tried = options.candidates(
-        {}, joints=recordings.joints, shear=recordings.shear, drawn=drawn
+    tried = candidates(
+        {},
+        options,
+        joints=recordings.joints,
+        shear=recordings.shear,
+        drawn=recordings.mixed or kinds_of(recordings.recordings) is not None,
+        quick=options.quick,
     )
-    names = [name for candidate in tried for name in candidate.sets]
 
     def by(threshold: int | None, onset: int | None) -> DataSet:
         return load_trials(
@@ -284,50 +272,48 @@ def _with_thresholds(
             threshold=threshold,
             onset=onset,
             horizon_s=windows[-1],
-            features=expand(names),
+            features=features_of(tried),
             arm=options.arm,
             partial=True,
             progress=options.progress,
             jobs=options.processes,
         )
 
-    threshold = options.threshold
-    onset = options.onset
-    fixed = threshold is not None or onset is not None
-    skin = recordings.of_owner[0].meta.get("skin", {})
-    if not fixed and "threshold_counts" not in skin:
-        proposal = thresholds.proposed(recordings.of_owner)
-        threshold = proposal.threshold
-        onset = proposal.onset
-        notes.append(
-            "warning: the skin was saved without thresholds; a threshold of "
-            f"{threshold} and an onset of {onset} counts come from {proposal.source}"
-        )
-    try:
-        dataset = by(threshold, onset)
-    except Untouched:
-        if fixed:
-            raise
-        proposal = thresholds.proposed(recordings.of_owner)
-        dataset = by(proposal.threshold, proposal.onset)
-        notes.append(
-            "warning: no recording has a contact at its own thresholds; a threshold of "
-            f"{proposal.threshold} and an onset of {proposal.onset} counts come from "
-            f"{proposal.source}"
-        )
-    if fixed or any("simulation" in r.meta for r in recordings.recordings):
-        return dataset
-
     def accuracy(trials: DataSet) -> float:
         hasty = replace(options, quick=True, progress=False)
-        few = hasty.choosing(
-            trials, _labels(trials, options.tasks), drawn=_are_drawn(trials)
-        )
+        y = _labels(trials, options.tasks)
+        few = hasty.choosing(trials, y, drawn=_are_drawn(trials))
         return few.accuracy(windows[0])
 
+    if options.threshold is not None or options.onset is not None:
+        return by(options.threshold, options.onset)
+    dataset = _by_noise(recordings, by, notes)
+    if any("simulation" in r.meta for r in recordings.recordings):
+        return dataset
     dataset, lower = thresholds.chosen(dataset, by, accuracy)
     notes += lower
     return dataset
+
+
+def _by_noise(
+    recordings: Recordings,
+    by: Callable[[int | None, int | None], DataSet],
+    notes: list[str],
+) -> DataSet:
+    """The trials by the thresholds that the skin was saved with, or else by those that
+    its noise suggests."""
+    reason = "the skin was saved without thresholds"
+    if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
+        try:
+            return by(None, None)
+        except Untouched:
+            reason = "no recording has a contact at its own thresholds"
+    proposal = thresholds.proposed(recordings.of_owner)
+    notes.append(
+        f"warning: {reason}; a threshold of {proposal.threshold} and an onset of "
+        f"{proposal.onset} counts come from {proposal.source}"
+    )
+    return by(proposal.threshold, proposal.onset)
 
 
 def _are_drawn(dataset: DataSet) -> bool:
@@ -389,8 +375,7 @@ def _choose_mixed(
         jobs=options.processes,
     )
     y = {task: y[task] for task in mixed.chosen}
-    silent = replace(options, progress=False)
-    tried = silent.choosing(dataset, y, drawn=True).tried
+    tried = options.tried(dataset, y, drawn=True)
     return Settings(
         mixed.chosen, mixed.folds, mixed.without, tried, window_s, mixed.notes
     )
@@ -432,22 +417,10 @@ def _early_of_known(
     Where groups are left out, settings are chosen for objects never met, though
     certificates are for recorded ones.
     """
-    known = {task: c for task, c in settings.chosen.items() if c.known is not None}
+    known = [task for task, c in settings.chosen.items() if c.known is not None]
     if not known:
         return []
-    chosen = {
-        task: replace(c, choice=c.known or c.choice)
-        for task, c in settings.chosen.items()
-    }
-    without = [
-        by_task | {task: c.known_by_fold[fold] for task, c in known.items()}
-        for fold, by_task in enumerate(settings.without)
-    ]
-    early = settings.early
-    if early is not None:
-        early = replace(early, settings=early.known)
-    for_known = replace(settings, chosen=chosen, without=without, early=early)
-    other = calibrate(measured, y, points, for_known, options)
+    other = calibrate(measured, y, points, settings.of_known, options)
     errors = []
     for task in known:
         smallest = exported.stopping_[task].smallest_error
@@ -523,25 +496,12 @@ def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:
 def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in
     contact."""
+    recordings = [t.recording for t in dataset.trials]
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):
-        mend = "record from before the touch"
-        recordings = [t.recording for t in dataset.trials]
-        proposal = thresholds.proposed(recordings)
-        low = proposal.threshold
-        high = proposal.onset
-        felt, _ = thresholds.count_contacts(recordings, low, high)
-        if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
-            mend += (
-                f", or take --threshold {low} --onset {high}, by which it begins later"
-            )
-        return [
-            f"warning: {(~untouched).mean():.0%} of the touches begin with their "
-            "recording, so "
-            f"their onset is not known; {mend}"
-        ]
-    X = np.stack([t.recording.frames[0].reshape(-1) for t in dataset.trials])[untouched]
-    squares = cdist(X, X, "sqeuclidean")
+        return [_late_recordings(recordings, float((~untouched).mean()))]
+    X = np.stack([recording.frames[0].reshape(-1) for recording in recordings])
+    squares = cdist(X[untouched], X[untouched], "sqeuclidean")
     np.fill_diagonal(squares, np.inf)
     notes = []
     for task, every in y.items():
@@ -551,12 +511,26 @@ def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
         if share > usual + LEAK * (1.0 - usual):
             notes.append(
                 f"warning: the first frame alone tells {task} in {share:.0%} of the "
-                "trials, before "
-                "anything is touched. The accuracy holds only where this is so in use "
-                "too; "
-                "`python -m train import --zero` subtracts the first frames"
+                "trials, before anything is touched. The accuracy holds only where "
+                "this is so in use too; `python -m train import --zero` subtracts the "
+                "first frames"
             )
     return notes
+
+
+def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
+    """The warning that a share of the recordings begins in contact."""
+    mend = "record from before the touch"
+    proposal = thresholds.proposed(recordings)
+    low = proposal.threshold
+    high = proposal.onset
+    felt, _ = thresholds.count_contacts(recordings, low, high)
+    if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
+        mend += f", or take --threshold {low} --onset {high}, by which it begins later"
+    return (
+        f"warning: {share:.0%} of the touches begin with their recording, so their "
+        f"onset is not known; {mend}"
+    )
 
 
 def _decision_points(

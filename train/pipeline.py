@@ -21,9 +21,10 @@ from edge.errors import InputError
 from edge.model.agreement import agreed
 from edge.tools.teaching import nearest_of_label
 from edge.touch.features import FEATURES
-from train.agreement import Labels, factors_of
+from train.agreement import factors_of
 from train.projection import Projection
 from train.scaling import finite, widths_of
+from train.vectors import Labels, Vectors
 
 
 def vote(labels: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -41,11 +42,9 @@ def squared_distances(
 ) -> NDArray[np.float64]:
     """(m, n) squared distances of points X (m, c) to rows (n, c); exact for those of a
     `Grid`."""
-    return (
-        np.asarray(cdist(X, rows, "sqeuclidean"))
-        if X.shape[1]
-        else np.zeros((len(X), len(rows)))
-    )
+    if not X.shape[1]:
+        return np.zeros((len(X), len(rows)))
+    return np.asarray(cdist(X, rows, "sqeuclidean"))
 
 
 def label_distances(
@@ -89,12 +88,9 @@ def slope(gaps: NDArray[np.float64]) -> float:
     def rise(change: float) -> float:
         return float((x * expit(-change * x)).sum() - 0.5 * np.tanh(0.5 * change))
 
-    return (
-        float(
-            brentq(rise, LEAST_SLOPE, most) if rise(LEAST_SLOPE) > 0.0 else LEAST_SLOPE
-        )
-        / size
-    )
+    if rise(LEAST_SLOPE) <= 0.0:
+        return LEAST_SLOPE / size
+    return float(brentq(rise, LEAST_SLOPE, most)) / size
 
 
 SLOPE_FOLDS = 3
@@ -139,17 +135,10 @@ class Choice:
 
         So they do if they also lack the labels of the same trials.
         """
+        space = (self.projection, self.scaling, self.features, self.weights)
         if self.projection == "pca":
-            return self.projection, self.scaling, self.features, self.weights
-        targets = self.targets or (task,)
-        return (
-            self.projection,
-            self.scaling,
-            self.features,
-            self.weights,
-            self.shrinkage,
-            targets,
-        )
+            return space
+        return (*space, self.shrinkage, self.targets or (task,))
 
     def counts(
         self, labels: NDArray[np.str_], is_own: NDArray[np.bool_] | None = None
@@ -175,12 +164,12 @@ def fittable(
     Args:
         choices, y, is_own: see `ContactClassifier.fit`.
     """
-    counts = {
-        task: int((c.counts(y[task], is_own) > 0).sum()) for task, c in choices.items()
-    }
-    return {
-        t: replace(c, k=min(c.k, counts[t])) for t, c in choices.items() if counts[t]
-    }
+    possible = {}
+    for task, choice in choices.items():
+        count = int(np.count_nonzero(choice.counts(y[task], is_own)))
+        if count:
+            possible[task] = replace(choice, k=min(choice.k, count))
+    return possible
 
 
 class Decided(NamedTuple):
@@ -230,6 +219,14 @@ class ContactClassifier:
         self.features = tuple(features)
         self.widths = widths
 
+    @classmethod
+    def of(
+        cls, choices: Mapping[str, Choice], vectors: Vectors, complete: bool = True
+    ) -> ContactClassifier:
+        """A classifier fitted on some trials; see `fit`."""
+        model = cls(choices, vectors.features, vectors.widths)
+        return model.fit(vectors.X, vectors.y, vectors.is_own, complete)
+
     def fit(
         self,
         X: NDArray[np.float64],
@@ -247,122 +244,126 @@ class ContactClassifier:
         """
         X = finite(X)
         self.n_trials_, self.n_features_in_ = X.shape
+        counts = self._set_spaces(y, is_own)
+        self._fit_spaces(X, y, counts)
+        self._set_labels(y)
+        if complete:
+            used = {}
+            for task, space in self.spaces_.items():
+                used[task] = np.where(counts[space] > 0, y[task], "")
+            self.products_ = factors_of(used)
+            vectors = Vectors(X, y, self.features, self.widths, is_own)
+            self.slopes_ = self._slopes(vectors)
+        return self
+
+    def _set_spaces(
+        self, y: Labels, is_own: NDArray[np.bool_] | None
+    ) -> dict[Space, NDArray[np.int64]]:
+        """Set `spaces_`; {space: (n,) how often each trial counts in it}."""
         self.spaces_: dict[str, Space] = {}
         counts: dict[Space, NDArray[np.int64]] = {}
         for task, choice in self.choices.items():
-            each = choice.counts(y[task], is_own)
-            space = (*choice.space(task), () if (each == 1).all() else each.tobytes())
+            how_often = choice.counts(y[task], is_own)
+            uneven = () if (how_often == 1).all() else how_often.tobytes()
+            space = (*choice.space(task), uneven)
             self.spaces_[task] = space
-            counts[space] = each
-            n = int((each > 0).sum())
+            counts[space] = how_often
+            n = np.count_nonzero(how_often)
             if not 1 <= choice.k <= n:
                 raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
             if choice.components < 1:
                 raise InputError(
                     f"components must be at least 1, not {choice.components}"
                 )
+        return counts
+
+    def _fit_spaces(
+        self, X: NDArray[np.float64], y: Labels, counts: dict[Space, NDArray[np.int64]]
+    ) -> None:
+        """Fit the projection of each space, and project its trials."""
         widths = widths_of(X.shape[1], self.features, self.widths)
-        self.columns_ = {
-            self.spaces_[task]: columns_of(choice.features, self.features, widths)
-            for task, choice in self.choices.items()
-        }
-        self.projections_ = {
-            space: self._projection(
-                space, widths, X, y, np.repeat(np.arange(len(X)), each)
+        self.columns_: dict[Space, NDArray[np.int64]] = {}
+        self.projections_: dict[Space, Projection] = {}
+        self.members_: dict[Space, NDArray[np.int64]] = {}
+        self.rows_: dict[Space, NDArray[np.float64]] = {}
+        for space, how_often in counts.items():
+            tasks = [task for task in self.spaces_ if self.spaces_[task] == space]
+            choice = self.choices[tasks[0]]
+            names, named_widths = types_of(choice.features, self.features, widths)
+            columns = columns_of(choice.features, self.features, widths)
+            members = np.flatnonzero(how_often)
+            # A trial that counts twice is there twice.
+            rows = np.repeat(members, how_often[members])
+            targets = [y[target][rows] for target in choice.targets or tasks[:1]]
+            projection = Projection(
+                choice.scaling,
+                max(self.choices[task].components for task in tasks),
+                names,
+                choice.projection,
+                choice.shrinkage,
+                named_widths,
             )
-            for space, each in counts.items()
-        }
-        self.members_ = {space: np.flatnonzero(each) for space, each in counts.items()}
-        self.rows_ = {
-            s: self.project(s, X[members]) for s, members in self.members_.items()
-        }
+            projection.fit(X[rows][:, columns], np.column_stack(targets))
+            self.columns_[space] = columns
+            self.projections_[space] = projection
+            self.members_[space] = members
+            self.rows_[space] = self.project(space, X[members])
+
+    def _set_labels(self, y: Labels) -> None:
+        """Set what is known of each task's labels and coordinates."""
         self.classes_: dict[str, NDArray[np.str_]] = {}
         self.labels_: dict[str, NDArray[np.int64]] = {}
         self.components_: dict[str, int] = {}
-        for task, choice in self.choices.items():
-            labels = y[task][self.members_[self.spaces_[task]]]
-            self.classes_[task], self.labels_[task] = np.unique(
-                labels, return_inverse=True
-            )
-            rank = self.projections_[self.spaces_[task]].rank_
-            self.components_[task] = min(choice.components, rank)
-        if complete:
-            labels_used = {
-                t: np.where(counts[space] > 0, y[t], "")
-                for t, space in self.spaces_.items()
-            }
-            self.products_ = factors_of(labels_used)
-            self.slopes_ = self._slopes(X, y, is_own)
-        return self
+        for task, space in self.spaces_.items():
+            labels = y[task][self.members_[space]]
+            classes, indices = np.unique(labels, return_inverse=True)
+            self.classes_[task] = classes
+            self.labels_[task] = indices
+            rank = self.projections_[space].rank_
+            self.components_[task] = min(self.choices[task].components, rank)
 
-    def _slopes(
-        self, X: NDArray[np.float64], y: Labels, is_own: NDArray[np.bool_] | None
-    ) -> dict[str, float]:
+    def _slopes(self, vectors: Vectors) -> dict[str, float]:
         """`slopes_`, from the distances of trials by fits without their fold.
 
         Distances between training trials would not do. Discriminants of many features
         with little shrinkage draw the trials of a label up to a hundred times closer
         together than new ones.
         """
-        sample = np.lexsort([y[task] for task in sorted(y)])[
-            :: -(-len(X) // MOST_MEASURED)
-        ]
-        X = X[sample]
-        y = {task: labels[sample] for task, labels in y.items()}
-        is_own = None if is_own is None else is_own[sample]
-        folds = np.arange(len(X)) % SLOPE_FOLDS
+        order = np.lexsort([vectors.y[task] for task in sorted(vectors.y)])
+        vectors = vectors.part(order[:: -(-len(order) // MOST_MEASURED)])
+        folds = np.arange(len(vectors.X)) % SLOPE_FOLDS
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
             new = folds == fold
-            known_labels = {task: labels[~new] for task, labels in y.items()}
-            owned = None if is_own is None else is_own[~new]
-            choices = fittable(self.choices, known_labels, owned)
-            model = ContactClassifier(choices, self.features, self.widths)
-            model.fit(X[~new], known_labels, owned, complete=False)
+            others = vectors.part(~new)
+            choices = fittable(self.choices, others.y, others.is_own)
+            model = ContactClassifier.of(choices, others, complete=False)
             for task, classes in model.classes_.items():
-                used = self.choices[task].counts(y[task], is_own) > 0
-                met = new & used & np.isin(y[task], classes)
+                labels = vectors.y[task]
+                used = self.choices[task].counts(labels, vectors.is_own) > 0
+                met = new & used & np.isin(labels, classes)
                 if len(classes) > 1:
-                    squares = model.squares(task, X[met])
-                    trial_labels = model.labels_[task]
-                    unit = model.unit(task)
-                    distances = label_distances(
-                        squares, trial_labels, len(classes), unit
-                    )
-                    labels = classes.searchsorted(y[task][met])[:, None]
-                    right = np.take_along_axis(distances, labels, axis=1)[:, 0]
-                    np.put_along_axis(distances, labels, np.inf, axis=1)
-                    gaps[task] += (distances.min(axis=1) - right).tolist()
+                    gaps[task] += model._gaps(task, vectors.X[met], labels[met])
         return {task: slope(np.array(task_gaps)) for task, task_gaps in gaps.items()}
 
-    def _projection(
-        self,
-        space: Space,
-        widths: Sequence[int],
-        X: NDArray[np.float64],
-        y: Labels,
-        trials: NDArray[np.int64],
-    ) -> Projection:
-        """The projection of a space, fitted on some trials, of which one may be there
-        often."""
-        tasks = [
-            task for task, task_space in self.spaces_.items() if task_space == space
-        ]
-        choice = self.choices[tasks[0]]
-        names, own_widths = types_of(choice.features, self.features, widths)
-        return Projection(
-            choice.scaling,
-            max(self.choices[task].components for task in tasks),
-            names,
-            choice.projection,
-            choice.shrinkage,
-            own_widths,
-        ).fit(
-            X[trials][:, self.columns_[space]],
-            np.column_stack(
-                [y[target][trials] for target in choice.targets or tasks[:1]]
-            ),
-        )
+    def _gaps(
+        self, task: str, X: NDArray[np.float64], labels: NDArray[np.str_]
+    ) -> list[float]:
+        """By how much nearer than any other the right label is to each of the vectors
+        (m, p)."""
+        distances = self._to_labels(task, self.squares(task, X))
+        right = self.classes_[task].searchsorted(labels)[:, None]
+        to_right = np.take_along_axis(distances, right, axis=1)[:, 0]
+        np.put_along_axis(distances, right, np.inf, axis=1)
+        gaps: list[float] = (distances.min(axis=1) - to_right).tolist()
+        return gaps
+
+    def _to_labels(
+        self, task: str, squares: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(m, classes) `label_distances` of squares (m, members)."""
+        classes = len(self.classes_[task])
+        return label_distances(squares, self.labels_[task], classes, self.unit(task))
 
     def project(self, space: Space, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (m, c) of vectors (m, p)."""
@@ -403,9 +404,7 @@ class ContactClassifier:
         for task, trial_labels in self.labels_.items():
             squares = self.squares(task, X)
             labels[task] = vote(trial_labels[self.nearest(task, squares)])
-            classes = len(self.classes_[task])
-            to_labels = label_distances(squares, trial_labels, classes, self.unit(task))
-            distances[task] = to_labels * self.slopes_[task]
+            distances[task] = self._to_labels(task, squares) * self.slopes_[task]
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,20 @@ class Settings:
         return {task: settled.choice for task, settled in self.chosen.items()}
 
     @property
+    def of_known(self) -> Settings:
+        """Those that are best for objects that were recorded, where groups were left
+        out to choose the others."""
+        chosen = dict(self.chosen)
+        without = list(map(dict, self.without))
+        for task, settled in self.chosen.items():
+            if settled.known is not None:
+                chosen[task] = replace(settled, choice=settled.known)
+                for by_task, choice in zip(without, settled.known_by_fold, strict=True):
+                    by_task[task] = choice
+        early = self.early and replace(self.early, settings=self.early.known)
+        return replace(self, chosen=chosen, without=without, early=early)
+
+    @property
     def tested(self) -> int:
         """Number of trials that calibrate."""
         return int((self.folds >= 0).sum())
@@ -58,9 +72,7 @@ class Settings:
             early = self.early.settings
             settings.append(early.choices)
             settings += early.by_fold if folds else []
-        return {
-            name
-            for choices in settings
-            for choice in choices.values()
-            for name in choice.features
-        }
+        names: set[str] = set()
+        for choices in settings:
+            names.update(*(choice.features for choice in choices.values()))
+        return names

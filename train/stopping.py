@@ -28,7 +28,7 @@ labels then names nothing, so an `unknown` for a trained object is an error of i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,6 @@ from train.evaluate import finest, stratified_folds
 from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
 from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
-from train.scaling import widths_of
 from train.threads import single_thread
 from train.vectors import Vectors
 
@@ -135,12 +134,10 @@ def held_out(
 
 def _fold(vectors: Vectors, left_out: NDArray[np.bool_], choices: AtPoints) -> Answers:
     training = vectors.part(~left_out)
-    form = training.features, training.widths
+    models = []
     with single_thread():
-        models = [
-            ContactClassifier(at_point, *form).fit(x, training.y, training.is_own)
-            for at_point, x in zip(choices, training.X, strict=True)
-        ]
+        for at_point, x in zip(choices, training.X, strict=True):
+            models.append(ContactClassifier.of(at_point, replace(training, X=x)))
         return answers(models, vectors.X[:, left_out])
 
 
@@ -275,7 +272,6 @@ class SequentialClassifier:
     Attributes:
         decision_points_: a fitted `ContactClassifier` for each decision point.
         columns_: the columns of the vectors that these take, rising.
-        types_: names and widths of their features.
         right_: {task: (decision points, n) whether the labels named without a trial are
             right}.
         unknown_: (decision points, n) whether trials are unlike all others.
@@ -326,11 +322,11 @@ class SequentialClassifier:
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
                 "export without decision points"
             )
-        self._fit_points(X, y, is_own)
+        vectors = Vectors(X, y, self.features, self.widths, is_own)
         tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
-        self._fit_novelty(X, y, folds)
+        self._fit_novelty(self._fit_points(vectors), folds)
         without = self._without(fold_choices)
-        chosen_without = self._held_out(X, y, folds, without, is_own)
+        chosen_without = self._held_out(vectors, folds, without)
         self.right_ = chosen_without.right
         rules = self._certify(chosen_without, folds, tested)
         # Margins are on the scale of the settings. Curves that the exported model uses
@@ -338,10 +334,9 @@ class SequentialClassifier:
         # trials had a part in the choice of these, the curves' means come from choices
         # without them.
         same = [self.choices_at] * len(fold_choices)
-        if without == same:
-            curves = chosen_without
-        else:
-            curves = self._held_out(X, y, folds, same, is_own)
+        curves = chosen_without
+        if without != same:
+            curves = self._held_out(vectors, folds, same)
         self._calibrate(curves, tested, rules)
         return self
 
@@ -371,59 +366,51 @@ class SequentialClassifier:
 
     def _held_out(
         self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
+        vectors: Vectors,
         folds: NDArray[np.int64],
         fold_choices: Sequence[AtPoints],
-        is_own: NDArray[np.bool_] | None,
     ) -> HeldOut:
         """Answers to each trial by models with some settings, without its fold."""
-        vectors = Vectors(X, y, self.features, self.widths, is_own)
         by_fold = held_out(vectors, folds, fold_choices, self.jobs)
+        shape = vectors.X.shape[:2]
         right = {}
         margins = {}
         for task in self.choices:
-            right[task] = np.zeros(X.shape[:2], dtype=bool)
-            margins[task] = np.zeros(X.shape[:2])
-            for k, answers_of in enumerate(by_fold):
+            right[task] = np.zeros(shape, dtype=bool)
+            margins[task] = np.zeros(shape)
+            for fold, answers_of in enumerate(by_fold):
+                in_fold = folds == fold
                 labels, sure = answers_of[task]
-                right[task][:, folds == k] = labels == y[task][folds == k]
-                margins[task][:, folds == k] = sure
+                right[task][:, in_fold] = labels == vectors.y[task][in_fold]
+                margins[task][:, in_fold] = sure
         return HeldOut(right, margins)
 
-    def _fit_points(
-        self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
-        is_own: NDArray[np.bool_] | None,
-    ) -> None:
-        """Fit the classifier of each decision point."""
+    def _fit_points(self, vectors: Vectors) -> Vectors:
+        """Fit the classifier of each decision point; the vectors that these take."""
         choices = [choice for at in self.choices_at for choice in at.values()]
-        features = _taken(choices, self.features)
-        widths = widths_of(X.shape[2], self.features, self.widths)
-        self.columns_ = columns_of(features, self.features, widths)
-        self.types_ = types_of(features, self.features, widths)
+        taken = _taken(choices, self.features)
+        self.columns_ = columns_of(taken, self.features, vectors.columns)
+        names, widths = types_of(taken, self.features, vectors.columns)
         self.n_features_in_ = len(self.columns_)
+        X = np.ascontiguousarray(vectors.X[..., self.columns_])
+        vectors = replace(vectors, X=X, features=names, widths=widths)
         self.decision_points_ = []
         with single_thread():
-            for at_point, x in zip(self.choices_at, X[..., self.columns_], strict=True):
-                classifier = ContactClassifier(at_point, *self.types_)
-                self.decision_points_.append(classifier.fit(x, y, is_own))
+            for at_point, x in zip(self.choices_at, X, strict=True):
+                model = ContactClassifier.of(at_point, replace(vectors, X=x))
+                self.decision_points_.append(model)
+        return vectors
 
-    def _fit_novelty(
-        self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
-        folds: NDArray[np.int64],
-    ) -> None:
+    def _fit_novelty(self, vectors: Vectors, folds: NDArray[np.int64]) -> None:
         """Fit the space of novelty, and set its limits by held-out trials."""
-        most = finest({task: y[task] for task in self.choices})
-        vectors = np.ascontiguousarray(X[..., self.columns_])
-        _, widths = self.types_
+        most = finest({task: vectors.y[task] for task in self.choices})
+        labels = vectors.y[most]
         with single_thread():
-            self.space_ = NoveltySpace.of(vectors, y[most], widths)
-        novelty_folds = np.where(folds >= 0, stratified_folds(y[most], FOLDS), -1)
-        scores = held_out_scores(vectors, y[most], novelty_folds, widths, self.jobs)
+            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
+        novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
+        scores = held_out_scores(
+            vectors.X, labels, novelty_folds, vectors.columns, self.jobs
+        )
         self.novelty_ = limits_of(most, scores[:, folds >= 0])
         self._excess = excess_of(self.novelty_, scores)
         self.unknown_ = unlike(self.novelty_, scores)
@@ -459,21 +446,20 @@ class SequentialClassifier:
         """Set the stopping rules and curves of each task."""
         self.stopping_ = {}
         for task, tests in tested.items():
-            evidence = answered.margins[task][:, tests], self._excess[:, tests]
-            right = answered.right[task][:, tests]
-            honest = self.right_[task][:, tests]
-            together = Curve.of(*evidence, right).with_mean(*evidence, honest.mean())
-            curves = []
-            for margins, excess, hits, shown in zip(
-                *evidence, right, honest, strict=True
-            ):
-                curve = Curve.of(margins, excess, hits)
-                curves.append(curve.with_mean(margins, excess, shown.mean()))
+            evidence = (
+                answered.margins[task][:, tests],
+                self._excess[:, tests],
+                answered.right[task][:, tests],
+                self.right_[task][:, tests],
+            )
+            together = _curve(*evidence)
+            curves = map(_curve, *evidence)
+            slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
             of_task, wrong = rules[task]
             self.stopping_[task] = Stopping(
-                slopes=tuple(curve.slope for curve in curves),
-                intercepts=tuple(curve.intercept for curve in curves),
-                doubts=tuple(curve.doubt for curve in curves),
+                slopes=slopes,
+                intercepts=intercepts,
+                doubts=doubts,
                 slope=together.slope,
                 intercept=together.intercept,
                 doubt=together.doubt,
@@ -512,15 +498,9 @@ class SequentialClassifier:
             right[task] = labels == y[task]
             pooled = Curve(stopping.slope, stopping.intercept, stopping.doubt)
             together[task] = pooled.probabilities(margins, excess)
-            confidence[task] = np.empty(margins.shape)
-            for point in range(len(margins)):
-                curve = Curve(
-                    stopping.slopes[point],
-                    stopping.intercepts[point],
-                    stopping.doubts[point],
-                )
-                evidence = margins[point], excess[point]
-                confidence[task][point] = curve.probabilities(*evidence)
+            curves = map(Curve, stopping.slopes, stopping.intercepts, stopping.doubts)
+            by_point = map(Curve.probabilities, curves, margins, excess)
+            confidence[task] = np.stack(list(by_point))
         unknown = unlike(self.novelty_, scores)
         tested = {task: y[task] != "" for task in right}
         return right, confidence, self._courses(together, right, unknown, tested)
@@ -554,6 +534,17 @@ def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
     """The features that some choice takes, in their order."""
     names = set().union(*(choice.features or features for choice in choices))
     return [name for name in features if name in names]
+
+
+def _curve(
+    margins: NDArray[np.float64],
+    excess: NDArray[np.float64],
+    right: NDArray[np.bool_],
+    honest: NDArray[np.bool_],
+) -> Curve:
+    """The curve of answers, with the mean probability of honest ones."""
+    share = float(honest.mean())
+    return Curve.of(margins, excess, right).with_mean(margins, excess, share)
 
 
 def cross_fitted(

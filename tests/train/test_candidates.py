@@ -8,6 +8,7 @@ from train.candidates import (
     PLAIN,
     WITH_JOINTS,
     WITH_SHEAR,
+    Fixed,
     candidates,
     costs,
 )
@@ -75,14 +76,15 @@ def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
     assert tried == both - {(("paper",), "lda")}
 
 
-def test_arguments_you_pass_are_held_fixed():
-    (candidate,) = candidates(
-        TASKS, features=["paper"], projection="pca", scaling="V", components=3, k=2
-    )
+def test_settings_that_are_fixed_are_held():
+    (candidate,) = candidates(TASKS, Fixed(["paper"], "pca", "V", 3, 2))
     (grid,) = candidate.grids
-    settings = candidate.name, grid.scaling, grid.components, grid.neighbours
-    assert settings == ("paper", "V", (3,), (2,))
+    assert candidate.name == "paper"
     assert grid.features == expand(["paper"])
+    assert grid.projection == "pca"
+    assert grid.scaling == "V"
+    assert grid.components == (3,)
+    assert grid.neighbours == (2,)
 
 
 def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():

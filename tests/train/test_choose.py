@@ -9,7 +9,7 @@ import pytest
 import train
 from edge.saving import save
 from edge.statistics import wilson
-from train.candidates import candidates
+from train.candidates import candidates, features_of
 from train.choose import Choosing, Chosen, decided_together
 from train.dataset import load_trials
 from train.evaluate import AnswerTable, Promise
@@ -32,8 +32,7 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
             touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
             save(tmp_path / f"{kind}-{seed}.npz", touch)
     tried = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    names = [name for candidate in tried for name in candidate.sets]
-    dataset = load_trials([tmp_path], features=expand(names))
+    dataset = load_trials([tmp_path], features=features_of(tried))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, tried, Divisions.of(dataset, y), samples=40)
     k = 3
