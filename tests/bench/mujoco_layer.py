@@ -1,7 +1,5 @@
 """The elastic layer of `mujoco_touch`: the face of every soft thing except a plant."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 
@@ -25,7 +23,31 @@ def beneath_n_m(modulus_pa):
     return 2.0 * modulus_pa * NET_M
 
 
-def layer_xml(height_m, breadth_m, modulus_pa, thick_m):
+class Net:
+    """The knots of a layer, in rows and columns.
+
+    Attributes:
+        rows, cols: of the cells between the knots.
+        dz_m, dy_m: size of a cell.
+        numbers: (rows + 1, cols + 1) of the knots.
+        row_parts, col_parts: parts of a cell that a knot stands for: half of one on the
+            rim, and at a corner a quarter.
+    """
+
+    def __init__(self, thing):
+        high_m = min(thing.height_m, 0.20)
+        wide_m = min(thing.breadth_m, 0.15)
+        self.rows = round(high_m / NET_M)
+        self.cols = round(wide_m / NET_M)
+        self.dz_m = high_m / self.rows
+        self.dy_m = wide_m / self.cols
+        self.row_parts = [0.5, *[1.0] * (self.rows - 1), 0.5]
+        self.col_parts = [0.5, *[1.0] * (self.cols - 1), 0.5]
+        knots = np.arange(len(self.row_parts) * len(self.col_parts))
+        self.numbers = knots.reshape(len(self.row_parts), -1)
+
+
+def layer_xml(thing):
     """An elastic layer: a net of sprung knots, and both the springs between neighbours
     (together a Pasternak foundation) and the face stretched over the net.
 
@@ -34,66 +56,74 @@ def layer_xml(height_m, breadth_m, modulus_pa, thick_m):
     elements of an elastic block (8 kPa, 0.1 m thick, the arm upright or askew by 17
     degrees), the net's depth, area and highest load are within 15 %.
     """
-    high = min(height_m, 0.20)
-    wide = min(breadth_m, 0.15)
-    rows = round(high / NET_M)
-    cols = round(wide / NET_M)
-    dz = high / rows
-    dy = wide / cols
-    k = modulus_pa * dz * dy / thick_m
-    shear = SHEAR * modulus_pa * thick_m
-    mass = LAYER_KG_M2 * dz * dy
-    number = np.arange((rows + 1) * (cols + 1)).reshape(rows + 1, cols + 1)
-    knots = ""
-    springs = ""
-    triangles = []
-    for (r, c), n in np.ndenumerate(number):
-        # A knot on the rim stands for half of a cell, or at a corner for a quarter.
-        of_row = 0.5 if r in (0, rows) else 1.0
-        of_col = 0.5 if c in (0, cols) else 1.0
-        y = (c - cols / 2) * dy
-        z = ABOVE_FLOOR_M + (r - rows / 2) * dz
-        share = of_row * of_col
-        # A body with a face may have no damped joint, so the face hangs on a second
-        # body.
-        knots += (
+    net = Net(thing)
+    tendons = tendons_xml(net, SHEAR * thing.modulus_pa * thing.thick_m)
+    return knots_xml(net, thing), tendons + face_xml(net)
+
+
+def knots_xml(net, thing):
+    """The knots, each on a spring of its own along the push.
+
+    A body with a face may have no damped joint, so the face hangs on a second body.
+    """
+    k = thing.modulus_pa * net.dz_m * net.dy_m / thing.thick_m
+    mass = LAYER_KG_M2 * net.dz_m * net.dy_m
+    xml = ""
+    for (r, c), n in np.ndenumerate(net.numbers):
+        y = (c - net.cols / 2) * net.dy_m
+        z = ABOVE_FLOOR_M + (r - net.rows / 2) * net.dz_m
+        part = net.row_parts[r] * net.col_parts[c]
+        xml += (
             f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" '
-            f'stiffness="{k * share}" '
-            f'damping="{0.06 * k * share + 0.02}" range="0 {thick_m * 0.9}"/><inertial '
-            'pos="0 0 0" '
-            f'mass="{mass * share}" diaginertia="1e-6 1e-6 1e-6"/><body '
-            f'name="n{n}"><inertial '
-            'pos="0 0 0" mass="1e-5" diaginertia="1e-9 1e-9 1e-9"/></body></body>'
+            f'stiffness="{k * part}" damping="{0.06 * k * part + 0.02}" '
+            f'range="0 {thing.thick_m * 0.9}"/><inertial pos="0 0 0" '
+            f'mass="{mass * part}" diaginertia="1e-6 1e-6 1e-6"/><body '
+            f'name="n{n}"><inertial pos="0 0 0" mass="1e-5" '
+            'diaginertia="1e-9 1e-9 1e-9"/></body></body>'
         )
-        for beside, stiff in (
-            (number[r + 1 : r + 2, c], dy / dz * of_col),
-            (number[r, c + 1 : c + 2], dz / dy * of_row),
-        ):
-            for m in beside:
-                springs += (
-                    f'<fixed stiffness="{shear * stiff}"><joint joint="b{n}" coef="1"/>'
-                    f'<joint joint="b{m}" coef="-1"/></fixed>'
-                )
-        if r < rows and c < cols:
-            a = n
-            b = n + 1
-            d = n + cols + 1
-            e = n + cols + 2
-            triangles += [a, b, e, a, e, d] if (r + c) % 2 else [a, b, d, b, e, d]
-    bodies = " ".join(f"n{n}" for n in number.flat)
-    face = (
+    return xml
+
+
+def tendons_xml(net, shear):
+    """The springs between a knot and the next ones, below it and beside it."""
+    xml = ""
+    for (r, c), n in np.ndenumerate(net.numbers):
+        below = shear * (net.dy_m / net.dz_m * net.col_parts[c])
+        beside = shear * (net.dz_m / net.dy_m * net.row_parts[r])
+        for m in net.numbers[r + 1 : r + 2, c]:
+            xml += spring_xml(n, m, below)
+        for m in net.numbers[r, c + 1 : c + 2]:
+            xml += spring_xml(n, m, beside)
+    return f"<tendon>{xml}</tendon>"
+
+
+def spring_xml(first, second, stiffness):
+    """A spring between two knots."""
+    return (
+        f'<fixed stiffness="{stiffness}"><joint joint="b{first}" coef="1"/>'
+        f'<joint joint="b{second}" coef="-1"/></fixed>'
+    )
+
+
+def face_xml(net):
+    """The face over the knots, of two triangles a cell, whose diagonals alternate."""
+    triangles = []
+    for r, c in np.ndindex(net.rows, net.cols):
+        (a, b), (d, e) = net.numbers[r : r + 2, c : c + 2]
+        triangles += [a, b, e, a, e, d] if (r + c) % 2 else [a, b, d, b, e, d]
+    bodies = " ".join(f"n{n}" for n in net.numbers.flat)
+    return (
         f'<deformable><flex name="face" dim="2" radius="{FACE_M}" body="{bodies}" '
-        f'vertex="{"0 0 0 " * number.size}" '
+        f'vertex="{"0 0 0 " * net.numbers.size}" '
         f'element="{" ".join(map(str, triangles))}"><contact '
         f'contype="2" conaffinity="1" selfcollide="none" condim="1" solref="{CONTACT}" '
         'solimp="0.95 0.95 0.001"/></flex></deformable>'
     )
-    return knots, f"<tendon>{springs}</tendon>{face}"
 
 
 class Rub:
     """Coulomb friction between skin and layer, on the stretch of the skin along the
-    forearm.
+    forearm; none of 0.
 
     Friction at each pad would jam instead. The knots under the pads yield in one
     direction only, so pads on the two sides of a dent would lean against each other and
@@ -125,14 +155,14 @@ class Rub:
             self._speed(data, self.arm, point) - self._speed(data, self.thing, point)
         )
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
-        pull = min(max(pull, -most), most)
-        self.pull = pull
-        stretch = self.stretch + slips * self.model.opt.timestep
+        self.pull = np.clip(pull, -most, most)
         longest = most / SHEAR_N_M
-        self.stretch = min(max(stretch, -longest), longest)
-        for body, force in ((self.arm, -pull * along), (self.thing, pull * along)):
+        stretch = self.stretch + slips * self.model.opt.timestep
+        self.stretch = np.clip(stretch, -longest, longest)
+        force = self.pull * along
+        for body, push in ((self.arm, -force), (self.thing, force)):
             mujoco.mj_applyFT(
-                self.model, data, force, np.zeros(3), point, body, data.qfrc_applied
+                self.model, data, push, np.zeros(3), point, body, data.qfrc_applied
             )
 
     def _speed(self, data, body, point):

@@ -1,9 +1,5 @@
 """The tangential force of each pad of `mujoco_touch`, from MuJoCo's contacts."""
 
-from __future__ import annotations
-
-import math
-
 import mujoco
 import numpy as np
 
@@ -15,45 +11,43 @@ class Tangents:
 
     Args:
         model: MuJoCo's.
-        where: (row, column) of each pad.
+        columns: (pads,) of the skin.
     """
 
-    def __init__(self, model, where):
+    def __init__(self, model, columns):
         self._model = model
-        self._pad_of_geom = {}
-        for number in range(len(where)):
-            body = model.body(f"pad{number}").id
-            self._pad_of_geom[int(model.body_geomadr[body])] = number
-        self._arm = model.body_parentid[model.body("pad0").id]
-        angles = np.radians([CODY_SKIN["column_angles_deg"][c] for _, c in where])
-        self._around = np.column_stack(
-            [-np.sin(angles), np.cos(angles), np.zeros(len(where))]
-        )
-        """(pads, 3) towards higher angles, in the arm's link."""
-        columns = np.array(CODY_SKIN["column_angles_deg"])
-        turn = (columns[1] - columns[0] + 180.0) % 360.0 - 180.0
-        self._sign = math.copysign(1.0, turn)
+        bodies = [model.body(f"pad{number}").id for number in range(len(columns))]
+        geoms = (int(model.body_geomadr[body]) for body in bodies)
+        self._pad_of_geom = {geom: number for number, geom in enumerate(geoms)}
+        self._arm = model.body_parentid[bodies[0]]
+        degrees = np.array(CODY_SKIN["column_angles_deg"])
+        angles = np.radians(degrees)[columns]
+        turn = (degrees[1] - degrees[0] + 180.0) % 360.0 - 180.0
+        around = [-np.sin(angles), np.cos(angles), np.zeros(len(columns))]
+        self._around = np.sign(turn) * np.column_stack(around)
+        """(pads, 3) towards the next column, in the arm's link."""
 
-    def read(self, data, loads, rub):
+    def read(self, data, loads, pull):
         """(pads, 2) newtons on each pad along the rows and around the columns.
 
         The pull of a soft layer's skin friction is shared by the pads' loads.
         """
-        forces = np.zeros((len(self._around), 3))
+        forces = np.zeros((len(loads), 3))
         wrench = np.zeros(6)
         for number in range(data.ncon):
             contact = data.contact[number]
-            first, second = (int(geom) for geom in contact.geom)
-            pad = self._pad_of_geom.get(second, self._pad_of_geom.get(first))
-            if pad is None:
+            first, second = (self._pad_of_geom.get(int(geom)) for geom in contact.geom)
+            if first is second is None:
                 continue
             mujoco.mj_contactForce(self._model, data, number, wrench)
             # The contact's normal points from its first geom to its second.
             force = contact.frame.reshape(3, 3).T @ wrench[:3]
-            forces[pad] += force if second in self._pad_of_geom else -force
+            if second is None:
+                forces[first] -= force
+            else:
+                forces[second] += force
         local = forces @ data.xmat[self._arm].reshape(3, 3)
         along = -local[:, 2]
-        if rub is not None and loads.sum() > 0.0:
-            along = along + rub.pull * loads / loads.sum()
-        around = self._sign * (local * self._around).sum(axis=1)
-        return np.column_stack([along, around])
+        if loads.any():
+            along += pull * loads / loads.sum()
+        return np.column_stack([along, (local * self._around).sum(axis=1)])

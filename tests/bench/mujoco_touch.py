@@ -8,10 +8,9 @@ clamped. A soft thing has an elastic layer (`mujoco_layer`); a plant is a set of
 stems.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from string import Template
 
@@ -38,6 +37,9 @@ PLACE_M = 0.10
 COUNTS_PER_NEWTON = 1000.0
 THRESHOLD_COUNTS = 40
 ONSET_COUNTS = 60
+LEAST_COUNTS = 35.0
+MOST_COUNTS = 17e3
+"""The electronics shows less as nothing, and no more."""
 RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
@@ -128,9 +130,13 @@ class Touch:
         layer."""
         if not self.thing.layered:
             return self.taxel_n_m
-        return 1.0 / (
-            1.0 / self.taxel_n_m + 1.0 / mujoco_layer.beneath_n_m(self.thing.modulus_pa)
-        )
+        beneath_n_m = mujoco_layer.beneath_n_m(self.thing.modulus_pa)
+        return 1.0 / (1.0 / self.taxel_n_m + 1.0 / beneath_n_m)
+
+    @property
+    def equilibrium_rad(self):
+        """(dof,) the arm's equilibrium point at the beginning."""
+        return np.radians(START_DEG) + self.start_rad
 
     @property
     def rate_rad_s(self):
@@ -140,12 +146,25 @@ class Touch:
     @property
     def lag_rad(self):
         """(dof,) by which each joint trails its equilibrium point in free motion."""
-        seconds = (
-            np.array(CODY_DAMPING)
-            / np.array(CODY_STIFFNESS)
-            / math.sqrt(self.stiffness)
-        )
+        seconds = np.divide(CODY_DAMPING, CODY_STIFFNESS) / math.sqrt(self.stiffness)
         return seconds * self.rate_rad_s
+
+    @property
+    def begin_rad(self):
+        """(dof,) the arm's angles at the beginning."""
+        return self.equilibrium_rad - self.lag_rad
+
+    @property
+    def labels(self):
+        """The labels of a recording."""
+        mobility = "fixed" if self.fixed else "movable"
+        softness = "soft" if self.thing.soft else "rigid"
+        return {
+            "category": f"{softness}-{mobility}",
+            "mobility": mobility,
+            "softness": softness,
+            "object": self.thing.kind,
+        }
 
 
 def joined(numbers):
@@ -158,15 +177,14 @@ def arm_xml(facing_deg, touch):
     links = {1: ("0.03 0.09", 2.1, "0 0 -0.13"), 3: ("0.03 0.09", 1.5, "0 0 -0.12")}
     angles = np.array(CODY_SKIN["column_angles_deg"])
     facing = np.abs((angles - facing_deg + 180.0) % 360.0 - 180.0) <= FACING_DEG
-    columns = np.flatnonzero(facing).tolist()
-    where = [(row, column) for row in range(ROWS) for column in columns]
+    where = list(product(range(ROWS), np.flatnonzero(facing).tolist()))
     pads = ""
     for number, (row, column) in enumerate(where):
         angle = math.radians(angles[column])
         out = math.cos(angle), math.sin(angle)
-        x, y = ((RADIUS_M - PAD_M) * v for v in out)
+        place = *((RADIUS_M - PAD_M) * v for v in out), 0.18432 - 0.0108 * row
         pads += (
-            f'<body name="pad{number}" pos="{x} {y} {0.18432 - 0.0108 * row}" '
+            f'<body name="pad{number}" pos="{joined(place)}" '
             f'childclass="pad"><joint axis="{joined(out)} 0"/><geom/></body>'
         )
     xml = ""
@@ -203,9 +221,7 @@ def stems_xml(thing):
 def upper_xml(thing):
     """What stands on the thing's foot, and the springs and the face of a layer."""
     if thing.layered:
-        return mujoco_layer.layer_xml(
-            thing.height_m, thing.breadth_m, thing.modulus_pa, thing.thick_m
-        )
+        return mujoco_layer.layer_xml(thing)
     if thing.soft:
         return stems_xml(thing), ""
     half = (thing.below_m + thing.height_m / 2) / 2
@@ -214,26 +230,38 @@ def upper_xml(thing):
     shape = f'type="box" size="{HALF_M} {across} {half}"'
     if thing.kind == "drum":
         deep = across + HALF_M
-        shape = f'type="cylinder" size="{across + HALF_M} {half}"'
+        shape = f'type="cylinder" size="{deep} {half}"'
     place = f'pos="{deep} 0 {ABOVE_FLOOR_M + thing.height_m / 2 - half}"'
     return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
 
-def model_of(touch):
-    """MuJoCo's model of a touch, the arm's start (dof,), and where the pads are."""
-    # It warns, and writes a file, of each face that only a layer's knots hold.
-    mujoco.set_mju_user_warning(lambda text: None)
-    thing = touch.thing
-    k = touch.pad_n_m
-    start = np.radians(START_DEG) + np.array(touch.start_rad)
-    rate = touch.rate_rad_s
-    first = start - touch.lag_rad
-    pose = ARM.pose(first + rate * LEAD_S)
-    later = ARM.pose(first + rate * (LEAD_S + 0.01))
+def pressing(touch):
+    """The words of `touch.xml` that tell how pads and thing press on each other."""
+    words = {"pad_n_m": touch.pad_n_m, "pad_kg": PAD_KG}
+    if touch.thing.layered:
+        words["pad_loss"] = 2.0 * math.sqrt(touch.pad_n_m * PAD_KG)
+        return words | {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
+    words["pad_loss"] = PAD_LOSS_S * touch.pad_n_m
+    return words | {"contact": RIGID, "dimensions": 3, "foot_x": HALF_M}
+
+
+def meeting(touch):
+    """The arm's pose (4, 4) as it meets the thing, the point where it does (3,), and the
+    heading of that point in radians."""
+    pose = ARM.pose(touch.begin_rad + touch.rate_rad_s * LEAD_S)
+    later = ARM.pose(touch.begin_rad + touch.rate_rad_s * (LEAD_S + 0.01))
     on = np.array([0.0, 0.0, touch.place_m, 1.0])
     point = (pose @ on)[:3]
     speed = (later @ on)[:3] - point
-    heading = math.atan2(speed[1], speed[0])
+    return pose, point, math.atan2(speed[1], speed[0])
+
+
+def model_of(touch):
+    """MuJoCo's model of a touch, and the (row, column) of each pad."""
+    # It warns, and writes a file, of each face that only a layer's knots hold.
+    mujoco.set_mju_user_warning(lambda text: None)
+    thing = touch.thing
+    pose, point, heading = meeting(touch)
     ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
     across = pose[:3, :3].T @ ahead
     arm, where = arm_xml(math.degrees(math.atan2(across[1], across[0])), touch)
@@ -245,22 +273,16 @@ def model_of(touch):
         for i, stiffness in enumerate(CODY_STIFFNESS)
     )
     slope = touch.slope_rad
+    gravity = *(G_M_S2 * math.sin(slope) * ahead[:2]), -G_M_S2 * math.cos(slope)
     words = {
         **vars(thing),
+        **pressing(touch),
         "x": x,
         "y": y,
         "floor_m": z - ABOVE_FLOOR_M,
-        "pad_n_m": k,
-        "pad_loss": PAD_LOSS_S * k,
-        "pad_kg": PAD_KG,
-        "gravity": joined(
-            (*(G_M_S2 * math.sin(slope) * ahead[:2]), -G_M_S2 * math.cos(slope))
-        ),
-        "contact": RIGID,
-        "dimensions": 3,
+        "gravity": joined(gravity),
         "turn_rad": heading + touch.yaw_rad,
         "foot_m": f"{HALF_M} {max(thing.breadth_m / 2, HALF_M)}",
-        "foot_x": HALF_M,
         "foot_kg": thing.mass_kg * 0.8,
         "motors": "".join(motors),
         "arm": arm,
@@ -269,10 +291,46 @@ def model_of(touch):
     }
     if touch.fixed:
         words["joint"] = ""
-    if thing.layered:
-        words |= {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
-        words["pad_loss"] = 2.0 * math.sqrt(k * PAD_KG)
-    return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), start, where
+    return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), where
+
+
+class Running:
+    """A touch that is being simulated.
+
+    Attributes:
+        data: MuJoCo's state.
+        pads: (2, n) row and column of each pad.
+    """
+
+    def __init__(self, touch):
+        self._touch = touch
+        self._model, where = model_of(touch)
+        self.data = mujoco.MjData(self._model)
+        self.data.qpos[: ARM.dof] = touch.begin_rad
+        self.data.qvel[: ARM.dof] = touch.rate_rad_s
+        mujoco.mj_forward(self._model, self.data)
+        self.pads = np.array(where).T
+        self._tangents = Tangents(self._model, self.pads[1])
+        friction = touch.thing.skin if touch.thing.layered else 0.0
+        self._rub = mujoco_layer.Rub(self._model, friction)
+
+    def loads(self):
+        """(pads,) newtons; the pads' joints follow the arm's."""
+        pushed = self.data.qpos[ARM.dof : ARM.dof + self.pads.shape[1]]
+        return np.maximum(-self._touch.pad_n_m * pushed, 0.0)
+
+    def pulls(self):
+        """(pads, 2) newtons along the rows and around the columns."""
+        return self._tangents.read(self.data, self.loads(), self._rub.pull)
+
+    def advance(self):
+        """Step to the next frame, with the arm's equilibrium point moving on."""
+        touch = self._touch
+        for _ in range(round(1.0 / (RATE_HZ * self._model.opt.timestep))):
+            turned = touch.rate_rad_s * self.data.time
+            self.data.ctrl[:] = touch.equilibrium_rad + turned
+            self._rub.hold(self.data, self.loads())
+            mujoco.mj_step(self._model, self.data)
 
 
 def simulate(touch):
@@ -282,57 +340,43 @@ def simulate(touch):
         The recording; (n,) newtons that the pads bear; (n,) metres that the thing has
         moved at the height of the contact. The skin cannot see the last two.
     """
-    model, start, where = model_of(touch)
-    thing = touch.thing
-    rate = touch.rate_rad_s
-    dof = ARM.dof
-    data = mujoco.MjData(model)
-    data.qpos[:dof] = start - touch.lag_rad
-    data.qvel[:dof] = rate
-    mujoco.mj_forward(model, data)
-    rub = mujoco_layer.Rub(model, thing.skin) if thing.layered else None
-
-    def pressed():
-        """(pads,) newtons; the pads' joints follow the arm's."""
-        return np.maximum(-touch.pad_n_m * data.qpos[dof : dof + len(where)], 0.0)
-
+    running = Running(touch)
     # A soft thing is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
     loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
-    tangents = Tangents(model, where)
     pulls = np.zeros((*loads.shape, 2))
-    joints = np.zeros((len(t), dof))
+    joints = np.zeros((len(t), ARM.dof))
     places = np.zeros((len(t), 3))
-    row, column = np.array(where).T
-    body = data.body("thing")
+    row, column = running.pads
+    body = running.data.body("thing")
     for i in range(len(t)):
-        loads[i, row, column] = pressed()
-        pulls[i, row, column] = tangents.read(data, pressed(), rub)
-        joints[i] = data.qpos[:dof]
+        loads[i, row, column] = running.loads()
+        pulls[i, row, column] = running.pulls()
+        joints[i] = running.data.qpos[: ARM.dof]
         places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
-        for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
-            data.ctrl[:] = start + rate * data.time
-            if rub is not None:
-                rub.hold(data, pressed())
-            mujoco.mj_step(model, data)
+        running.advance()
+    frames, shear = readings(touch, loads, pulls)
+    skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
+    skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
+    meta = {"labels": touch.labels, "skin": skin, "arm": ARM.to_dict()}
+    meta["source"] = "MuJoCo, tests/bench/mujoco_touch.py"
+    moved_m = np.hypot(*(places - places[0])[:, :2].T)
+    recording = Recording(t, frames, joints=joints, meta=meta, shear=shear)
+    return recording, loads.sum(axis=(1, 2)), moved_m
+
+
+def readings(touch, loads, pulls):
+    """The counts (n, rows, cols) and shear (n, rows, cols, 2) that an electronics of
+    these newtons gives, with noise."""
     counts = loads * COUNTS_PER_NEWTON
-    sheared = pulls * COUNTS_PER_NEWTON
+    shear = pulls * COUNTS_PER_NEWTON
     if touch.noise is not None:
         size, generator = touch.noise
         counts += generator.normal(0.0, size, counts.shape)
-        sheared += generator.spawn(1)[0].normal(0.0, size, sheared.shape)
-    shear = np.where(np.abs(sheared) < 35.0, 0.0, np.clip(sheared, -17e3, 17e3))
-    frames = np.where(counts < 35.0, 0.0, np.minimum(counts, 17e3)).astype(np.uint16)
-    condition = "fixed" if touch.fixed else "movable"
-    soft = "soft" if thing.soft else "rigid"
-    labels = {"category": f"{soft}-{condition}", "mobility": condition}
-    labels |= {"softness": soft, "object": thing.kind}
-    skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
-    skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
-    source = "MuJoCo, tests/bench/mujoco_touch.py"
-    meta = {"labels": labels, "skin": skin, "arm": ARM.to_dict(), "source": source}
-    whole = np.rint(shear).astype(np.int16)
-    recording = Recording(t, frames, joints=joints, meta=meta, shear=whole)
-    moved_m = np.hypot(*(places - places[0])[:, :2].T)
-    return recording, loads.sum(axis=(1, 2)), moved_m
+        shear += generator.spawn(1)[0].normal(0.0, size, shear.shape)
+    shear = np.where(
+        np.abs(shear) < LEAST_COUNTS, 0.0, shear.clip(-MOST_COUNTS, MOST_COUNTS)
+    )
+    counts = np.where(counts < LEAST_COUNTS, 0.0, np.minimum(counts, MOST_COUNTS))
+    return counts.astype(np.uint16), np.rint(shear).astype(np.int16)
