@@ -18,7 +18,6 @@ import train
 from edge.cli import main as edge_classify
 from edge.recording import Recording
 from edge.saving import save
-from edge.touch.arm import Chain
 from edge.touch.layout import SkinLayout
 from export.__main__ import main as export_main
 
@@ -44,49 +43,35 @@ FOREARM = SkinLayout(
 )
 
 
-def touch(  # noqa: PLR0913 - independent properties of a touch
-    *,
-    kind="hard",
-    seed=0,
-    seconds=1.6,
-    lead_s=0.2,
-    layout=FOREARM,
-    arm=True,
-    rate=100.0,
-    labels=None,
+def touch(
+    *, kind="hard", seed=0, seconds=1.6, lead_s=0.2, arm=True, rate=100.0, labels=None
 ):
     """A contact that grows: a hard one in force, a soft one in area. It imitates no
     physics."""
     rng = np.random.default_rng([seed, len(kind)])
     n = round((lead_s + seconds) * rate)
     t = np.arange(n) / rate
-    frames = np.zeros((n, layout.rows, layout.cols), dtype=np.uint16)
+    rows, cols = FOREARM.shape
     row = rng.integers(4, 10)
-    col = rng.integers(0, layout.cols)
+    col = rng.integers(0, cols)
     slope = rng.uniform(0.8, 1.2)
+    down = np.abs(np.arange(rows) - row)[:, None]
+    round_it = np.abs((np.arange(cols) - col + cols // 2) % cols - cols // 2)
+    frames = np.zeros((n, rows, cols), dtype=np.uint16)
     for i in np.flatnonzero(t >= lead_s):
         age = (t[i] - lead_s) * slope
         force = 300 + age * (4000 if kind == "hard" else 500)
         reach = 1 if kind == "hard" else 1 + int(3 * age)
-        for r in range(max(row - reach, 0), min(row + reach + 1, layout.rows)):
-            for c in range(col - reach, col + reach + 1):
-                frames[i, r, c % layout.cols] = force / (
-                    1 + abs(r - row) + abs(c - col)
-                )
+        pressed = np.maximum(down, round_it) <= reach
+        frames[i] = pressed * force / (1 + down + round_it)
     joints = None
     if arm:
-        chain = Chain.cody()
         joints = np.tile([0.2, 0.1, 0.0, 1.2, 0.0], (n, 1))
         joints[:, 0] += 0.3 * t * slope
-        assert joints.shape[1] == chain.dof
-    own = {"category": f"{'rigid' if kind == 'hard' else 'soft'}-fixed"}
-    own["object"] = f"{kind} {seed % 2}"
-    meta = {
-        "labels": labels or own,
-        "skin": layout.to_dict(),
-        "source": "test",
-        "trial": seed,
-    }
+    softness = "rigid" if kind == "hard" else "soft"
+    usual = {"category": f"{softness}-fixed", "object": f"{kind} {seed % 2}"}
+    meta = {"labels": labels or usual, "skin": FOREARM.to_dict()}
+    meta |= {"source": "test", "trial": seed}
     return Recording(t=t, frames=frames, joints=joints, meta=meta)
 
 
@@ -102,10 +87,8 @@ def save_touches(folder, count, **more):
     digits = len(str(count - 1))
     for kind in ("hard", "soft"):
         for seed in range(count):
-            save(
-                folder / f"{kind}_{seed:0{digits}}.npz",
-                touch(kind=kind, seed=seed, **more),
-            )
+            path = folder / f"{kind}_{seed:0{digits}}.npz"
+            save(path, touch(kind=kind, seed=seed, **more))
     return folder
 
 
@@ -125,16 +108,11 @@ def recordings(tmp_path_factory):
 def in_a_row(*touches, rest=50):
     """Touches one after another at 100 Hz, each with so many frames of rest after
     it."""
-    still = np.zeros((rest, *touches[0].frames.shape[1:]), np.uint16)
-    frames = np.concatenate([part for each in touches for part in (each.frames, still)])
-    ends = [np.repeat(each.joints[-1:], rest, axis=0) for each in touches]
-    joints = [
-        part
-        for each, end in zip(touches, ends, strict=True)
-        for part in (each.joints, end)
-    ]
-    t = np.arange(len(frames)) / 100.0
-    return replace(touches[0], t=t, frames=frames, joints=np.concatenate(joints))
+    frames = [np.pad(each.frames, ((0, rest), (0, 0), (0, 0))) for each in touches]
+    joints = [np.pad(each.joints, ((0, rest), (0, 0)), "edge") for each in touches]
+    t = np.arange(sum(map(len, frames))) / 100.0
+    whole = {"frames": np.concatenate(frames), "joints": np.concatenate(joints)}
+    return replace(touches[0], t=t, **whole)
 
 
 def full_pipe():

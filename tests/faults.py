@@ -14,7 +14,7 @@ import argparse
 import errno
 import math
 import sys
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -28,7 +28,8 @@ from edge.skin import file as skinfile
 from edge.skin.loop import Schedule
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
-from tests.faulty import Fault, faulty_buses, one_bus
+from tests.bench import tables
+from tests.faulty import Fault, Route, faulty_buses, one_bus
 from train.progress import bar
 
 OVERHEADS_US = (0.0, 50.0, 100.0)
@@ -133,6 +134,18 @@ class Outcome:
     missed_ticks: int = 0
     back_s: float = 0.0
 
+    def row(self, met):
+        """A row of a table; `met` heads the column of that number."""
+        return {
+            "fault": self.name,
+            met: self.met,
+            "wrong values called valid": self.wrong,
+            "taxels missing, worst frame": self.missing,
+            "readings lost on other chips": self.others,
+            "ticks left out": self.missed_ticks,
+            "all back after, ms": f"{1e3 * self.back_s:.0f}",
+        }
+
 
 class Watched:
     """A fake skin that feels its pattern, was started while faults were played, and is
@@ -141,15 +154,8 @@ class Watched:
     def __init__(self, file, *, faults=(), overhead_s=0.0, seed=0):
         clock = VirtualClock()
         self.feels = Pattern(file)
-        self.buses = faulty_buses(
-            file,
-            self.feels,
-            clock,
-            timed=True,
-            overhead_s=overhead_s,
-            faults=faults,
-            seed=seed,
-        )
+        options = {"timed": True, "overhead_s": overhead_s, "seed": seed}
+        self.buses = faulty_buses(file, self.feels, clock, faults=faults, **options)
         self.skin = Skin(file, self.buses, clock=clock)
         self.skin.start()
         clock.sleep_until(math.ceil(clock.now() / 0.01) * 0.01)
@@ -171,6 +177,22 @@ class Watched:
             self.back_at = self.skin.clock.now()
         return frame
 
+    def spare(self, file, faults):
+        """Count the readings lost on chips that no fault may meet."""
+        for bus in file.buses:
+            for chip in bus.chips:
+                met = any(touches(fault, bus, chip) for fault in faults)
+                self.spared.flat[list(chip.taxels)] = not met
+
+    def reset(self):
+        """Reset every chip and mux."""
+        for bus in self.buses:
+            for chip in bus.chips.values():
+                chip.reset()
+                for channel in getattr(chip, "channels", ()):
+                    for behind in channel.values():
+                        behind.reset()
+
     def outcome(self, name, met, end, missed_ticks=0):
         """The outcome of faults that ended at a time."""
         back = math.nan if self.back_at == math.inf else max(0.0, self.back_at - end)
@@ -181,9 +203,9 @@ class Watched:
 
 def touches(fault, bus, chip):
     """Whether a fault may meet a transaction with a chip or its mux."""
-    there = {"bus": bus.device, "mux": chip.mux, "channel": chip.channel}
-    at_it = fault.address in (None, chip.address, chip.mux)
-    return at_it and all(getattr(fault, key) in (None, there[key]) for key in there)
+    to_chip = Route(chip.address, chip.mux, chip.channel)
+    there = fault.targets(to_chip) or fault.targets(Route(chip.mux))
+    return there and fault.bus in (None, bus.device)
 
 
 def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, seed=0):
@@ -193,15 +215,11 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, se
     Frames count from 1. Without a script no reading counts as lost on another chip.
     """
     watched = Watched(file, overhead_s=overhead_s, seed=seed)
-    for bus in file.buses:
-        for chip in bus.chips:
-            spared = bool(faults) and not any(
-                touches(fault, bus, chip) for fault in faults
-            )
-            watched.spared.flat[list(chip.taxels)] = spared
+    if faults:
+        watched.spare(file, faults)
     with watched.skin as skin:
         start = skin.clock.now()
-        moved = [replace(f, during=tuple(start + t for t in f.during)) for f in faults]
+        moved = [fault.later(start) for fault in faults]
         for bus in watched.buses:
             bus.inject(moved, seed)
         end = max((fault.during[1] for fault in moved), default=start)
@@ -211,8 +229,7 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, se
                 break
             if k in resets:
                 end = skin.clock.now()
-                for chip in models(watched.buses):
-                    chip.reset()
+                watched.reset()
             watched.read()
     met = len(resets) + sum(bus.met for bus in watched.buses)
     return watched.outcome(name, met, end, schedule.missed_ticks)
@@ -226,21 +243,16 @@ def sweep(name, file, fault, *, set_up=False, every=1, first=0, overhead_s=0.0):
     """
     watched = Watched(file)
     with watched.skin:
-        before = [bus.transactions for bus in watched.buses]
-        for _ in range(4):
-            watched.read()
-        frame = [
-            bus.transactions - n for bus, n in zip(watched.buses, before, strict=True)
-        ]
-    outcomes = [
-        _one_fault(
-            file, replace(fault, at=[position], bus=bus.device), set_up, overhead_s
-        )
-        for bus, transactions in zip(
-            file.buses, before if set_up else frame, strict=True
-        )
-        for position in range(first, transactions, every)
-    ]
+        if not set_up:
+            for bus in watched.buses:
+                bus.inject([])
+            for _ in range(4):
+                watched.read()
+    outcomes = []
+    for bus in watched.buses:
+        for position in range(first, bus.carried, every):
+            once = replace(fault, at=[position], bus=bus.name)
+            outcomes.append(_one_fault(file, once, set_up, overhead_s))
     return Outcome(
         f"{name}, {'set-up' if set_up else 'frame'}",
         met=len(outcomes),
@@ -264,14 +276,6 @@ def _one_fault(file, fault, set_up, overhead_s):
             if k > 4 and t - max(end, watched.back_at) > INTACT_FRAMES * skin.period_s:
                 break
     return watched.outcome("", 1, end)
-
-
-def models(buses):
-    """The models of all chips and muxes of fake buses."""
-    for chip in [chip for bus in buses for chip in bus.chips.values()]:
-        yield chip
-        for channel in getattr(chip, "channels", []):
-            yield from channel.values()
 
 
 def scripts():
@@ -330,12 +334,28 @@ def scripts():
 
 def table(outcomes, met):
     """The outcomes as a Markdown table; `met` heads the column of that number."""
-    heads = ["fault", met, "wrong values called valid", "taxels missing, worst frame"]
-    heads += ["readings lost on other chips", "ticks left out", "all back after, ms"]
-    rows = [[*astuple(o)[:-1], f"{1e3 * o.back_s:.0f}"] for o in outcomes]
-    return "\n".join(
-        f"| {' | '.join(map(str, row))} |" for row in [heads, ["---"] * 7, *rows]
-    )
+    return tables.markdown([outcome.row(met) for outcome in outcomes])
+
+
+def plays(seed, overhead_s):
+    """The scripts, and the loss of all settings, once and again."""
+    cost = {"overhead_s": overhead_s}
+    for name, file, faults in scripts():
+        yield delayed(run)(name, file, faults, seed=seed, **cost)
+    for name, file in SKINS.items():
+        yield delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost)
+        again = f"all reset 4 times, {name}"
+        yield delayed(run)(again, file, resets=REPEATED, **cost)
+
+
+def sweeps(every, overhead_s):
+    """Each fault that the protocol can tell, at each transaction of each skin."""
+    options = {"every": every, "overhead_s": overhead_s}
+    for name, file in SKINS.items():
+        for kind, fault in KINDS.items():
+            for set_up in (False, True):
+                words = f"{kind}, {name}"
+                yield delayed(sweep)(words, file, fault, set_up=set_up, **options)
 
 
 def campaign(overhead_us, every, seed):
@@ -344,34 +364,18 @@ def campaign(overhead_us, every, seed):
     Returns:
         The names of the outcomes that break the promise.
     """
-    cost = {"overhead_s": overhead_us * 1e-6}
-    jobs = [
-        delayed(run)(name, file, faults, seed=seed, **cost)
-        for name, file, faults in scripts()
-    ]
-    for name, file in SKINS.items():
-        jobs.append(
-            delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost)
-        )
-        jobs.append(
-            delayed(run)(f"all reset 4 times, {name}", file, resets=REPEATED, **cost)
-        )
-    played = len(jobs)
-    jobs += [
-        delayed(sweep)(
-            f"{kind}, {name}", file, fault, set_up=set_up, every=every, **cost
-        )
-        for name, file in SKINS.items()
-        for kind, fault in KINDS.items()
-        for set_up in (False, True)
-    ]
-    outcomes = Parallel(n_jobs=-1)(
-        bar(jobs, desc=f"{overhead_us:g} us", unit=" scripts")
+    overhead_s = overhead_us * 1e-6
+    played = list(plays(seed, overhead_s))
+    jobs = bar(
+        [*played, *sweeps(every, overhead_s)],
+        desc=f"{overhead_us:g} us",
+        unit=" scripts",
     )
+    outcomes = Parallel(n_jobs=-1)(jobs)
     print(f"\nOverhead of {overhead_us:g} us a transaction:\n")
-    print(table(outcomes[:played], "met"))
+    print(table(outcomes[: len(played)], "met"))
     print("\n\\* The protocol cannot tell: see `scripts` in tests/faults.py.\n")
-    print(table(outcomes[played:], "positions"))
+    print(table(outcomes[len(played) :], "positions"))
     known = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
     longest = max(known, key=lambda outcome: outcome.back_s)
     print(

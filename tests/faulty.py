@@ -16,6 +16,14 @@ from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 
 
+class Route(NamedTuple):
+    """The target of a transaction: address, and the mux and channel on the way."""
+
+    address: int
+    mux: int | None = None
+    channel: int | None = None
+
+
 @dataclass(frozen=True)
 class Fault:
     """One kind of fault.
@@ -47,13 +55,19 @@ class Fault:
     mux: int | None = None
     channel: int | None = None
 
+    def lasts(self, t):
+        """Whether a time of the bus's clock is within the fault's."""
+        return self.during[0] <= t < self.during[1]
 
-class Route(NamedTuple):
-    """The target of a transaction: address, and the mux and channel on the way."""
+    def later(self, seconds):
+        """The same, so much later."""
+        begin, end = self.during
+        return replace(self, during=(begin + seconds, end + seconds))
 
-    address: int
-    mux: int | None = None
-    channel: int | None = None
+    def targets(self, route):
+        """Whether its target may be that of a transaction."""
+        there = route._asdict().items()
+        return all(getattr(self, key) in (None, at) for key, at in there)
 
 
 class FaultyBus(FakeBus):
@@ -74,40 +88,53 @@ class FaultyBus(FakeBus):
         # threads.
         self.random = random.Random(f"faults/{seed}/{self.name}")
 
+    @property
+    def carried(self):
+        """Number of transactions since the script started."""
+        return self.transactions - self._first
+
     def reopen(self):
         """Open it, unless a fault keeps the adapter away."""
-        gone = [
-            f
-            for f in self.faults
-            if (f.kind, f.code, f.at) == ("error", errno.ENODEV, None)
-        ]
-        if any(fault.during[0] <= self.now() < fault.during[1] for fault in gone):
-            raise bus_error(errno.ENODEV, self.name)
+        for fault in self.faults:
+            gone = fault.kind == "error" and fault.code == errno.ENODEV
+            if gone and fault.at is None and fault.lasts(self.now()):
+                raise bus_error(errno.ENODEV, self.name)
         super().reopen()
 
     def transfer(self, prepared):
         """Carry the messages, with the fault that is due."""
         first = prepared.messages[0]
-        into = prepared.messages[-1]
         route = self._route(first.address)
-        number = self.transactions - self._first
-        fault = self._due(route, number) if self.is_open else Fault("none")
-        if fault.kind == "error":
-            self._fail(fault, first)
-        if fault.kind == "foreign":
-            for mux in self.muxes():
-                mux.write(_another(mux.read(1, 0.0)), 0.0)
-                mux.stop()
-        if fault.kind == "reset":
-            for chip in self.chips_at(first.address):
-                chip.reset()
-        to_mux = isinstance(self.chips.get(first.address), FakeTCA9548A)
-        if fault.kind == "misroute" and to_mux and not first.read:
-            first = write(first.address, _another(first.buffer.tobytes()))
-            prepared = Transfer((first, *prepared.messages[1:]))
+        fault = self._due(route) if self.is_open else Fault("none")
+        match fault.kind:
+            case "error":
+                self._fail(fault, first)
+            case "foreign":
+                self._select_another()
+            case "reset":
+                for chip in self.chips_at(first.address):
+                    chip.reset()
+            case "misroute":
+                prepared = self._misrouted(prepared)
         super().transfer(prepared)
+        into = prepared.messages[-1]
         if into.read:
             self._spoil(fault, route, into.buffer)
+
+    def _select_another(self):
+        """Let another program select the next channel of each mux."""
+        for mux in self.muxes():
+            mux.write(_another(mux.read(1, 0.0)), 0.0)
+            mux.stop()
+
+    def _misrouted(self, prepared):
+        """The messages with the next channel in place of the one that they select."""
+        first, *others = prepared.messages
+        to_mux = isinstance(self.chips.get(first.address), FakeTCA9548A)
+        if first.read or not to_mux:
+            return prepared
+        wrong = write(first.address, _another(first.buffer.tobytes()))
+        return Transfer((wrong, *others))
 
     def _fail(self, fault, message):
         """Raise the fault's error, which takes its time."""
@@ -131,19 +158,14 @@ class FaultyBus(FakeBus):
         elif n > 2:
             self._held[route, n] = data.copy()
 
-    def _due(self, route, number):
-        """The first fault that matches a transaction, or one that does nothing."""
-        t = self.now()
+    def _due(self, route):
+        """The first fault that a transaction meets, or one that does nothing."""
         for fault in self.faults:
-            if (
-                (fault.at is None or number in fault.at)
-                and fault.during[0] <= t < fault.during[1]
-                and all(
-                    getattr(fault, key) in (None, at)
-                    for key, at in route._asdict().items()
-                )
-                and (fault.rate >= 1.0 or self.random.random() < fault.rate)
-            ):
+            if not (fault.lasts(self.now()) and fault.targets(route)):
+                continue
+            if fault.at is not None and self.carried not in fault.at:
+                continue
+            if fault.rate >= 1.0 or self.random.random() < fault.rate:
                 self.met += 1
                 return fault
         return Fault("none")
@@ -151,8 +173,8 @@ class FaultyBus(FakeBus):
     def _route(self, address):
         if address not in self.chips:
             for mux_address, mux in self.chips.items():
-                for channel in mux.connected if isinstance(mux, FakeTCA9548A) else ():
-                    return Route(address, mux_address, channel)
+                if isinstance(mux, FakeTCA9548A) and mux.connected:
+                    return Route(address, mux_address, mux.connected[0])
         return Route(address)
 
 

@@ -237,12 +237,23 @@ def temporaries(folder):
     return paths
 
 
-def tried(victim, moment):
-    """Kill a victim once.
+@dataclass(frozen=True)
+class Death:
+    """What came of a victim that was to be killed.
 
-    Returns:
-        Whether it was alive, whether it left a temporary file, and what is wrong.
+    Attributes:
+        alive: whether it was killed before its end.
+        left: whether it left a temporary file.
+        complaint: what is wrong; "" if nothing.
     """
+
+    alive: bool
+    left: bool
+    complaint: str
+
+
+def tried(victim, moment):
+    """Kill a victim once."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         victim.prepare(folder)
@@ -257,7 +268,38 @@ def tried(victim, moment):
         remaining = [path for path in left if path.exists()]
         if remaining:
             complaint += f"temporary files stay: {remaining}"
-        return alive, bool(left), complaint
+        return Death(alive, bool(left), complaint)
+
+
+def whole_s(victim):
+    """Seconds of a whole run, which must succeed."""
+    with tempfile.TemporaryDirectory() as folder:
+        victim.prepare(Path(folder))
+        began = time.perf_counter()
+        done = called(*victim.command(Path(folder)))
+        assert done.returncode == 0, done.stderr
+        return time.perf_counter() - began
+
+
+def deaths_of(name, victim, count):
+    """Kill a victim at so many moments, those of odd number shortly after a change."""
+    lasts_s = whole_s(victim)
+    stream = random.Random(f"kills {name}")
+    for i in tqdm(range(count), desc=name, leave=False, disable=None):
+        changes = stream.randint(1, MOST_CHANGES) if i % 2 else 0
+        delay_s = stream.uniform(0.0, CLOSE_S if changes else lasts_s)
+        yield tried(victim, Moment(changes, delay_s))
+
+
+def row(name, deaths, damages):
+    """A row of the table."""
+    return {
+        "command": f"`{name}`",
+        "runs": len(deaths),
+        "killed before their end": sum(death.alive for death in deaths),
+        "left a temporary file": sum(death.left for death in deaths),
+        "damage, or a next start that failed": damages,
+    }
 
 
 def main(argv=None):
@@ -271,34 +313,11 @@ def main(argv=None):
     rows = []
     complaints = []
     for name, victim in VICTIMS.items():
-        if arguments.only not in name:
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            victim.prepare(Path(folder))
-            began = time.perf_counter()
-            done = called(*victim.command(Path(folder)))
-            whole_s = time.perf_counter() - began
-            assert done.returncode == 0, done.stderr
-        stream = random.Random(f"kills {name}")
-        alive = left = 0
-        wrong = []
-        for i in tqdm(range(arguments.count), desc=name, leave=False, disable=None):
-            changes = stream.randint(1, MOST_CHANGES) if i % 2 else 0
-            longest_s = CLOSE_S if changes else whole_s
-            seen = tried(victim, Moment(changes, stream.uniform(0.0, longest_s)))
-            alive += seen[0]
-            left += seen[1]
-            wrong += [seen[2]] if seen[2] else []
-        complaints += [f"{name}: {text}" for text in wrong]
-        rows.append(
-            {
-                "command": f"`{name}`",
-                "runs": arguments.count,
-                "killed before their end": alive,
-                "left a temporary file": left,
-                "damage, or a next start that failed": len(wrong),
-            }
-        )
+        if arguments.only in name:
+            deaths = list(deaths_of(name, victim, arguments.count))
+            wrong = [death.complaint for death in deaths if death.complaint]
+            complaints += [f"{name}: {text}" for text in wrong]
+            rows.append(row(name, deaths, len(wrong)))
     for text in complaints:
         print(text, file=sys.stderr)
     if arguments.only:

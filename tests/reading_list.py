@@ -49,19 +49,13 @@ def _room(path):
 def lines_of_code(path):
     """Lines of a module without blank lines, comments and docstrings."""
     text = (ROOT / path).read_text()
-    tree = ast.parse(text)
-    docstrings = set()
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        for child in body if isinstance(body, list) else []:
-            if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant):
-                docstrings.update(range(child.lineno, (child.end_lineno or 0) + 1))
-    count = 0
-    for number, line in enumerate(text.splitlines(), 1):
-        stripped = line.strip()
-        if stripped and not stripped.startswith("#") and number not in docstrings:
-            count += 1
-    return count
+    lines = {number: line.strip() for number, line in enumerate(text.splitlines(), 1)}
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Expr(value=ast.Constant(), lineno=first, end_lineno=last):
+                for number in range(first, last + 1):
+                    lines[number] = ""
+    return sum(line != "" and not line.startswith("#") for line in lines.values())
 
 
 def main():

@@ -171,20 +171,39 @@ def of_onnx(data, draw):
         prop = draw.choice(model.metadata_props)
         prop.value = of_text(prop.value.encode(), draw).decode("utf-8", "replace")
     elif way == 4:
-        node.op_type = draw.choice(
-            ["Loop", "Exp", "Identity", *(n.op_type for n in graph.node)]
-        )
+        node.op_type = _operator(graph, draw)
     elif way == 5 and node.input:
-        names = [*(i.name for i in graph.initializer), "features", "", "nowhere"]
-        node.input[draw.randrange(len(node.input))] = draw.choice(names)
+        node.input[draw.randrange(len(node.input))] = _input(graph, draw)
     elif way == 6 and node.attribute:
         draw.choice(node.attribute).i = draw.choice((-1, 0, 1, 7, 1 << 40))
     elif way == 7:
-        constant.dims[:] = [draw.choice((0, 1, 3, 1 << 33)) for _ in constant.dims]
+        _reshape(constant, draw)
     elif way == 8:
-        array = of_array(numpy_helper.to_array(constant), draw)
-        if array.dtype.kind in "uif" and array.dtype.isnative:
-            constant.CopyFrom(numpy_helper.from_array(array, constant.name))
+        _exchange(constant, draw)
     else:
         model.opset_import[0].version = draw.choice((0, 1, 7, 17, 21, 999))
     return bytes(model.SerializeToString())
+
+
+def _operator(graph, draw):
+    """An operator of the graph, or another that ONNX has."""
+    known = [node.op_type for node in graph.node]
+    return draw.choice(["Loop", "Exp", "Identity", *known])
+
+
+def _input(graph, draw):
+    """The name of a constant, of the graph's input, or of nothing."""
+    constants = [constant.name for constant in graph.initializer]
+    return draw.choice([*constants, "features", "", "nowhere"])
+
+
+def _reshape(constant, draw):
+    """Give a constant another shape."""
+    constant.dims[:] = [draw.choice((0, 1, 3, 1 << 33)) for _ in constant.dims]
+
+
+def _exchange(constant, draw):
+    """Damage a constant as an array."""
+    array = of_array(numpy_helper.to_array(constant), draw)
+    if array.dtype.kind in "uif" and array.dtype.isnative:
+        constant.CopyFrom(numpy_helper.from_array(array, constant.name))
