@@ -153,16 +153,8 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
-    tasks = set(choices)
-    features: list[str] = []
-    for choice in choices.values():
-        tasks.update(choice.targets)
-        features += choice.features
-    dataset = fitted.measured.of(features)
-    y = {task: dataset.labels(task) for task in tasks}
-    X = dataset.features(fitted.window_s, fitted.samples)
-    widths = dataset.widths(fitted.samples)
-    classifier = ContactClassifier(choices, dataset.names, widths).fit(X, y)
+    dataset, vectors = fitted.taken(choices.values())
+    classifier = ContactClassifier.of(choices, vectors)
     of_candidate = replace(
         fitted, dataset=dataset, classifier=classifier, chosen={}, sequential=None
     )

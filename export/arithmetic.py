@@ -154,8 +154,7 @@ def compare(model: Path, golden: Path) -> list[dict[str, Any]]:
     if vectors is None or vectors.ndim != 2 or vectors.shape[1] != info.width:
         raise InputError(
             f"{golden}: has no vectors of {info.width} features; give the golden file "
-            "that was "
-            "exported with the model"
+            "that was exported with the model"
         )
     vectors = vectors[np.isfinite(vectors).all(axis=1)]
     shipped = onnx.load(model)

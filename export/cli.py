@@ -52,10 +52,20 @@ def parser() -> argparse.ArgumentParser:
         prog="export",
         description="Fits a model for every task that the recordings' labels share, and writes "
         "OUT/model.onnx and OUT/golden.npz. Options you give are held fixed. The "
-        "others are chosen "
-        "for each task: the smallest model within one standard error of the best in "
-        "cross-validation.",
+        "others are chosen for each task: the smallest model within one standard error "
+        "of the best in cross-validation.",
     )
+    _add_files(top)
+    _add_settings(top)
+    _add_choice(top)
+    _add_front(top)
+    _add_results(top)
+    top.set_defaults(run=run)
+    return top
+
+
+def _add_files(top: argparse.ArgumentParser) -> None:
+    """The recordings, the model and its tasks."""
     option = top.add_argument
     option(
         "--data",
@@ -71,6 +81,11 @@ def parser() -> argparse.ArgumentParser:
         "--name", help="of the model (default: that of the folder of the recordings)"
     )
     option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
+
+
+def _add_settings(top: argparse.ArgumentParser) -> None:
+    """The settings that can be held fixed."""
+    option = top.add_argument
     option(
         "--features",
         nargs="+",
@@ -86,6 +101,11 @@ def parser() -> argparse.ArgumentParser:
     option("--scaling", choices=SCALINGS, help="fix the scaling (paper, Eqs. 1 to 5)")
     option("--components", type=count, help="fix the number of principal components")
     option("-k", "--k", type=count, help="fix the number of neighbours")
+
+
+def _add_choice(top: argparse.ArgumentParser) -> None:
+    """How the others are chosen, and at which times."""
+    option = top.add_argument
     option(
         "--leave-out",
         default=LEAVE_OUT,
@@ -110,13 +130,17 @@ def parser() -> argparse.ArgumentParser:
         metavar="A:B:STEP",
         help="calibrate decisions before the full window (edge-classify run --error), at these "
         "seconds from onset, or at a list a,b,c, or `none` (default: "
-        f"{DECISION_POINTS} with "
-        f"{FEWEST} to {MOST_TRIALS} trials, and fewer points if the model would exceed "
-        "1 MB)",
+        f"{DECISION_POINTS} with {FEWEST} to {MOST_TRIALS} trials, and fewer points if "
+        "the model would exceed 1 MB)",
     )
     counts = within(int, 0, 65534)
     option("--threshold", type=counts, help="counts above which a taxel is in contact")
     option("--onset", type=counts, help="counts above which a contact begins")
+
+
+def _add_front(top: argparse.ArgumentParser) -> None:
+    """The point of `make tradeoff`, and the arm."""
+    option = top.add_argument
     option(
         "--front",
         metavar="WHAT",
@@ -131,6 +155,11 @@ def parser() -> argparse.ArgumentParser:
         help="the file with the points (default: %(default)s)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
+
+
+def _add_results(top: argparse.ArgumentParser) -> None:
+    """What is written and scored."""
+    option = top.add_argument
     text = "also write OUT/report.html, as `make export` does"
     option("--report", action="store_true", help=text)
     text = "recordings that are scored and never fitted, such as those of another day"
@@ -140,8 +169,6 @@ def parser() -> argparse.ArgumentParser:
     option(
         "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
     )
-    top.set_defaults(run=run)
-    return top
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -226,8 +253,7 @@ def _of_front(
     point = front.pick(arguments.front)
     print(
         f"{arguments.front}: a window of {point.window_s:g} s, {front.task} "
-        f"{point.accuracy:.1%} "
-        f"({100 * point.low:.0f} to {100 * point.high:.0f}) in "
+        f"{point.accuracy:.1%} ({100 * point.low:.0f} to {100 * point.high:.0f}) in "
         f"{point.milliseconds:.0f} ms",
         file=sys.stderr,
     )

@@ -14,6 +14,7 @@ from edge.recording import Recording
 from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet
+from train.evaluate import finest
 from train.parts import part
 
 TRIALS = 24
@@ -31,8 +32,8 @@ leave a factor of 40 and more. All outputs of the graph must be equal, to the bi
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
     """Trials spread evenly over the labels of the finest task."""
-    finest = max(dataset.tasks, key=lambda task: len(set(dataset.labels(task))))
-    order = np.argsort(dataset.labels(finest), kind="stable")
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    order = np.argsort(y[finest(y)], kind="stable")
     places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
     return sorted({int(order[i]) for i in places})
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,10 @@ from train.dataset import DataSet, Recordings, Untouched, load_trials, read
 from train.decision_points import MOST_TRIALS, usual_points
 from train.groups import LEAVE_OUT, Divisions, kinds_of
 from train.mix import mix
-from train.pipeline import ContactClassifier
+from train.pipeline import Choice, ContactClassifier
 from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
-from train.vectors import Labels
+from train.vectors import Labels, Vectors
 
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
@@ -75,6 +75,23 @@ class Fitted:
         """Settings of the decision points before the full window, where these have
         their own."""
         return None if self.sequential is None else self.sequential.early
+
+    def taken(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
+        """The trials, and their vectors, with the features and labels that some
+        settings of the tasks take."""
+        tasks = set(self.chosen)
+        features: list[str] = []
+        for choice in choices:
+            tasks.update(choice.targets)
+            features += choice.features
+        dataset = self.measured.of(features)
+        return dataset, Vectors(
+            dataset.features(self.window_s, self.samples),
+            {task: dataset.labels(task) for task in tasks},
+            dataset.names,
+            dataset.widths(self.samples),
+            dataset.is_own,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,8 +227,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
             notes += _early_of_known(measured, y, points, settings, fixed, sequential)
     else:
         widths = dataset.widths(fixed.samples)
-        classifier = ContactClassifier(settings.choices, dataset.names, widths)
-        classifier.fit(X, y, dataset.is_own)
+        vectors = Vectors(X, y, dataset.names, widths, dataset.is_own)
+        classifier = ContactClassifier.of(settings.choices, vectors)
     return Fitted(
         dataset=dataset,
         measured=measured,

@@ -31,9 +31,8 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
         )
     if len(contacts) != count:
         raise InputError(
-            f"meta.contacts labels {len(contacts)} contacts, {count} are found; correct "
-            "the labels or "
-            "the threshold"
+            f"meta.contacts labels {len(contacts)} contacts, {count} are found; "
+            "correct the labels or the threshold"
         )
     return [
         {**recording.labels, **{str(k): str(v) for k, v in own.items()}}

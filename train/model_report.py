@@ -84,84 +84,79 @@ def _left_out(
         choices: each task's settings, chosen without the left-out trials.
         test: the left-out trials.
     """
-    X = vectors.X
-    y = vectors.y
-    features = vectors.features
-    widths = vectors.columns
-    classes, index = np.unique(y[task], return_inverse=True)
-    counting = choices[task].counts(y[task], vectors.is_own) > 0
+    labels = vectors.y[task]
+    classes, index = np.unique(labels, return_inverse=True)
+    counting = choices[task].counts(labels, vectors.is_own) > 0
     counting[test] = False
     training = np.flatnonzero(counting)
-    quarter_of = stratified_folds(y[task][training], QUARTERS)
+    quarter_of = stratified_folds(labels[training], QUARTERS)
+    X = vectors.X[test]
     answers = []
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
-        earlier = vectors.part(train)
-        fewer = fittable(choices, earlier.y, earlier.is_own)
-        model = ContactClassifier(fewer, features, widths)
-        model.fit(earlier.X, earlier.y, earlier.is_own)
-        answers.append(model.classes_[task][model.decide(X[test])[task].labels])
-    rows = model.neighbours(task, X[test])[1]
-    key = model.spaces_[task]
-    c = model.components_[task]
-    p = model.projections_[key]
-    space = Space(
-        model.columns_[key],
-        p.mean_,
-        p.gain_,
-        p.weights_[:, :c],
-        model.rows_[key][:, :c],
-        index[train],
-        MOST_STEPS * p.grid_.step,
-        p.grid_.limit * p.grid_.unit,
-    )
+        fewer = vectors.part(train)
+        possible = fittable(choices, fewer.y, fewer.is_own)
+        model = ContactClassifier.of(possible, fewer)
+        answers.append(model.classes_[task][model.decide(X)[task].labels])
+    _, voters = model.neighbours(task, X)
+    space = _space(model, task, index[train])
+    form = vectors.features, vectors.columns
 
     def numbered(near: Any) -> Any:
         """The training trial under its number among all trials; None stays None."""
         return near and near._replace(row=int(train[near.row]))
 
     explained = {}
-    for trial, voters, answer in zip(
-        test.tolist(), rows.tolist(), answers[-1], strict=True
+    for place, (trial, answer) in enumerate(
+        zip(test.tolist(), answers[-1], strict=True)
     ):
-        if answer != y[task][trial] or trial % max(len(X) // EXPLAINED, 1) == 0:
+        if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
             label = int(np.searchsorted(classes, answer))
             truth = int(index[trial])
-            why = explain(space, X[trial], voters, label, features, widths, truth)
+            why = explain(space, X[place], voters[place].tolist(), label, *form, truth)
             voted = tuple(map(numbered, why.voters))
             explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
     return answers, explained
 
 
+def _space(model: ContactClassifier, task: str, labels: NDArray[np.int64]) -> Space:
+    """The space of a task, whose trials have these labels (n,)."""
+    key = model.spaces_[task]
+    c = model.components_[task]
+    projection = model.projections_[key]
+    grid = projection.grid_
+    return Space(
+        columns=model.columns_[key],
+        mean=projection.mean_,
+        gain=projection.gain_,
+        weights=projection.weights_[:, :c],
+        rows=model.rows_[key][:, :c],
+        labels=labels,
+        reach=MOST_STEPS * grid.step,
+        limit=grid.limit * grid.unit,
+    )
+
+
 def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     """{task: its answers to left-out trials}, the same that the nested accuracy
     counts."""
-    by_fold = [
-        by_task for chosen in fitted.chosen.values() for by_task in chosen.by_fold
-    ]
-    choices = [choice for by_task in by_fold for choice in by_task.values()]
-    dataset = fitted.measured.of(
-        [name for choice in choices for name in choice.features]
-    )
-    tasks = {
-        *fitted.chosen,
-        *(target for choice in choices for target in choice.targets),
-    }
-    y = {task: dataset.labels(task) for task in tasks}
+    choices: list[Choice] = []
+    for chosen in fitted.chosen.values():
+        for by_task in chosen.by_fold:
+            choices += by_task.values()
+    _, vectors = fitted.taken(choices)
     answers = {}
     cases = []
     for task, chosen in fitted.chosen.items():
-        tested = (chosen.folds >= 0) & (y[task] != "")
-        truth = np.where(tested, y[task], "")
-        classes = np.unique(y[task]).tolist()
+        labels = vectors.y[task]
+        tested = (chosen.folds >= 0) & (labels != "")
+        truth = np.where(tested, labels, "")
+        classes = np.unique(labels).tolist()
         answers[task] = Answers(classes, truth, np.tile(truth, (QUARTERS, 1)), {})
         for fold, by_task in enumerate(chosen.by_fold):
             test = np.flatnonzero(tested & (chosen.folds == fold))
             if test.size:
                 cases.append((task, by_task, test))
-    X = dataset.features(fitted.window_s, fitted.samples)
-    widths = dataset.widths(fitted.samples)
-    vectors = Vectors(X, y, dataset.names, widths, dataset.is_own)
     left_out = partial(_left_out, vectors)
     results = Workers(jobs, progress=False).map("report", left_out, cases)
     for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
@@ -214,10 +209,9 @@ def _accuracy(exported: Exported, task: str) -> Section:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     text += (
         " The intervals are for the exported model on other trials: Wilson's for two "
-        "fifths of "
-        "the trials, because that model differs from those of the folds. Where entire "
-        "groups are "
-        "left out they count groups, whose trials are right or wrong together."
+        "fifths of the trials, because that model differs from those of the folds. "
+        "Where entire groups are left out they count groups, whose trials are right or "
+        "wrong together."
     )
     labels = sorted(set(truth))
     scores: Any = precision_recall_fscore_support(
@@ -281,14 +275,11 @@ def _wrong(exported: Exported) -> Section:
             figures.append(_picture(fitted, trials, task, answer))
     text = [
         "A model that had not seen these trials classified them wrongly. The last "
-        "column names the "
-        "feature that pulls a trial most strongly towards the wrong answer, compared "
-        "with the "
-        "nearest trial of the right label. Wrong labels and failed touches often stand "
-        "out here. "
-        "The picture shows the first of the trials; `edge-classify explain` and "
-        "`python -m train "
-        "show` explain any other recording in the same way."
+        "column names the feature that pulls a trial most strongly towards the wrong "
+        "answer, compared with the nearest trial of the right label. Wrong labels and "
+        "failed touches often stand out here. The picture shows the first of the "
+        "trials; `edge-classify explain` and `python -m train show` explain any other "
+        "recording in the same way."
     ]
     table = Table("wrong", "Wrong answers", rows)
     return Section("Wrong answers", text if rows else ["None."], [table], figures)
@@ -331,24 +322,24 @@ def _features(exported: Exported) -> Section:
         row: Row = {"feature": name}
         for task, answer in exported.answers.items():
             pulls = [why.pulls for why in answer.explained.values() if why.pulls]
-            shares = [
-                abs(p.get(name, 0.0)) / (sum(map(abs, p.values())) or 1.0)
-                for p in pulls
-            ]
-            row[f"{task}, % of pull"] = percent(float(np.mean(shares or [0.0])))
-        rows.append(
-            {**row, "unit": "" if unit == "1" else unit, "values": widths[name]}
-        )
+            shares = [_share(name, of_answer) for of_answer in pulls] or [0.0]
+            row[f"{task}, % of pull"] = percent(float(np.mean(shares)))
+        row["unit"] = "" if unit == "1" else unit
+        row["values"] = widths[name]
+        rows.append(row)
     text = [
         "A feature's pull says how much nearer the feature brings a touch to the "
-        "nearest trial "
-        "with the model's answer than to the nearest trial with another label. The "
-        "table gives "
-        "each feature's share of all pulls, as a mean over the wrong answers and about "
-        f"{EXPLAINED} other left-out trials."
+        "nearest trial with the model's answer than to the nearest trial with another "
+        "label. The table gives each feature's share of all pulls, as a mean over the "
+        f"wrong answers and about {EXPLAINED} other left-out trials."
     ]
     table = Table("features", "Each feature's share of the pull", rows, narrow=3)
     return Section("Features", text, [table])
+
+
+def _share(name: str, pulls: Mapping[str, float]) -> float:
+    """A feature's share of all pulls."""
+    return abs(pulls.get(name, 0.0)) / (sum(map(abs, pulls.values())) or 1.0)
 
 
 def _learning(exported: Exported) -> Section:
@@ -357,36 +348,26 @@ def _learning(exported: Exported) -> Section:
     folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
     largest = n * (1.0 - 1.0 / folds)
     sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
-    hits = {
-        t: (a.answers == a.truth)[:, a.truth != ""] for t, a in exported.answers.items()
-    }
-    results = {
-        t: [Result(int(q.sum()), q.size) for q in quarters]
-        for t, quarters in hits.items()
-    }
-    rows: list[Row] = [
-        {
-            "trials": size,
-            **{f"{task} %": percent(row[i].accuracy) for task, row in results.items()},
-        }
-        for i, size in enumerate(sizes)
-    ]
+    rows: list[Row] = [{"trials": size} for size in sizes]
     half = QUARTERS // 2 - 1
-    text = [
-        f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} "
-        "changed the "
-        f"accuracy by {100 * (row[-1].accuracy - row[half].accuracy):+.1f} percentage "
-        "points."
-        for task, row in results.items()
-    ]
+    text = []
+    results = {}
+    for task, answer in exported.answers.items():
+        hits = (answer.answers == answer.truth)[:, answer.truth != ""]
+        results[task] = [Result(int(quarter.sum()), quarter.size) for quarter in hits]
+        accuracies = [result.accuracy for result in results[task]]
+        for row, share in zip(rows, accuracies, strict=True):
+            row[f"{task} %"] = percent(share)
+        text.append(
+            f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} "
+            "changed the accuracy by "
+            f"{100 * (accuracies[-1] - accuracies[half]):+.1f} percentage points."
+        )
     text.append(
         "Doubling them again usually changes less. All fits use the settings that were "
-        "chosen on "
-        "the full training set, and the smaller sets contain the same objects. To "
-        "recognise "
-        "objects that the model has never met, record more objects rather than more "
-        "touches of "
-        "the same ones."
+        "chosen on the full training set, and the smaller sets contain the same "
+        "objects. To recognise objects that the model has never met, record more "
+        "objects rather than more touches of the same ones."
     )
     title = "Accuracy by the number of training trials"
     figure = lines("learning", title, sizes, results, label="training trials")
@@ -400,14 +381,10 @@ def _sizes(exported: Exported) -> Section:
     size = Path(exported.model.path).stat().st_size / 1024
     text = [
         f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
-        "nested "
-        "cross-validation, and stand with their 95 % intervals. The times are for "
-        "features and "
-        "decision together on this machine; `edge-classify bench` measures those of a "
-        "board. A "
-        "star marks the candidate chosen for a task, which is the smallest one within "
-        "a standard "
-        "error of the best."
+        "nested cross-validation, and stand with their 95 % intervals. The times are "
+        "for features and decision together on this machine; `edge-classify bench` "
+        "measures those of a board. A star marks the candidate chosen for a task, "
+        "which is the smallest one within a standard error of the best."
     ]
     return Section(
         "Candidates, sizes and times",

@@ -105,10 +105,8 @@ class TouchMap:
                 if head[:2] != self.head[:2]:
                     raise InputError(
                         f"{self.path}: line {number} begins a run in the frame "
-                        f"{head.frame} "
-                        f"({head.unit}), another is in {self.head.frame} "
-                        f"({self.head.unit}); keep "
-                        "a map for each"
+                        f"{head.frame} ({head.unit}), another is in {self.head.frame} "
+                        f"({self.head.unit}); keep a map for each"
                     )
                 continue
             key = line.contact, line.onset_s
