@@ -178,7 +178,12 @@ def run(arguments: argparse.Namespace) -> int:
             "--compare needs --test: only recordings that neither model was fitted on "
             "tell which is better"
         )
-    check_writable(arguments.out)  # before the work, which may take an hour
+    # What may fail does so before the work, which may take an hour.
+    check_writable(arguments.out)
+    former = Model(arguments.compare) if arguments.compare else None
+    held_out = find(arguments.test or [])
+    for file in held_out:
+        load(file)
     fitted = _fit(arguments)
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
@@ -187,8 +192,8 @@ def run(arguments: argparse.Namespace) -> int:
     print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
-    if arguments.test:
-        print(tested(path, arguments.compare, arguments.test), file=sys.stderr)
+    if held_out:
+        print(tested(Model(path), former, held_out), file=sys.stderr)
     if arguments.report:
         from train.model_report import write  # loads matplotlib
 
@@ -221,23 +226,29 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
     )
 
 
-def tested(path: Path, former: str | None, recordings: Sequence[str]) -> str:
+def tested(model: Model, former: Model | None, recordings: Sequence[Path]) -> str:
     """The accuracy on recordings that were not fitted, also of a former model."""
-    summaries = []
-    lines = []
-    for name in [str(path), *([former] if former else [])]:
-        model = Model(name)
-        summary = Summary(model.info.tasks)
-        for file in find(list(recordings)):
-            recording = load(file)
-            events = decide(model, recording, str(file))
-            summary.add(recording.labels, events, str(file))
-        summaries.append(summary)
-        lines.append(f"{name} on recordings that it was not fitted on:")
-        lines.append(summary.text())
-    if former:
-        lines.append(compared(former, summaries[1], str(path), summaries[0]))
+    summary = _scored(model, recordings)
+    lines = [_heading(model), summary.text()]
+    if former is not None:
+        before = _scored(former, recordings)
+        lines += [_heading(former), before.text()]
+        lines.append(compared(former.path, before, model.path, summary))
     return "\n\n".join(lines)
+
+
+def _heading(model: Model) -> str:
+    return f"{model.path} on recordings that it was not fitted on:"
+
+
+def _scored(model: Model, recordings: Sequence[Path]) -> Summary:
+    """What a model decides of recordings."""
+    summary = Summary(model.info.tasks)
+    for file in recordings:
+        recording = load(file)
+        events = decide(model, recording, str(file))
+        summary.add(recording.labels, events, str(file))
+    return summary
 
 
 def _of_front(

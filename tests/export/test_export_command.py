@@ -1,5 +1,6 @@
 """`make export` as a user meets it."""
 
+import shutil
 from unittest.mock import Mock
 
 import pytest
@@ -8,6 +9,7 @@ from edge.errors import InputError
 from edge.model.model import Model
 from edge.statistics import wilson
 from export.__main__ import main
+from export.cli import tested
 from tests.conftest import PAPER, export
 
 
@@ -163,6 +165,35 @@ def test_recordings_that_are_held_out_are_scored_by_both_models(
     assert "on recordings that it was not fitted on:" in err
     assert "category: 16 of 16 right" in err
     assert "category: 0 gained, 0 lost of 16: +0.0 points" in err
+
+
+def test_a_former_model_in_the_same_place_is_compared_as_it_was(
+    exported, recordings, tmp_path, capsys
+):
+    path = shutil.copy(exported / "model.onnx", tmp_path)
+    words = "--features max_force --projection pca --decision-points none".split()
+    held_out = ["--test", recordings, "--compare", path]
+    export(tmp_path, "--data", recordings, *words, *held_out)
+    comparison = capsys.readouterr().err.splitlines()[-2:]
+    files = sorted(recordings.iterdir())
+    text = tested(Model(path), Model(exported / "model.onnx"), files)
+    assert text.splitlines()[-2:] == comparison
+    assert "0 gained, 0 lost" not in comparison[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--test", "missing"], "missing: cannot be read: No such file or directory"),
+        (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
+    ],
+)
+def test_held_out_recordings_and_a_former_model_are_read_before_any_work(
+    words, sentence, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
+    assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2
+    assert sentence in capsys.readouterr().err
 
 
 def test_a_comparison_needs_recordings_that_were_held_out(recordings, capsys):
