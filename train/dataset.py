@@ -6,7 +6,9 @@ import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import compress
+from operator import not_
 from pathlib import Path
 from typing import Any
 
@@ -66,15 +68,22 @@ class Recordings:
     @property
     def joints(self) -> bool:
         """Whether most of the owner's have joint angles."""
-        return 2 * sum(
-            recording.joints is not None for recording in self.of_owner
-        ) > len(self.of_owner)
+        return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
 
     @property
     def shear(self) -> bool:
         """Whether most of the owner's have shear."""
-        sheared = sum(recording.shear is not None for recording in self.of_owner)
-        return 2 * sheared > len(self.of_owner)
+        return bool(np.mean([r.shear is not None for r in self.of_owner]) > 0.5)
+
+    def split(self, part: str) -> tuple[Recordings, tuple[Path, ...]]:
+        """The recordings that have `joints` or `shear`, and the files of the others."""
+        has = [getattr(recording, part) is not None for recording in self.recordings]
+        with_part = replace(
+            self,
+            paths=tuple(compress(self.paths, has)),
+            recordings=tuple(compress(self.recordings, has)),
+        )
+        return with_part, tuple(compress(self.paths, map(not_, has)))
 
 
 @dataclass(frozen=True)
@@ -87,6 +96,10 @@ class Trial:
     labels: dict[str, str]
     onset_s: float
     series: FeatureSeries
+
+
+LabelledFile = tuple[Path, dict[str, str]]
+"""A recording's file, and {task: label}."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +127,7 @@ class DataSet:
     trials: tuple[Trial, ...]
     layout: SkinLayout
     chain: Chain | None
-    untouched: tuple[tuple[Path, dict[str, str]], ...]
+    untouched: tuple[LabelledFile, ...]
     digest: str
     names: tuple[str, ...]
     joints: int
@@ -260,14 +273,56 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 
-def load_trials(  # noqa: PLR0913 - independent options, all with defaults
+@dataclass(frozen=True)
+class Measurement:
+    """What is measured of each contact.
+
+    Attributes:
+        features: names of the features (see `edge.touch.measures`).
+        horizon_s: seconds from onset that are kept of each contact.
+        threshold: counts above which a taxel is in contact; those of the first
+            recording that is not simulated where None. All share it, as the board does
+            not know which object it touches.
+        onset: counts above which a contact begins; scaled with the threshold where
+            None.
+        arm: for recordings with joint angles that name no arm.
+    """
+
+    features: Sequence[str] = FEATURES
+    horizon_s: float = 2.0
+    threshold: int | None = None
+    onset: int | None = None
+    arm: Chain | None = None
+
+    @cached_property
+    def types(self) -> tuple[Feature, ...]:
+        """The features."""
+        return features_of(tuple(self.features))
+
+    @property
+    def moves(self) -> bool:
+        """Whether a feature is measured in the world's frame."""
+        return any(map(moves, self.types))
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether a feature is made of joint angles."""
+        return any(feature.of_joints for feature in self.types)
+
+    def layout(self, data: Recordings) -> SkinLayout:
+        """The skin of recordings, as it is measured."""
+        skin = with_thresholds(data.of_owner[0].layout, self.threshold, self.onset)
+        return replace(skin, dead=_dead(data.recordings), axes=axes(self.types))
+
+
+USUAL = Measurement()
+"""The paper's three features, at the recorded thresholds."""
+
+
+def load_trials(
     data: Recordings | Sequence[str | Path],
+    measurement: Measurement = USUAL,
     *,
-    threshold: int | None = None,
-    onset: int | None = None,
-    horizon_s: float = 2.0,
-    features: Sequence[str] = FEATURES,
-    arm: Chain | None = None,
     partial: bool = False,
     progress: bool = False,
     jobs: int = 1,
@@ -283,14 +338,7 @@ def load_trials(  # noqa: PLR0913 - independent options, all with defaults
 
     Args:
         data: recordings, or `.npz` files and folders of them.
-        threshold: counts above which a taxel is in contact; those of the first
-            recording that is not simulated where None. All share it, as the board does
-            not know which object it touches.
-        onset: counts above which a contact begins; scaled with the threshold where
-            None.
-        horizon_s: seconds from onset that are kept of each contact.
-        features: names of the features measured (see `edge.touch.measures`).
-        arm: for recordings with joint angles that name no arm.
+        measurement: what is measured.
         partial: keep trials that have a label for some task.
         progress: show progress bars on stderr.
         jobs: processes.
@@ -299,27 +347,27 @@ def load_trials(  # noqa: PLR0913 - independent options, all with defaults
         InputError: a file cannot be used, the skins differ, or nothing is labelled or
             touched.
     """
-    types = features_of(tuple(features))
     recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
-    layout = with_thresholds(recordings.of_owner[0].layout, threshold, onset)
-    layout = replace(layout, dead=_dead(recordings.recordings), axes=axes(types))
+    layout = measurement.layout(recordings)
     recordings, without_shear = with_shear(recordings, layout)
-    posed = with_poses(recordings, types, arm)
-    follow = {
-        "chain": posed.chain,
-        "horizon_s": horizon_s,
-        "features": tuple(feature.name for feature in types),
-        "joints": posed.joints,
-    }
+    posed = with_poses(recordings, measurement)
+    names = tuple(feature.name for feature in measurement.types)
+    follow = delayed(_followed)
+    work = Parallel(n_jobs=jobs, return_as="generator")(
+        follow(
+            recording,
+            path,
+            layout,
+            chain=posed.chain,
+            horizon_s=measurement.horizon_s,
+            features=names,
+            joints=posed.joints,
+        )
+        for recording, path in posed.recordings
+    )
+    count = len(posed.recordings)
     shown = bar(
-        Parallel(n_jobs=jobs, return_as="generator")(
-            delayed(_followed)(recording, path, layout, **follow)
-            for recording, path in posed.recordings
-        ),
-        total=len(posed.recordings),
-        desc="following",
-        unit=" trials",
-        disable=not progress,
+        work, total=count, desc="following", unit=" trials", disable=not progress
     )
     touched = collect(posed.recordings, shown, layout)
     labelled = complete(touched, partial=partial)
@@ -334,7 +382,7 @@ def load_trials(  # noqa: PLR0913 - independent options, all with defaults
         chain=posed.chain,
         untouched=labelled.untouched,
         digest=recordings.digest,
-        names=tuple(feature.name for feature in types),
+        names=names,
         joints=posed.joints,
         tasks=labelled.tasks,
         left_out={need: paths for need, paths in left_out.items() if paths},
@@ -356,15 +404,10 @@ def with_shear(
     """
     if layout.axes is None:
         return data, ()
-    has = [recording.shear is not None for recording in data.recordings]
-    if not any(has):
+    sheared, others = data.split("shear")
+    if not sheared.paths:
         raise InputError("no recording has shear, which the features need")
-    resorted = replace(
-        data,
-        paths=tuple(compress(data.paths, has)),
-        recordings=tuple(compress(data.recordings, has)),
-    )
-    return resorted, tuple(path for path in data.paths if path not in resorted.paths)
+    return sheared, others
 
 
 @dataclass(frozen=True)
@@ -384,32 +427,28 @@ class Posed:
     without_joints: tuple[Path, ...]
 
 
-def with_poses(data: Recordings, types: Sequence[Feature], arm: Chain | None) -> Posed:
+def with_poses(data: Recordings, measurement: Measurement) -> Posed:
     """Leave out recordings without joint angles, where most have them.
 
     Raises:
         InputError: the recordings have several arms.
     """
-    moving = any(map(moves, types))
-    of_joints = any(feature.of_joints for feature in types)
-    needs_joints = data.joints and (of_joints or moving)
+    without: tuple[Path, ...] = ()
+    if data.joints and (measurement.of_joints or measurement.moves):
+        data, without = data.split("joints")
     named: list[Named] = []
     arms: list[Chain | None] = []
-    without: list[Path] = []
     for recording, path in zip(data.recordings, data.paths, strict=True):
-        if needs_joints and recording.joints is None:
-            without.append(path)
-            continue
-        chain = arm_of(recording, str(path), arm)
+        chain = arm_of(recording, str(path), measurement.arm)
         arms.append(chain)
         if chain is not None:
             recording = recording.for_joints(chain.names)
         named.append((recording, path))
-    chain = arms[0] if moving and None not in arms else None
+    chain = arms[0] if measurement.moves and None not in arms else None
     if chain is not None:
         require_one_arm(named, arms, chain)
-    joints = joint_angles(named) if of_joints else 0
-    return Posed(named, chain, joints, tuple(without))
+    joints = joint_angles(named) if measurement.of_joints else 0
+    return Posed(named, chain, joints, without)
 
 
 def require_one_arm(
@@ -442,8 +481,22 @@ class Touched:
     """
 
     trials: list[Trial]
-    untouched: list[tuple[Path, dict[str, str]]]
+    untouched: list[LabelledFile]
     unused: tuple[Path, ...]
+
+    @property
+    def files(self) -> list[LabelledFile]:
+        """The file and the labels of each trial, and of the untouched."""
+        return [(trial.path, trial.labels) for trial in self.trials] + self.untouched
+
+    def completed(self) -> Touched:
+        """The same contacts with the labels that follow from their others."""
+        labels = iter(completed([labels for _, labels in self.files]))
+        return replace(
+            self,
+            trials=[replace(trial, labels=next(labels)) for trial in self.trials],
+            untouched=[(path, next(labels)) for path, _ in self.untouched],
+        )
 
 
 def collect(
@@ -484,7 +537,7 @@ class Labelled:
     """
 
     trials: tuple[Trial, ...]
-    untouched: tuple[tuple[Path, dict[str, str]], ...]
+    untouched: tuple[LabelledFile, ...]
     tasks: tuple[str, ...]
     lacking: dict[str, tuple[Path, ...]]
 
@@ -499,32 +552,25 @@ def complete(touched: Touched, *, partial: bool) -> Labelled:
     Raises:
         InputError: no trial has the labels.
     """
-    paths = [trial.path for trial in touched.trials]
-    labels = [trial.labels for trial in touched.trials]
-    for path, untouched_labels in touched.untouched:
-        paths.append(path)
-        labels.append(untouched_labels)
-    labels = completed(labels)
-    tasks = shared_tasks(labels, partial=partial)
-    lacking: dict[str, tuple[Path, ...]] = {}
-    for task in tasks:
-        by_path = zip(paths, labels, strict=True)
-        without = [path for path, of_trial in by_path if task not in of_trial]
-        lacking[f"a label for {task}"] = tuple(dict.fromkeys(without))
+    touched = touched.completed()
+    files = touched.files
+    tasks = shared_tasks([labels for _, labels in files], partial=partial)
+    lacking = {f"a label for {task}": _files_without(task, files) for task in tasks}
     enough = any if partial else all
-    trials: list[Trial] = []
-    untouched = []
-    for number, trial_labels in enumerate(labels):
-        if not enough(task in trial_labels for task in tasks):
-            continue
-        if number < len(touched.trials):
-            trial = touched.trials[number]
-            trials.append(replace(trial, labels=trial_labels))
-        else:
-            untouched.append((paths[number], trial_labels))
+
+    def suffices(labels: dict[str, str]) -> bool:
+        return enough(task in labels for task in tasks)
+
+    trials = tuple(trial for trial in touched.trials if suffices(trial.labels))
     if not trials:
         raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
-    return Labelled(tuple(trials), tuple(untouched), tasks, lacking)
+    untouched = tuple(file for file in touched.untouched if suffices(file[1]))
+    return Labelled(trials, untouched, tasks, lacking)
+
+
+def _files_without(task: str, files: Iterable[LabelledFile]) -> tuple[Path, ...]:
+    """The files that lack a label for a task, each once."""
+    return tuple(dict.fromkeys(path for path, labels in files if task not in labels))
 
 
 Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]

@@ -20,10 +20,17 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from train import thresholds
 from train.candidates import Candidate, Fixed, candidates, features_of
 from train.choose import Choosing, Chosen
-from train.dataset import DataSet, Recordings, Untouched, load_trials, read
+from train.dataset import (
+    DataSet,
+    Measurement,
+    Recordings,
+    Untouched,
+    load_trials,
+    read,
+)
 from train.decision_points import MOST_TRIALS, usual_points
 from train.groups import LEAVE_OUT, Divisions, kinds_of
-from train.mix import mix
+from train.mix import Mixing, mix
 from train.pipeline import Choice, ContactClassifier
 from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
@@ -283,14 +290,12 @@ def _with_thresholds(
         quick=options.quick,
     )
 
+    measurement = Measurement(features_of(tried), windows[-1], arm=options.arm)
+
     def by(threshold: int | None, onset: int | None) -> DataSet:
         return load_trials(
             recordings,
-            threshold=threshold,
-            onset=onset,
-            horizon_s=windows[-1],
-            features=features_of(tried),
-            arm=options.arm,
+            replace(measurement, threshold=threshold, onset=onset),
             partial=True,
             progress=options.progress,
             jobs=options.processes,
@@ -380,17 +385,17 @@ def _choose_mixed(
     def settings(trials: DataSet, labels: Labels) -> dict[str, Chosen]:
         return options.choosing(trials, labels, drawn=True).choose(window_s)[0]
 
-    mixed = mix(
+    mixing = Mixing(
         dataset,
         y,
         is_own,
-        settings,
         X,
         options.samples,
         options.leave_out,
-        quick=options.quick,
-        jobs=options.processes,
+        options.quick,
+        options.processes,
     )
+    mixed = mix(mixing, settings)
     y = {task: y[task] for task in mixed.chosen}
     tried = options.tried(dataset, y, drawn=True)
     return Settings(

@@ -84,8 +84,8 @@ class Mixing:
     features: NDArray[np.float64]
     samples: int
     leave_out: str
-    quick: bool
-    jobs: int
+    quick: bool = False
+    jobs: int = 1
 
     @property
     def shared(self) -> list[str]:
@@ -185,6 +185,14 @@ class Scores:
     by_group: AnswerTable
     groups: int
 
+    def empty_plans(self, leave_out: str) -> dict[str, Plan]:
+        """{what is left out: its folds, none of which has a choice yet}."""
+        plans: dict[str, Plan] = {}
+        for left_out, table in ((leave_out, self.by_group), (TRIAL, self.by_trial)):
+            count = int(table.folds.max()) + 1
+            plans[left_out] = table.folds, [{} for _ in range(count)]
+        return plans
+
     def weigh(
         self, task: str, settled: Chosen, mixing: Mixing, plans: Mapping[str, Plan]
     ) -> Chosen:
@@ -224,39 +232,23 @@ Settings = Callable[[DataSet, Labels], dict[str, Chosen]]
 """Chooses the settings of tasks on some of the trials."""
 
 
-def mix(  # noqa: PLR0913 - the fields of `Mixing`
-    dataset: DataSet,
-    y: Labels,
-    is_own: NDArray[np.bool_],
-    choose: Settings,
-    features: NDArray[np.float64],
-    samples: int,
-    leave_out: str,
-    *,
-    quick: bool = False,
-    jobs: int = 1,
-) -> MixResult:
-    """Choose the weights of each task; the arguments are those of `Mixing`.
+def mix(mixing: Mixing, choose: Settings) -> MixResult:
+    """Choose the weights of each task, and its settings with `choose`.
 
     Raises:
         InputError: the owner's trials are too few, or have no label.
     """
-    few = [task for task in y if int((y[task][is_own] != "").sum()) < FEWEST_OWN]
-    fitted = {task: labels for task, labels in y.items() if task not in few}
+    few = [task for task in mixing.y if mixing.labelled(task) < FEWEST_OWN]
+    fitted = {task: labels for task, labels in mixing.y.items() if task not in few}
+    count = int(mixing.is_own.sum())
     if not fitted:
         raise InputError(
-            f"{int(is_own.sum())} of the trials are no simulated ones; record at least "
+            f"{count} of the trials are no simulated ones; record at least "
             f"{FEWEST_OWN} with a label, or export the simulated ones alone"
         )
-    mixing = Mixing(dataset, fitted, is_own, features, samples, leave_out, quick, jobs)
-    settled = mixing.settings(choose)
-    scores = mixing.scores(mixing.grids(settled))
-    plans: dict[str, Plan] = {}
-    for left_out, table in ((leave_out, scores.by_group), (TRIAL, scores.by_trial)):
-        folds = int(table.folds.max()) + 1
-        plans[left_out] = table.folds, [{} for _ in range(folds)]
+    mixing = replace(mixing, y=fitted)
     notes = [
-        f"{int(is_own.sum())} of your own trials beside {int((~is_own).sum())} simulated "
+        f"{count} of your own trials beside {len(mixing.is_own) - count} simulated "
         "ones, on which the settings are chosen (the table); the other accuracies are "
         "those on your own"
     ]
@@ -265,13 +257,16 @@ def mix(  # noqa: PLR0913 - the fields of `Mixing`
             f"not fitted, as fewer than {FEWEST_OWN} of your own have it: "
             f"{', '.join(few)}"
         )
+    settled = mixing.settings(choose)
+    scores = mixing.scores(mixing.grids(settled))
+    plans = scores.empty_plans(mixing.leave_out)
     chosen = {}
     for task in settled:
         chosen[task] = scores.weigh(task, settled[task], mixing, plans)
         notes += _sentences(task, chosen[task].choice, scores, mixing)
-    together = decided_together(chosen, mixing.vectors, plans, jobs)
-    folds_of_trials, without = plans[TRIAL]
-    return MixResult(together, folds_of_trials, without, notes)
+    together = decided_together(chosen, mixing.vectors, plans, mixing.jobs)
+    folds, without = plans[TRIAL]
+    return MixResult(together, folds, without, notes)
 
 
 def _sentences(task: str, best: Choice, scores: Scores, mixing: Mixing) -> list[str]:

@@ -87,48 +87,56 @@ def scale_of(
     Raises:
         InputError: the method is unknown, or the columns are not those of the features.
     """
-    types = len(features)
     sizes = np.array(widths_of(X.shape[1], features, widths))
+    if method not in SCALINGS:
+        raise InputError(
+            f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}"
+        )
+    gain = np.ones(len(features))
     if method in ("none", "III"):
-        return np.ones(types)
-    starts = np.cumsum(sizes) - sizes
-    powers = np.frexp(np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts))[
-        1
-    ]
-    small = np.ldexp(X, -np.repeat(powers, sizes))
-    means = small.mean(axis=0)
-    largest = np.maximum.reduceat(np.abs(small).max(axis=0, initial=0.0), starts)
-
-    def inverse(scale: NDArray[np.float64]) -> NDArray[np.float64]:
-        gain = np.divide(1.0, scale, out=np.zeros(types), where=scale > 0.0)
-        with np.errstate(over="ignore"):  # `centred_and_scaled` refuses infinite gains
-            return np.asarray(np.ldexp(gain, -powers))
-
-    if method in ("I", "II"):
-        return inverse(largest)
-    if method == "IV":
-        # Each cell or joint has a level of its own, which says nothing about a trial: a
-        # wide feature deviates from each column's mean.
-        wide = np.repeat([feature(name).wide for name in features], sizes)
-        of_type = np.add.reduceat(means, starts) / sizes
-        squares = (
-            (small - np.where(wide, means, np.repeat(of_type, sizes))) ** 2
-        ).mean(axis=0)
-        deviation = np.sqrt(np.add.reduceat(squares, starts) / sizes)
-        # A spread below the rounding of its own mean is no spread.
-        deviation[deviation <= 8 * np.finfo(float).eps * largest] = 0.0
-        return inverse(deviation)
-    if method == "V":
-        gain = np.ones(types)
-        magnitudes = np.ldexp(largest, powers)
-        ranges = [
-            magnitudes[i] for i, name in enumerate(features) if name in FEATURES[:2]
-        ]
-        if ranges and FEATURES[2] in features:
-            motion = list(features).index(FEATURES[2])
-            gain[motion] = max(ranges) * inverse(largest)[motion]
         return gain
-    raise InputError(f"scaling must be one of {', '.join(SCALINGS)}, not {method!r}")
+    starts = np.cumsum(sizes) - sizes
+    magnitudes = np.maximum.reduceat(np.abs(X).max(axis=0, initial=0.0), starts)
+    largest, powers = np.frexp(magnitudes)
+    if method in ("I", "II"):
+        return _inverse(largest, powers)
+    if method == "IV":
+        wide = np.array([feature(name).wide for name in features])
+        small = np.ldexp(X, -np.repeat(powers, sizes))
+        deviations = _deviations(small, sizes, wide)
+        # A spread below the rounding of its own mean is no spread.
+        deviations[deviations <= 8 * np.finfo(float).eps * largest] = 0.0
+        return _inverse(deviations, powers)
+    ranges = magnitudes[np.isin(features, FEATURES[:2])]
+    if ranges.size and FEATURES[2] in features:
+        motion = list(features).index(FEATURES[2])
+        gain[motion] = ranges.max() * _inverse(largest, powers)[motion]
+    return gain
+
+
+def _inverse(
+    scale: NDArray[np.float64], powers: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """1 / (scale * 2^powers); 0 where the scale is 0."""
+    gain = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    with np.errstate(over="ignore"):  # `centred_and_scaled` refuses infinite gains
+        return np.asarray(np.ldexp(gain, -powers))
+
+
+def _deviations(
+    X: NDArray[np.float64], sizes: NDArray[np.int64], wide: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """(features,) standard deviation of each feature type over all of its columns.
+
+    Each cell or joint has a level of its own, which says nothing about a trial: a wide
+    feature deviates from each column's mean.
+    """
+    starts = np.cumsum(sizes) - sizes
+    means = X.mean(axis=0)
+    of_type = np.add.reduceat(means, starts) / sizes
+    levels = np.where(np.repeat(wide, sizes), means, np.repeat(of_type, sizes))
+    squares = ((X - levels) ** 2).mean(axis=0)
+    return np.asarray(np.sqrt(np.add.reduceat(squares, starts) / sizes))
 
 
 def centred_and_scaled(

@@ -3,6 +3,7 @@ missed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import filterfalse
 
 import numpy as np
 
@@ -55,26 +56,28 @@ def proposed(recordings: Sequence[Recording]) -> Proposal:
     Where no recording has an untouched part, the threshold is the level of the quietest
     taxels, or 0 where that misses touches.
     """
-    labelled = [
-        r for r in recordings if r.labels and NO_CONTACT not in r.labels.values()
-    ]
-    untouched = [r for r in recordings if not begins_in_contact(r)]
+    labelled = list(filter(_is_touch, recordings))
+    untouched = list(filterfalse(begins_in_contact, recordings))
     begun = len(recordings) - len(untouched)
-    if untouched:
+    pair = _above_noise(untouched, labelled) if untouched else None
+    if pair is not None:
         source = "the noise before contact"
         if begun:
             source += f" ({begun} of {len(recordings)} begin in contact and give none)"
-        pair = _above_noise(untouched, labelled)
-        if pair is not None:
-            return Proposal(*pair, source)
-    level = float(np.median([_quietest(recording) for recording in recordings]))
+        return Proposal(*pair, source)
+    level = float(np.median(list(map(_quietest, recordings))))
     pair = above(level, 1.0)
-    felt = count_felt(labelled or recordings, pair[1])
-    if felt >= (1.0 - MISSED_SHARE) * len(labelled or recordings):
+    touched = labelled or recordings
+    if count_felt(touched, pair[1]) >= (1.0 - MISSED_SHARE) * len(touched):
         source = "the quietest taxels, as no recording has a part without contact"
         return Proposal(*pair, source)
     source = "nothing to go by: no recording has a part without contact"
     return Proposal(0, 0, source)
+
+
+def _is_touch(recording: Recording) -> bool:
+    """Whether a recording is labelled with a touch."""
+    return bool(recording.labels) and NO_CONTACT not in recording.labels.values()
 
 
 def _above_noise(

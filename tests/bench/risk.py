@@ -37,7 +37,7 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from tests.bench import tables
 from tests.bench.program import start
 from train.candidates import candidates
-from train.dataset import DataSet, load_trials
+from train.dataset import DataSet, Measurement, load_trials
 from train.feature_sets import expand
 from train.fitting import fit
 from train.parts import part
@@ -99,7 +99,9 @@ def simulated(seed):
     names = [name for candidate in tried for name in candidate.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(replace(scenes.load(SCENE, count=COUNT), seed=seed), folder)
-        dataset = load_trials([folder], features=expand(names), horizon_s=POINTS_S[-1])
+        dataset = load_trials(
+            [folder], Measurement(expand(names), horizon_s=POINTS_S[-1])
+        )
     trials = []
     for trial in dataset.trials:
         ends = part(trial.recording, slice(None, None, len(trial.recording.t) - 1))

@@ -20,7 +20,7 @@ from edge.model.verify import first_series
 from edge.recording import load
 from edge.saving import save_arrays
 from export import golden
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TOUCHES = (
@@ -61,10 +61,10 @@ def main(folder):
         meta = {key: short.meta[key] for key in META}
         save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
     features = model.info.features
-    X = load_trials([folder / "known"], features=features).features(
+    X = load_trials([folder / "known"], Measurement(features)).features(
         model.info.window_s, model.info.samples
     )
-    golden.write(golden_file, model, load_trials([demo], features=features), X)
+    golden.write(golden_file, model, load_trials([demo], Measurement(features)), X)
 
 
 if __name__ == "__main__":

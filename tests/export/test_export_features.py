@@ -9,7 +9,7 @@ from edge.errors import InputError
 from edge.model.metadata import to_json
 from edge.model.model import Model
 from tests.conftest import export
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 
 SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate@10".split()
 
@@ -60,6 +60,8 @@ def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
     assert len(json.dumps(to_json(model.info))) < 20_000
     files = ("--model", model.path, "--golden", tmp_path / "golden.npz")
     assert edge("verify", *files, text=True)[0] == 0
-    dataset = load_trials([recordings], features=model.info.features).with_kernels(1.2)
+    dataset = load_trials([recordings], Measurement(model.info.features)).with_kernels(
+        1.2
+    )
     own = [model.info.vector(trial.series) for trial in dataset.trials]
     assert (np.stack(own) == dataset.features(1.2)).all()

@@ -11,7 +11,7 @@ from edge.saving import save
 from edge.statistics import wilson
 from train.candidates import candidates, features_of
 from train.choose import Choosing, Chosen, decided_together
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 from train.evaluate import AnswerTable, Promise
 from train.feature_sets import expand
 from train.groups import Divisions, Groups
@@ -32,7 +32,7 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
             touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
             save(tmp_path / f"{kind}-{seed}.npz", touch)
     tried = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    dataset = load_trials([tmp_path], features=features_of(tried))
+    dataset = load_trials([tmp_path], Measurement(features_of(tried)))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, tried, Divisions.of(dataset, y), samples=40)
     k = 3

@@ -15,7 +15,7 @@ from edge.saving import save
 from edge.touch.arm import Chain, Joint
 from edge.touch.features import feature_vector
 from tests.conftest import export, in_a_row
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def sheared(recordings, tmp_path_factory):
 
 def test_features_of_shear_are_measured_where_recordings_have_it(sheared):
     names = ["max_force", "contact_shear_ratio"]
-    data = load_trials([sheared], features=names)
+    data = load_trials([sheared], Measurement(names))
     assert data.layout.axes == 3
     assert data.features(0.5, 5).shape == (16, 10)
     assert data.of(["max_force"]).layout.axes is None
@@ -73,11 +73,11 @@ def test_features_of_shear_are_measured_where_recordings_have_it(sheared):
 def test_recordings_without_shear_are_left_out_and_named(sheared, recordings, tmp_path):
     shutil.copytree(sheared, tmp_path / "data")
     shutil.copy(recordings / "hard_0.npz", tmp_path / "data" / "plain.npz")
-    data = load_trials([tmp_path / "data"], features=["skin_shear_size"])
+    data = load_trials([tmp_path / "data"], Measurement(["skin_shear_size"]))
     assert [path.name for path in data.left_out["shear"]] == ["plain.npz"]
     assert len(data.trials) == 16
     with pytest.raises(InputError, match="no recording has shear"):
-        load_trials([recordings], features=["skin_shear_size"])
+        load_trials([recordings], Measurement(["skin_shear_size"]))
 
 
 def test_a_model_of_shear_is_verified_and_refuses_a_skin_without_it(
@@ -97,7 +97,7 @@ def test_a_model_of_shear_is_verified_and_refuses_a_skin_without_it(
 
 def test_training_and_the_board_compute_the_same_bits(recordings, exported):
     model = Model(exported / "model.onnx")
-    data = load_trials([recordings], horizon_s=1.2)
+    data = load_trials([recordings], Measurement(horizon_s=1.2))
     for trial, expected in zip(data.trials[::3], data.features()[::3], strict=True):
         recording = load(trial.path)
         classifier = Classifier(model, recording.layout)
@@ -119,12 +119,12 @@ def test_the_digest_follows_the_data(folder, tmp_path):
 
 def test_one_threshold_for_all(folder):
     low = load_trials([folder])
-    high = load_trials([folder], threshold=400)
+    high = load_trials([folder], Measurement(threshold=400))
     assert high.layout.threshold_counts == 400
     assert high.layout.onset_counts == 600
     area = slice(40, 80)
     assert high.features()[:, area].sum() < low.features()[:, area].sum()
-    own = load_trials([folder], threshold=400, onset=500)
+    own = load_trials([folder], Measurement(threshold=400, onset=500))
     assert own.layout.onset_counts == 500
 
 
@@ -160,7 +160,7 @@ def test_the_few_that_lack_joint_angles_do_not_take_them_from_the_others(
     assert data.chain is not None
     assert [path.name for path in data.left_out["joint angles"]] == ["bare.npz"]
     assert len(data.trials) == 4
-    assert load_trials([folder], features=["max_force"]).left_out == {}
+    assert load_trials([folder], Measurement(["max_force"])).left_out == {}
 
 
 def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path):
@@ -288,14 +288,14 @@ def test_damaged_files_stop_the_fit_and_the_first_is_named(folder):
 
 def test_a_threshold_that_no_contact_reaches_is_said(recordings):
     with pytest.raises(InputError, match="no contact in any of 16 recordings"):
-        load_trials([recordings], threshold=60000)
+        load_trials([recordings], Measurement(threshold=60000))
 
 
 def test_recordings_that_name_no_arm_take_the_one_given(make_touch, tmp_path):
     swing = Chain([Joint("swing", (0.0, 0.0, 1.0))])
     trial = make_touch()
     save(tmp_path / "one.npz", replace(trial, joints=trial.joints[:, :1]))
-    data = load_trials([tmp_path], arm=swing)
+    data = load_trials([tmp_path], Measurement(arm=swing))
     assert data.chain is swing
 
 
@@ -312,10 +312,13 @@ def test_angles_are_measured_by_the_names_of_their_joints(
     meta = {**trial.meta, "joint_names": [*names[:2], "wheel", *names[2:]]}
     save(tmp_path / "b" / "one.npz", replace(trial, joints=shuffled, meta=meta))
     straight = load_trials([tmp_path / "a"])
-    reordered = load_trials([tmp_path / "b"], arm=arm)
+    reordered = load_trials([tmp_path / "b"], Measurement(arm=arm))
     np.testing.assert_array_equal(reordered.features(), straight.features())
 
 
 def test_joint_angles_are_called_for_by_motion_alone(recordings):
-    assert load_trials([recordings], features=["force_motion"]).chain is not None
-    assert load_trials([recordings], features=["max_force", "skin_force"]).chain is None
+    assert load_trials([recordings], Measurement(["force_motion"])).chain is not None
+    assert (
+        load_trials([recordings], Measurement(["max_force", "skin_force"])).chain
+        is None
+    )

@@ -8,7 +8,7 @@ import pytest
 import train
 from edge.recording import Recording
 from edge.saving import save
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 from train.evaluate import VARIANCE, stratified_folds
 from train.fitting import (
     _leaks,
@@ -39,7 +39,7 @@ def test_the_number_that_is_told_is_that_of_the_whole_choice(fitted):
 
 
 def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
-    data = load_trials([recordings], features=["max_force", "contact_area"])
+    data = load_trials([recordings], Measurement(["max_force", "contact_area"]))
     given = {
         "features": ["max_force", "contact_area"],
         "projection": "pca",

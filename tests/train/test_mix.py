@@ -40,25 +40,37 @@ def saved(folder, make_touch, count, *, simulated, swap=False, first=0, **more):
     return str(folder)
 
 
+@pytest.fixture(scope="module")
+def five(make_touch, tmp_path_factory):
+    """A fit to five trials with a category alone, beside simulated ones."""
+    folder = tmp_path_factory.mktemp("five")
+    simulated = saved(folder / "simulated", make_touch, 24, simulated=True)
+    own = saved(folder / "own", make_touch, 5, simulated=False, first=50)
+    return train.fit([own, simulated], **GIVEN)
+
+
 def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_ones(
-    make_touch, tmp_path
+    five,
 ):
-    simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True)
-    own = saved(tmp_path / "own", make_touch, 5, simulated=False, first=50)
-    fitted = train.fit([own, simulated], **GIVEN)
-    assert len(fitted.dataset.trials) == 29
-    assert set(fitted.chosen) == {"category", "softness"}
-    for chosen in fitted.chosen.values():
-        assert chosen.accuracy.right == 5
-        assert chosen.accuracy.total == 5
-        assert chosen.accuracy.interval == chosen.by_trial.interval == wilson(2.0, 2.0)
-        assert chosen.choice.weights == (1, 1)
-    assert "5 of your own trials beside 24 simulated ones" in fitted.notes[0]
-    assert "not fitted, as fewer than 3 of your own have it: object" in fitted.notes[1]
-    assert (
-        "both 100.0%, both, yours counted 5 times (half of the weight) 100.0%, your"
-        in fitted.notes[2]
-    )
+    assert len(five.dataset.trials) == 29
+    assert set(five.chosen) == {"category", "softness"}
+
+
+@pytest.mark.parametrize("task", ["category", "softness"])
+def test_five_trials_choose_no_weight_and_promise_little(five, task):
+    chosen = five.chosen[task]
+    assert chosen.choice.weights == (1, 1)
+    assert chosen.accuracy.right == 5
+    assert chosen.accuracy.total == 5
+    assert chosen.accuracy.interval == chosen.by_trial.interval == wilson(2.0, 2.0)
+
+
+def test_the_notes_say_how_much_the_simulated_trials_help(five):
+    begun, few, category, *_ = five.notes
+    assert "5 of your own trials beside 24 simulated ones" in begun
+    assert "not fitted, as fewer than 3 of your own have it: object" in few
+    weights = "both 100.0%, both, yours counted 5 times (half of the weight) 100.0%, "
+    assert weights + "your" in category
 
 
 def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
@@ -70,10 +82,8 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
     )
     fitted = train.fit([own, simulated], **GIVEN)
     assert fitted.chosen["category"].choice.weights == (0, 1)
-    assert fitted.chosen["room"].choice.weights == (
-        0,
-        1,
-    )  # no simulated trial has a room
+    # No simulated trial has a room.
+    assert fitted.chosen["room"].choice.weights == (0, 1)
     assert fitted.classifier.rows_[fitted.classifier.spaces_["category"]].shape[0] == 22
     assert any(
         "simulated trials no longer help category" in note for note in fitted.notes

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from edge.errors import InputError
 from train.cluster import on_cluster
-from train.dataset import DataSet, load_trials
+from train.dataset import DataSet, Measurement, load_trials
 from train.feature_sets import expand
 from train.progress import bar
 from train.report.page import write
@@ -48,7 +48,7 @@ def _studied(data: Sequence[str]) -> DataSet:
         InputError: they are too few.
     """
     names = expand([name for name, _ in methods.OURS])
-    dataset = load_trials(data, horizon_s=LONGEST_S, features=names, progress=True)
+    dataset = load_trials(data, Measurement(names, LONGEST_S), progress=True)
     if len(dataset.trials) < FEWEST:
         raise InputError(
             f"{counted(len(dataset.trials), 'trial')} are too few to study; give "
@@ -167,7 +167,7 @@ def _again(context: Context, scene: Scene, i: int) -> paper.Numbers:
     seed."""
     with tempfile.TemporaryDirectory() as folder:
         simulate(replace(scene, seed=scene.seed + i), folder, jobs=context.workers.jobs)
-        dataset = load_trials([folder], horizon_s=LONGEST_S)
+        dataset = load_trials([folder], Measurement(horizon_s=LONGEST_S))
     quiet = replace(
         context, dataset=dataset, workers=replace(context.workers, progress=False)
     )

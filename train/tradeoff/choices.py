@@ -8,7 +8,7 @@ from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.candidates import candidates
 from train.choose import Chosen
-from train.dataset import DataSet, Recordings, load_trials
+from train.dataset import DataSet, Measurement, Recordings, load_trials
 from train.evaluate import Result
 from train.feature_sets import expand
 from train.fitting import FitOptions, fit, trials_of, windows_of
@@ -72,14 +72,13 @@ def followed(
     drawn = kinds_of(raw.recordings) is not None
     tried = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
     sets = [name for candidate in tried for name in candidate.sets]
-    return load_trials(
-        raw,
-        horizon_s=WINDOWS_S[-1],
-        features=expand([*sets, *features]),
-        progress=progress,
+    measurement = Measurement(
+        expand([*sets, *features]),
+        WINDOWS_S[-1],
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,
     )
+    return load_trials(raw, measurement, progress=progress)
 
 
 def chosen(

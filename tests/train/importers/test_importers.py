@@ -12,7 +12,7 @@ from edge.errors import InputError
 from edge.recording import load
 from edge.touch.arm import Chain
 from train.__main__ import main
-from train.dataset import load_trials
+from train.dataset import Measurement, load_trials
 from train.importers import sdh2
 
 MASK = "\n".join(["011110"] * 5 + ["111111"] * 8)
@@ -156,7 +156,7 @@ def test_the_command_writes_a_folder_that_trains_with_the_hands_joints(
     ]
     assert f"recordings written to {out}: 3" in capsys.readouterr().out
     assert load(out / "0000_cup.npz").joints.shape == (3, 7)
-    data = load_trials([out], features=["contact_motion", "joint_change@2"])
+    data = load_trials([out], Measurement(["contact_motion", "joint_change@2"]))
     assert data.chain is None
     assert data.joints == 7
     assert data.features(samples=3).shape == (3, 3 + 14)
