@@ -4,13 +4,14 @@ time."""
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from cycler import cycler
 from matplotlib import style
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from edge.classifier import Classifier
 from edge.errors import InputError, about
@@ -72,39 +73,29 @@ def draw(
 def _draw(
     recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None
 ) -> None:
-    touches = []
-    for name, recording in recordings:
-        onset, series = contact_of(name, recording)
-        touches.append(_Touch(name, recording, onset, series))
     horizon = WINDOW_S if model is None else model.info.window_s
-    figure = Figure(figsize=(2.6 * len(recordings) + 0.6, 8.6), layout="constrained")
+    touches = [_Touch.of(*recording, horizon) for recording in recordings]
+    layout = touches[0].recording.layout
+    figure = Figure(figsize=(2.6 * len(touches) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
-        4, len(recordings), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
+        4, len(touches), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
     )
-    frames = [
-        strongest_frame(touch.recording, touch.onset_s, horizon) for touch in touches
-    ]
-    strongest = max(float(force.max()) for _, force in frames)
+    strongest = max(float(touch.force.max()) for touch in touches)
     scale = PowerNorm(GAMMA, vmin=0.0, vmax=strongest)
-    for touch, (seconds, force), column in zip(touches, frames, axes.T, strict=True):
-        image = column[0].imshow(force, norm=scale, cmap="magma", aspect="auto")
+    for touch, column in zip(touches, axes.T, strict=True):
+        image = column[0].imshow(touch.force, norm=scale, cmap="magma", aspect="auto")
         column[0].set_title(touch.title, fontsize=14, weight="bold")
-        column[0].set_xlabel(f"column, at {seconds:.2f} s")
-        decided = None
-        if model is not None:
-            decided = _decided(touch.name, touch.recording, model)
+        column[0].set_xlabel(f"column, at {touch.strongest_s:.2f} s")
+        decided = None if model is None else _decided(touch, model)
         _draw_curves(column[1:], touch.series, decided, horizon)
         if decided is not None:
             _draw_answer(column[3], decided)
-    for axis, title, unit in zip(
-        axes[1:, 0], TITLES, units(recordings[0][1].layout).values(), strict=True
-    ):
-        axis.set_ylim(bottom=0.0)
-        axis.set_ylabel(f"{title} ({unit})")
-    on_arm = recordings[0][1].layout.wraps
-    axes[0, 0].set_ylabel("row, elbow to wrist" if on_arm else "row")
+    named = zip(axes[1:, 0], TITLES, units(layout).values(), strict=True)
+    for axis, title, unit in named:
+        axis.set(ylim=(0.0, None), ylabel=f"{title} ({unit})")
+    axes[0, 0].set_ylabel("row, elbow to wrist" if layout.wraps else "row")
     bar = figure.colorbar(image, ax=axes[0, :], pad=0.01, shrink=0.9)
-    bar.set_label(f"{UNITS[recordings[0][1].layout.force_unit]} per taxel")
+    bar.set_label(f"{UNITS[layout.force_unit]} per taxel")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight")
 
@@ -122,47 +113,45 @@ def contact_of(
         recording = recording.for_joints(chain.names, name)
     touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
     if len(touches) < number:
-        raise InputError(
-            f"{name}: holds no contact" + (f" {number}" if number > 1 else "")
-        )
+        which = f" {number}" if number > 1 else ""
+        raise InputError(f"{name}: holds no contact{which}")
     return touches[number - 1]
-
-
-def _decided(name: str, recording: Recording, model: Model) -> Decided | None:
-    """The decision of the first task: the category, where the model has one."""
-    task = (
-        "category" if "category" in model.info.tasks else next(iter(model.info.tasks))
-    )
-    with about(name):
-        events = list(Classifier(model, recording.layout).classify(recording))
-    return next((e for e in events if isinstance(e, Decided) and e.task == task), None)
-
-
-def strongest_frame(
-    recording: Recording, onset: float, horizon: float
-) -> tuple[float, np.ndarray]:
-    """Seconds from onset to the frame with the largest total force in the window, and
-    its forces.
-
-    The forces are of shape (rows, cols), in newtons, or in counts if the scale is
-    unknown.
-    """
-    t = recording.t - onset
-    (inside,) = np.nonzero((t >= 0.0) & (t <= horizon))
-    k = inside[recording.frames[inside].sum(axis=(1, 2), dtype=np.int64).argmax()]
-    return float(t[k]), recording.frames[k] / (
-        recording.layout.counts_per_newton or 1.0
-    )
 
 
 @dataclass(frozen=True)
 class _Touch:
-    """A recording, and its first contact."""
+    """A recording, and its first contact.
+
+    Attributes:
+        name: of the recording, for errors.
+        recording: the whole.
+        series: the contact.
+        strongest_s: seconds from onset to the frame with the largest total force in the
+            window.
+        force: (rows, cols) of this frame, in newtons, or in counts if the scale is
+            unknown.
+    """
 
     name: str
     recording: Recording
-    onset_s: float
     series: FeatureSeries
+    strongest_s: float
+    force: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, name: str, recording: Recording, window_s: float) -> Self:
+        """The first contact of a recording, and its strongest frame in a window.
+
+        Raises:
+            InputError: there is no contact.
+        """
+        onset, series = contact_of(name, recording)
+        t = recording.t - onset
+        (inside,) = np.nonzero((t >= 0.0) & (t <= window_s))
+        total = recording.frames[inside].sum(axis=(1, 2), dtype=np.int64)
+        k = inside[total.argmax()]
+        force = recording.frames[k] / (recording.layout.counts_per_newton or 1.0)
+        return cls(name, recording, series, float(t[k]), force)
 
     @property
     def title(self) -> str:
@@ -170,6 +159,16 @@ class _Touch:
         kind = self.recording.labels.get("category", "").replace("-", ", ")
         words = (kind, self.recording.labels.get("object"))
         return "\n".join(filter(None, words)) or "touch"
+
+
+def _decided(touch: _Touch, model: Model) -> Decided | None:
+    """The decision of the category, or of the first task where the model has none."""
+    tasks = list(model.info.tasks)
+    task = "category" if "category" in tasks else tasks[0]
+    with about(touch.name):
+        classifier = Classifier(model, touch.recording.layout)
+        events = list(classifier.classify(touch.recording))
+    return next((e for e in events if isinstance(e, Decided) and e.task == task), None)
 
 
 def _draw_curves(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from edge.errors import InputError
@@ -54,45 +55,50 @@ def draw_case(
 ) -> None:
     """Draw the three features of a case beside those of its nearest trials, and the
     pulls."""
-    axes = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
-    legend = {}
-    for axis, (name, unit) in zip(axes, units(layout).items(), strict=False):
-        stroke = {"color": TOUCH[0], "lw": 2.4, "zorder": 3}
-        legend["this touch"] = axis.plot(
-            *_within(case.touch, name, window_s), **stroke
-        )[0]
-        for place, (text, series, same) in enumerate(case.near, start=1):
-            colour, _, dashes = SAME if same else OTHER
-            curve = ([], []) if series is None else _within(series, name, window_s)
-            style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
-            marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
-            legend[text] = axis.plot(*curve, **style, **marks)[0]
-        axis.set(
-            title=name,
-            xlabel="seconds from onset",
-            ylabel=unit,
-            xlim=(0.0, 1.06 * window_s),
-        )
-        axis.set_ylim(bottom=0.0)
-    strongest = list(case.pulls.items())[:MOST_PULLS]
-    signs = [SAME[0] if pull > 0.0 else OTHER[0] for _, pull in strongest]
-    axes[3].barh(range(len(strongest)), [pull for _, pull in strongest], color=signs)
-    axes[3].set_yticks(
-        range(len(strongest)), [name for name, _ in strongest], fontsize=8
-    )
-    axes[3].invert_yaxis()
-    axes[3].axvline(0.0, color="0.3", lw=0.8)
-    axes[3].set(
-        title="pulls to the answer", xlabel=f"squared distance,\nagainst {case.rival}"
-    )
+    *axes, below = canvas.subplots(*(4, 1) if phone else (2, 2)).ravel()
+    legend: dict[str, Any] = {}
+    for axis, (name, unit) in zip(axes, units(layout).items(), strict=True):
+        legend |= _draw_curves(axis, case, name, window_s)
+        axis.set(title=name, xlabel="seconds from onset", ylabel=unit)
+        axis.set(xlim=(0.0, 1.06 * window_s), ylim=(0.0, None))
+    _draw_pulls(below, case)
     canvas.legend(
         legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False
     )
 
 
-def _within(series: FeatureSeries, name: str, window_s: float) -> tuple[Any, Any]:
-    inside = series.t <= window_s
-    return series.t[inside], curves(series)[name][inside]
+def _draw_curves(axis: Any, case: Case, name: str, window_s: float) -> dict[str, Any]:
+    """Draw a feature of the touch and of the nearest trials; {text: line} of the
+    legend."""
+
+    def curve(series: FeatureSeries | None) -> tuple[Any, Any]:
+        if series is None:
+            return [], []
+        inside = series.t <= window_s
+        return series.t[inside], curves(series)[name][inside]
+
+    (line,) = axis.plot(*curve(case.touch), color=TOUCH[0], lw=2.4, zorder=3)
+    legend = {"this touch": line}
+    for place, (text, series, same) in enumerate(case.near, start=1):
+        colour, _, dashes = SAME if same else OTHER
+        style = {"color": colour, "ls": dashes, "lw": 1.0, "ms": 4}
+        marks = {"marker": STROKES[place][1], "markevery": (0.04 * place, 0.25)}
+        (legend[text],) = axis.plot(*curve(series), **style, **marks)
+    return legend
+
+
+def _draw_pulls(axis: Any, case: Case) -> None:
+    """Draw the strongest pulls of a case as bars, the strongest at the top."""
+    names = list(case.pulls)[:MOST_PULLS]
+    pulls = list(case.pulls.values())[:MOST_PULLS]
+    places = range(len(names))
+    colours = np.where(np.array(pulls) > 0.0, SAME[0], OTHER[0])
+    axis.barh(places, pulls, color=colours)
+    axis.set_yticks(places, names, fontsize=8)
+    axis.invert_yaxis()
+    axis.axvline(0.0, color="0.3", lw=0.8)
+    xlabel = f"squared distance,\nagainst {case.rival}"
+    axis.set(title="pulls to the answer", xlabel=xlabel)
 
 
 def draw(
@@ -106,28 +112,15 @@ def draw(
             folder holds none of the trials.
     """
     touch = contact_of(where, recording)[1]
-    series_of: dict[str, FeatureSeries | None] = {}
-    cases = []
-    for line in explanations(model, recording, where):
-        rival = line["rival"] or {"label": "others"}
-        neighbours = []
-        for trial in [*line["nearest"][:MOST_NEAR], *filter(None, [line["rival"]])]:
-            name = trial["trial"]
-            if name not in series_of:
-                series_of[name] = _trial(folder, name)
-            text = f"{name}: {trial['label']}, {trial['distance']:.3g} away"
-            missing = "" if series_of[name] is not None else " (recording not found)"
-            neighbours.append(
-                (text + missing, series_of[name], trial["label"] == line["label"])
-            )
-        title = f"{line['task']}: {line['label']}"
-        cases.append(Case(title, touch, neighbours, line["pulls"], rival["label"]))
+    answers = list(explanations(model, recording, where))
+    names = [trial["trial"] for answer in answers for trial in _shown(answer)]
+    series_of = {name: _trial(folder, name) for name in dict.fromkeys(names)}
     if not any(series_of.values()):
         raise InputError(
-            f"{folder}: holds none of the nearest trials, such as {next(iter(series_of))}; "
-            "name their "
-            "folder by --data"
+            f"{folder}: holds none of the nearest trials, such as {names[0]}; name "
+            "their folder by --data"
         )
+    cases = [_case(answer, touch, series_of) for answer in answers]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 5.0 * len(cases)), layout="constrained")
         canvases = figure.subfigures(len(cases), squeeze=False)[:, 0]
@@ -138,11 +131,35 @@ def draw(
             figure.savefig(file, format="png", dpi=110)
 
 
+def _shown(answer: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The nearest trials of an explanation, and last the nearest of its rival."""
+    return [*answer["nearest"][:MOST_NEAR], *filter(None, [answer["rival"]])]
+
+
+def _case(
+    answer: Mapping[str, Any],
+    touch: FeatureSeries,
+    series_of: Mapping[str, FeatureSeries | None],
+) -> Case:
+    """The picture of an explanation, with the contact and {trial: its contact}."""
+    near = []
+    for trial in _shown(answer):
+        series = series_of[trial["trial"]]
+        text = f"{trial['trial']}: {trial['label']}, {trial['distance']:.3g} away"
+        if series is None:
+            text += " (recording not found)"
+        near.append((text, series, trial["label"] == answer["label"]))
+    rival = answer["rival"] or {"label": "others"}
+    title = f"{answer['task']}: {answer['label']}"
+    return Case(title, touch, near, answer["pulls"], rival["label"])
+
+
 def _trial(folder: Path, name: str) -> FeatureSeries | None:
     """A trial's contact by its name, if its recording is in the folder."""
     path = folder / f"{name}.npz"
     number = 1
-    if not path.is_file() and name.rpartition(" ")[2].isdecimal():
-        path = folder / f"{name.rpartition(' ')[0]}.npz"
-        number = int(name.rpartition(" ")[2])
+    stem, _, digits = name.rpartition(" ")
+    if not path.is_file() and digits.isdecimal():
+        path = folder / f"{stem}.npz"
+        number = int(digits)
     return contact_of(str(path), load(path), number)[1] if path.is_file() else None

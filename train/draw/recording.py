@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from edge.errors import InputError
 from edge.files import parsing
@@ -49,8 +50,6 @@ def draw(
         InputError: a sketch is asked for without a known arm or of a damaged
             `meta.simulation`, or `out` cannot be written.
     """
-    from matplotlib.figure import Figure
-
     layout = with_thresholds(recording.layout, threshold, None)
     chain = arm_of(recording, where)
     if chain is not None:
@@ -63,27 +62,13 @@ def draw(
     onset, series = contact or (float(recording.t[0]), None)
     heights = [1.7, 3.2, 4.0][: 3 if scene else 2]
     figure = Figure(figsize=(15.0, 1.2 + sum(heights)), layout="constrained")
-    labels = ", ".join(
-        f"{task}: {label}" for task, label in sorted(recording.labels.items())
-    )
-    figure.suptitle(
-        f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
-    )
+    figure.suptitle(_title(recording))
     grid = figure.add_gridspec(len(heights), FRAMES, height_ratios=heights)
     _frames(figure, grid, recording, layout, onset)
     third = FRAMES // 3
-    for i, (name, unit) in enumerate(units(layout).items()):
+    for i, feature in enumerate(FEATURES):
         axis = figure.add_subplot(grid[1, third * i : third * (i + 1)])
-        axis.set(title=name, xlabel="seconds from onset", ylabel=unit)
-        if series is None:
-            axis.text(
-                0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes
-            )
-        else:
-            axis.plot(series.t, curves(series)[name])
-            axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
-            axis.set_xlim(0.0, max(float(series.t[-1]), 0.1))
-            axis.set_ylim(bottom=0.0)
+        _curve(axis, feature, units(layout)[feature], series)
     if scene and chain is not None:
         with parsing(f"{where}: meta.simulation", "that of a scene"):
             draw_side(
@@ -93,10 +78,30 @@ def draw(
         figure.savefig(file, format="png", dpi=110)
 
 
+def _title(recording: Recording) -> str:
+    """The name of a recording's trial, and its labels."""
+    labels = ", ".join(map(": ".join, sorted(recording.labels.items())))
+    return f"{recording.meta.get('trial', 'trial')}   {labels or 'without labels'}"
+
+
+def _curve(axis: Any, feature: str, unit: str, series: FeatureSeries | None) -> None:
+    """Draw a feature against time; words where there is no contact."""
+    axis.set(title=feature, xlabel="seconds from onset", ylabel=unit)
+    if series is None:
+        axis.text(0.5, 0.5, "no contact found", ha="center", transform=axis.transAxes)
+        return
+    axis.plot(series.t, curves(series)[feature])
+    axis.axvspan(0.0, WINDOW_S, color="tab:green", alpha=0.08)
+    axis.set(xlim=(0.0, max(float(series.t[-1]), 0.1)), ylim=(0.0, None))
+
+
 def units(layout: SkinLayout) -> dict[str, str]:
     """{feature: unit} of the paper's three features, as on an axis."""
-    named = layout.force_unit, "taxel", layout.length_unit
-    return {feature: UNITS[unit] for feature, unit in zip(FEATURES, named, strict=True)}
+    return {
+        "max_force": UNITS[layout.force_unit],
+        "contact_area": UNITS["taxel"],
+        "contact_motion": UNITS[layout.length_unit],
+    }
 
 
 def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
@@ -144,9 +149,9 @@ def _frames(
             counts, layout.threshold_counts, valid=valid, wraps=layout.wraps
         )
         title = f"{t[k] - onset:+.2f} s"
-        if region is not None and frames[k].shear is not None:
-            _shear(axis, frames[k], region, longest / ARROW)
         if region is not None:
+            if frames[k].shear is not None:
+                _shear(axis, frames[k], region, longest / ARROW)
             axis.contour(
                 region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2
             )

@@ -4,7 +4,7 @@ moves."""
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -25,15 +25,31 @@ STEMS = 30
 LOST_S = 0.3
 """Seconds without contact after which an object that tips has fallen."""
 
-MOMENTS = (
-    ("at onset", 0.0, "0.45", "--", "//"),
-    ("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"),
-)
-"""The moments that are drawn: name, seconds from onset, colour, line and hatching."""
 
-Place = tuple[np.ndarray, np.ndarray, float]
-"""Position (3,) of a contact, the skin's outward normal there (3,), and metres along
-the skin to its first row."""
+class Moment(NamedTuple):
+    """A moment that is drawn: its name, seconds from onset, colour, line and
+    hatching."""
+
+    name: str
+    after_s: float
+    colour: str
+    line: str
+    hatch: str
+
+
+MOMENTS = (
+    Moment("at onset", 0.0, "0.45", "--", "//"),
+    Moment("1.2 s on", WINDOW_S, "tab:blue", "-", "\\\\"),
+)
+
+
+class Place(NamedTuple):
+    """Position (3,) of a contact, the skin's outward normal there (3,), and metres
+    along the skin to its first row."""
+
+    position: np.ndarray
+    normal: np.ndarray
+    row0_m: float
 
 
 def link_positions(chain: Chain, q: Any) -> np.ndarray:
@@ -57,50 +73,47 @@ def draw_side(
     assert joints is not None
     first: Place | None = None
     motion = ""
-    for text, later, style, line, hatch in MOMENTS:
-        k = int(
-            np.clip(
-                np.searchsorted(recording.t, onset + later), 0, len(recording.t) - 1
-            )
-        )
-        points = link_positions(chain, joints[k])
-        axis.plot(
-            *points[:, [0, 2]].T,
-            line,
-            marker="o",
-            color=style,
-            label=text,
-            markersize=4,
-        )
-        if layout.radius_m is not None:
-            axis.fill(
-                *skin_outline(chain.pose(joints[k]), layout).T,
-                facecolor=style,
-                alpha=0.35,
-            )
+    for moment in MOMENTS:
+        k = int((recording.t[:-1] < onset + moment.after_s).sum())
+        _arm(axis, chain, joints[k], layout, moment)
         last = _last_contact(recording, joints, chain, layout, k)
         if last is None:
             continue
         since, place = last
         first = first or place
+        style = {"color": moment.colour}
         if since == 0.0:
-            star = {"color": style, "ms": 13, "mec": "white", "ls": "none"}
-            axis.plot(*place[0][[0, 2]], "*", **star, label=f"contact {text}")
+            star = {"ms": 13, "mec": "white", "ls": "none", **style}
+            label = f"contact {moment.name}"
+            axis.plot(*place.position[[0, 2]], "*", **star, label=label)
         if simulation:
-            motion = _object(
-                axis, simulation, first, place[0], since, color=style, hatch=hatch
-            )
-    title = "seen from the side"
-    if simulation:
-        mass = simulation["values"].get("mass_kg")
-        title += (
-            f": {simulation['family']}" + (f", {mass:.2g} kg" if mass else "") + motion
-        )
-        title += "\n" + ", ".join(simulation["effects"])
+            style["hatch"] = moment.hatch
+            motion = _object(axis, simulation, first, place.position, since, **style)
+    title = _title(simulation, motion) if simulation else "seen from the side"
     axis.set_title(title, fontsize=9)
     axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
     axis.set_aspect("equal", adjustable="datalim")
     axis.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4)
+
+
+def _arm(
+    axis: Any, chain: Chain, q: np.ndarray, layout: SkinLayout, moment: Moment
+) -> None:
+    """Draw the arm at joint angles q, with the skin of a cylinder around it."""
+    style = {"color": moment.colour, "label": moment.name, "markersize": 4}
+    x, _, z = link_positions(chain, q).T
+    axis.plot(x, z, moment.line, marker="o", **style)
+    if layout.radius_m is not None:
+        corners = skin_outline(chain.pose(q), layout)
+        axis.fill(*corners.T, facecolor=moment.colour, alpha=0.35)
+
+
+def _title(simulation: Mapping[str, Any], motion: str) -> str:
+    """The title over a simulated object that moves so."""
+    mass = simulation["values"].get("mass_kg")
+    weight = f", {mass:.2g} kg" if mass else ""
+    effects = ", ".join(simulation["effects"])
+    return f"seen from the side: {simulation['family']}{weight}{motion}\n{effects}"
 
 
 def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
@@ -126,10 +139,12 @@ def _last_contact(
         if region is not None:
             pose = chain.pose(joints[i])
             position = layout.position(*region.centroid)
-            place = pose[:3, :3] @ position + pose[:3, 3]
-            normal = pose[:3, :2] @ position[:2]
-            above = region.centroid[0] * layout.pitch[0]
-            return float(recording.t[k] - recording.t[i]), (place, normal, above)
+            place = Place(
+                position=pose[:3, :3] @ position + pose[:3, 3],
+                normal=pose[:3, :2] @ position[:2],
+                row0_m=region.centroid[0] * layout.pitch[0],
+            )
+            return float(recording.t[k] - recording.t[i]), place
     return None
 
 
@@ -152,11 +167,11 @@ def _object(
         style: colour and hatching, by their names in matplotlib.
     """
     body = _Body.of(simulation, first)
-    ahead = math.copysign(1.0, first[1][0] or 1.0)
-    start = first[0][[0, 2]]
+    ahead = math.copysign(1.0, first.normal[0] or 1.0)
+    start = first.position[[0, 2]]
     table = start[0] + ahead * np.array([-0.1, body.depth + 0.25])
     axis.plot(table, 2 * [start[1] + body.floor], color="sienna")
-    way = max(ahead * float(now[0] - first[0][0]), 0.0)
+    way = max(ahead * float(now[0] - first.position[0]), 0.0)
     slid = way if "sliding" in body.effects else 0.0
     if "stems" in body.effects:
         for ends in body.stems(way, slid):
@@ -200,7 +215,7 @@ class _Body:
             effects=simulation["effects"],
             values=values,
             floor=-max(height, 0.5 * min(width, 0.6)),
-            top=max(min(0.5 * width, first[2]), ABOVE_M),
+            top=max(min(0.5 * width, first.row0_m), ABOVE_M),
             depth=values.get("base_m") or DEPTH_M,
         )
 

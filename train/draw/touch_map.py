@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.model.info import ModelInfo
@@ -39,18 +38,6 @@ def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
     return "the skin", [
         np.array([layout.position(*place) for place in line]) for line in lines
     ]
-
-
-def _style(number: int, label: str, sure: NDArray[np.float64]) -> dict[str, Any]:
-    """How the contacts of a label are drawn, from their confidences."""
-    return {
-        "s": 90,
-        "edgecolors": "black",
-        "linewidths": 0.6,
-        "color": "0.6" if label == UNKNOWN else f"C{number % 10}",
-        "marker": MARKERS[number % len(MARKERS)],
-        "alpha": 0.35 + 0.65 * sure,
-    }
 
 
 def _task(contacts: TouchMap, touches: Sequence[Touch], wish: str | None) -> str:
@@ -86,23 +73,13 @@ def draw(
     if not touches:
         raise InputError(f"{contacts.path}: no contact is on this map yet")
     chosen = _task(contacts, touches, task)
-    labels = [touch.labels.get(chosen) or UNKNOWN for touch in touches]
-    sure = np.array([touch.confidence.get(chosen, 0.0) for touch in touches])
-    positions = np.array([touch.position for touch in touches])
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     axes = figure.subplots(1, 2)
-    name, lines = ("", []) if info is None else outline(info)
     unit = UNITS.get(contacts.head.unit, contacts.head.unit)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
-        for i, line in enumerate(lines):
-            behind = {"color": "0.6", "lw": 2.0, "zorder": 0}
-            axis.plot(line[:, across], line[:, up], label=None if i else name, **behind)
-        for i, label in enumerate(sorted(set(labels))):
-            labelled = np.array(labels) == label
-            places = positions[labelled][:, [across, up]]
-            style = _style(i, label, sure[labelled])
-            text = f"{label} ({int(labelled.sum())})"
-            axis.scatter(*places.T, **style, label=text)
+        if info is not None:
+            _draw_outline(axis, info, [across, up])
+        _draw_touches(axis, touches, chosen, [across, up])
         axis.set(
             xlabel=f"{'xyz'[across]} ({unit})",
             ylabel=f"{'xyz'[up]} ({unit})",
@@ -119,3 +96,33 @@ def draw(
     figure.suptitle(f"{counted(len(touches), 'contact')} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
+
+
+def _draw_outline(axis: Any, info: ModelInfo, plane: list[int]) -> None:
+    """Draw a model's arm or skin behind the contacts, in a plane of two axes."""
+    name, lines = outline(info)
+    for i, line in enumerate(lines):
+        label = None if i else name
+        axis.plot(*line[:, plane].T, color="0.6", lw=2.0, zorder=0, label=label)
+
+
+def _draw_touches(
+    axis: Any, touches: Sequence[Touch], task: str, plane: list[int]
+) -> None:
+    """Draw the contacts in a plane of two axes, in the colour and marker of their
+    label for a task; the less sure, the fainter."""
+    positions = np.array([touch.position for touch in touches])
+    labels = np.array([touch.labels.get(task) or UNKNOWN for touch in touches])
+    sure = np.array([touch.confidence.get(task, 0.0) for touch in touches])
+    for number, label in enumerate(np.unique(labels)):
+        labelled = labels == label
+        axis.scatter(
+            *positions[labelled][:, plane].T,
+            s=90,
+            edgecolors="black",
+            linewidths=0.6,
+            color="0.6" if label == UNKNOWN else f"C{number % 10}",
+            marker=MARKERS[number % len(MARKERS)],
+            alpha=0.35 + 0.65 * sure[labelled],
+            label=f"{label} ({labelled.sum()})",
+        )

@@ -98,10 +98,8 @@ def accuracy(chosen: Chosen) -> str:
     """The nested accuracy of a task in words."""
     numbers = (
         f"{chosen.accuracy.accuracy:.1%} of {chosen.accuracy.total} trials are "
-        "classified "
-        f"correctly (95 % interval {interval(chosen.accuracy)}), each by a model "
-        "chosen and fitted "
-        "without "
+        f"classified correctly (95 % interval {interval(chosen.accuracy)}), each by a "
+        "model chosen and fitted without "
     )
     if chosen.left_out == TRIAL:
         return f"{numbers}this trial"
@@ -143,8 +141,7 @@ def warnings(fitted: Fitted) -> list[str]:
         total = len({trial.path for trial in dataset.trials} | set(paths))
         lines.append(
             f"warning: {len(paths)} of {total} recordings are left out for lack of "
-            f"{lacking}: "
-            f"{_files(paths)}"
+            f"{lacking}: {_files(paths)}"
         )
     if dataset.unused:
         lines.append(
@@ -158,8 +155,7 @@ def warnings(fitted: Fitted) -> list[str]:
     if fitted.window_s > longest + 1e-9:
         lines.append(
             f"warning: the window of {fitted.window_s:g} s is too long: every "
-            "recording ends "
-            f"within {longest:.2f} s of the onset"
+            f"recording ends within {longest:.2f} s of the onset"
         )
     return [
         *lines,
@@ -181,11 +177,9 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
         share = posture_accuracy(dataset, task)
         lines.append(
             f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset "
-            "alone "
-            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
-            "recognise "
-            "places instead of objects; leave posture out of --features to judge touch "
-            "alone"
+            f"alone give {share:.1%} of the labels (1-NN, leave-one-out), so the "
+            "model may recognise places instead of objects; leave posture out of "
+            "--features to judge touch alone"
         )
     if choice.components > components and choice.projection == "pca":
         lines.append(
@@ -197,9 +191,8 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
     if equal:
         lines.append(
             f"warning: {task}: {equal} trials have the same coordinates as a trial "
-            "with another "
-            "label; the earlier trial counts as nearer, so their order decides the "
-            "label"
+            "with another label; the earlier trial counts as nearer, so their order "
+            "decides the label"
         )
     projection = classifier.projections_[space]
     members = classifier.members_[space]
@@ -209,10 +202,8 @@ def _task_warnings(fitted: Fitted, task: str) -> list[str]:
         farthest = dataset.trials[members[(rows**2).sum(axis=1).argmax()]].path
         lines.append(
             f"warning: {task}: half of the trials lie within {steps:.0f} of the "
-            "model's steps from "
-            f"another trial, because {farthest} lies far outside all others; leave it "
-            "out if the "
-            "recording is wrong"
+            f"model's steps from another trial, because {farthest} lies far outside "
+            "all others; leave it out if the recording is wrong"
         )
     if projection.gap_ < CLOSE_EIGENVALUES:
         lines.append(

@@ -79,25 +79,18 @@ def early(measured: Measured) -> Section:
         "Early decisions",
         [
             "With a requested error rate, the model decides as soon as it is sure "
-            "enough. Each of "
-            f"{FOLDS} folds tests this once, with a model that was chosen, trained and "
-            "calibrated "
-            "on the other folds. Error rates that no fold certifies have no row; those "
-            "that only "
-            "some folds certify are tested on fewer contacts.",
+            f"enough. Each of {FOLDS} folds tests this once, with a model that was "
+            "chosen, trained and calibrated on the other folds. Error rates that no "
+            "fold certifies have no row; those that only some folds certify are "
+            "tested on fewer contacts.",
             "A contact unlike all trained ones waits for the full window. It gets no "
-            "label of the "
-            f"task {finest(measured.y)}, which counts as wrong.",
+            f"label of the task {finest(measured.y)}, which counts as wrong.",
             "The model runs once at each decision point, which takes "
-            f"{decision_us:.0f} us of "
-            f"features and decision on {board.name}. All {count} decision points "
-            "together take "
-            f"{1e-3 * count * decision_us:.1f} ms for a contact, while the program "
-            "waits for the "
-            "contact to unfold.",
+            f"{decision_us:.0f} us of features and decision on {board.name}. All "
+            f"{count} decision points together take {1e-3 * count * decision_us:.1f} "
+            "ms for a contact, while the program waits for the contact to unfold.",
             "The confidence differs from the share of right decisions by this many "
-            "percentage "
-            f"points on average: {', '.join(gaps)}.",
+            f"percentage points on average: {', '.join(gaps)}.",
         ],
         [Table("early", "Decisions with a requested error rate", rows, narrow=4)],
     )
@@ -146,11 +139,9 @@ def reasons(measured: Measured) -> Section:
     if slow:
         notes.append(
             "Physics sets a lower limit. A movable object stands still, and cannot be "
-            "told from a "
-            "fixed one, until the arm pushes harder than static friction holds. The "
-            "table gives "
-            "this time, mu_s m g / (k v), for the middle of each object's friction and "
-            "mass."
+            "told from a fixed one, until the arm pushes harder than static friction "
+            "holds. The table gives this time, mu_s m g / (k v), for the middle of "
+            "each object's friction and mass."
         )
     commands = measured.commands
     kind = "quick choice" if commands.quick else "choice of `make export`"

@@ -125,7 +125,6 @@ def check(board: Board, path: str, digest: str) -> None:
     if board.digest != digest:
         raise InputError(
             f"{path}: was made with a model of other recordings (digest "
-            f"{board.digest[:12]}, "
-            f"these have {digest[:12]}); run `edge-classify bench` with a model of "
-            "these"
+            f"{board.digest[:12]}, these have {digest[:12]}); run `edge-classify "
+            "bench` with a model of these"
         )

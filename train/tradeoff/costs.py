@@ -211,13 +211,10 @@ def section(measured: Measured) -> Section:
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
             "The rows of number formats are about the exported graph, measured with "
-            "`python -m "
-            "export.arithmetic` on this machine. Labels are compared on the model's "
-            "golden "
-            "vectors. A distance depends on the batch if it has other bits when its "
-            "vector is "
-            "decided alone. Only whole numbers give the same bits in any order of "
-            "summation, and so on every machine.",
+            "`python -m export.arithmetic` on this machine. Labels are compared on "
+            "the model's golden vectors. A distance depends on the batch if it has "
+            "other bits when its vector is decided alone. Only whole numbers give the "
+            "same bits in any order of summation, and so on every machine.",
         ],
         [
             Table(

@@ -112,8 +112,7 @@ class ParetoFront:
         if measured != digest:
             raise InputError(
                 f"{path}: was measured on other recordings (digest {measured[:12]}, "
-                "these have "
-                f"{digest[:12]}); {mend} DATA=... of these"
+                f"these have {digest[:12]}); {mend} DATA=... of these"
             )
         fastest_first = sorted(points, key=lambda point: point.milliseconds)
         return cls(task, tuple(fastest_first), quick)
@@ -147,8 +146,7 @@ class ParetoFront:
         if not 0.0 < number < math.inf:
             raise InputError(
                 f"--front must be {', '.join(NAMES)}, milliseconds (above 1) or an "
-                "accuracy "
-                f"(0 to 1), not {wanted!r}"
+                f"accuracy (0 to 1), not {wanted!r}"
             )
         if number > 1.0:
             able = [

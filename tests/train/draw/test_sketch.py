@@ -7,13 +7,17 @@ from matplotlib.figure import Figure
 
 from train.draw import sketch as sketches
 
-FIRST = np.array([-0.1, 0.0, -0.4]), np.array([1.0, 0.0, 0.0]), 0.08
+FIRST = sketches.Place(
+    position=np.array([-0.1, 0.0, -0.4]),
+    normal=np.array([1.0, 0.0, 0.0]),
+    row0_m=0.08,
+)
 
 
 def sketch(effects, moved=0.1, since=0.0, **values):
     axis = Figure().add_subplot()
     drawn = {"effects": effects, "values": values}
-    now = FIRST[0] + [moved, 0.0, 0.0]
+    now = FIRST.position + np.array([moved, 0.0, 0.0])
     return axis, sketches._object(
         axis, drawn, FIRST, now, since, color="blue", hatch="//"
     )
@@ -63,7 +67,7 @@ def test_a_plants_stems_bend_to_where_the_forearm_is():
     assert len(stems) == 5
     for stem in stems:
         (foot, tip), (floor, top) = stem.get_xdata(), stem.get_ydata()
-        share = (FIRST[0][2] - floor) / (top - floor)
+        share = (FIRST.position[2] - floor) / (top - floor)
         assert foot + share * (tip - foot) == pytest.approx(
             0.0
         )  # at the contact's height
@@ -79,4 +83,4 @@ def test_the_skin_is_seen_as_thick_as_it_is_and_the_object_no_higher_than_it(for
     assert corners[:, 1].max() == pytest.approx(forearm.row0_z_m)
     assert np.ptp(corners[:, 1]) == pytest.approx(15 * forearm.pitch[0])
     tall = outline(sketch([], width_m=1.0)[0])
-    assert tall[:, 1].max() == pytest.approx(FIRST[0][2] + FIRST[2])
+    assert tall[:, 1].max() == pytest.approx(FIRST.position[2] + FIRST.row0_m)
