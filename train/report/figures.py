@@ -39,6 +39,10 @@ PHONE = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
+MATRIX_SHARES = 4
+"""One of at most so many classes shows shares too."""
+MANY_CLASSES = 6
+"""One of more classes has smaller rows, and on a phone smaller text."""
 
 
 def picture(
@@ -113,28 +117,40 @@ def confusion(
         truth: (n,) labels.
         answers: (n,) the model's.
     """
-    classes = sorted(set(truth) | set(answers))
+    classes = np.union1d(truth, answers)
     n = len(classes)
     counts = confusion_matrix(truth, answers, labels=classes)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    numbered = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
+    many = n > MANY_CLASSES
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
-        axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
-        small = {"fontsize": 7} if phone and n > 6 else {}
-        places = range(0, n, -(-n // MATRIX_TEXT))
-        axes.set_xticks(places, [i + 1 for i in places], **(small and {"fontsize": 6}))
-        axes.set_yticks(range(n), numbered, **small)
+        small = phone and many
+        places = np.arange(0, n, -(-n // MATRIX_TEXT))
+        numbered = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
+        axes.set_xticks(places, places + 1, fontsize=6 if small else None)
+        axes.set_yticks(range(n), numbered, fontsize=7 if small else None)
         axes.set(xlabel="answer, as a row's number", ylabel="label")
-        for i, j in zip(*np.nonzero(counts), strict=True) if n <= MATRIX_TEXT else ():
-            text = f"{counts[i, j]:.0f}" + (f"\n{shares[i, j]:.0%}" if n <= 4 else "")
-            colour = "white" if shares[i, j] > 0.55 else "black"
-            axes.text(j, i, text, ha="center", va="center", color=colour, **small)
+        _draw_matrix(axes, counts, fontsize=7 if small else None)
 
-    height = 1.2 + 0.3 * n if n > 6 else 2.0 + 0.45 * n
-    heights = height, 0.9 + 0.16 * n if n > 6 else 2.8
+    height = 1.2 + 0.3 * n if many else 2.0 + 0.45 * n
+    heights = height, 0.9 + 0.16 * n if many else 2.8
     return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
+
+
+def _draw_matrix(axes: Any, counts: NDArray[np.int64], fontsize: int | None) -> None:
+    """Draw the counts of a confusion matrix, darker with their share of a row."""
+    n = len(counts)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+    if n > MATRIX_TEXT:
+        return
+    style = {"ha": "center", "va": "center", "fontsize": fontsize}
+    for i, j in np.argwhere(counts):
+        text = str(counts[i, j])
+        if n <= MATRIX_SHARES:
+            text += f"\n{shares[i, j]:.0%}"
+        colour = "white" if shares[i, j] > 0.55 else "black"
+        axes.text(j, i, text, color=colour, **style)
 
 
 def lines(
@@ -144,7 +160,7 @@ def lines(
     results: Mapping[str, Sequence[Result]],
     *,
     label: str,
-    paper: Mapping[str, Mapping[float, float]] | None = None,
+    paper: Mapping[str, Mapping[str, float]] | None = None,
     ticks: Sequence[str] = (),
 ) -> Figure:
     """Accuracy against x, with a line and binomial intervals for each task.
@@ -155,7 +171,7 @@ def lines(
         x: (m,).
         results: {task: m results}.
         label: label of the x axis.
-        paper: {task: {x: percent}} of hollow points.
+        paper: {task: {x, as text: percent}} of hollow points.
         ticks: labels of x, which then lie on a logarithmic axis.
     """
 
@@ -163,11 +179,13 @@ def lines(
         axes = canvas.subplots()
         for order, (task, row) in enumerate(results.items()):
             curve(axes, order, task, x, row)
-            points = sorted((paper or {}).get(task, {}).items())
+            points = (paper or {}).get(task, {})
             if points:
                 colour, marker, _ = STROKES[order % len(STROKES)]
                 style = {"color": colour, "marker": marker, "mfc": "white", "lw": 0.6}
-                axes.plot(*zip(*points, strict=True), **style, label=f"{task}, paper")
+                places = list(map(float, points))
+                heights = list(points.values())
+                axes.plot(places, heights, **style, label=f"{task}, paper")
         if ticks:
             axes.set_xscale("log")
             axes.set_xticks(x, ticks)
@@ -206,23 +224,24 @@ def bars(
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         diamonds = []
-        for i, (stroke, (group, row)) in enumerate(
-            zip(STROKES, groups.items(), strict=False)
-        ):
+        for i, (group, row) in enumerate(groups.items()):
             y = np.arange(m) + (i - (g - 1) / 2) * height
             values, arms = spread(row)
-            style = {
-                "color": stroke[0],
-                "alpha": 0.85,
-                "hatch": HATCHES[i],
-                "ec": "white",
-                "lw": 0,
-            }
-            error = {"xerr": arms, "error_kw": {"ecolor": "0.25", "elinewidth": 0.8}}
-            axes.barh(y, values, height * 0.92, **style, **error, label=group)
-            diamonds += [
-                (p, y[names.index(n)]) for n, p in (marks or {}).get(group, {}).items()
-            ]
+            axes.barh(
+                y,
+                values,
+                height * 0.92,
+                color=STROKES[i][0],
+                alpha=0.85,
+                hatch=HATCHES[i],
+                ec="white",
+                lw=0,
+                xerr=arms,
+                error_kw={"ecolor": "0.25", "elinewidth": 0.8},
+                label=group,
+            )
+            for marked, percent in (marks or {}).get(group, {}).items():
+                diamonds.append((percent, y[names.index(marked)]))
         if diamonds:
             style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
             axes.plot(*zip(*diamonds, strict=True), marker="D", **style)

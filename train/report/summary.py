@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,32 +37,32 @@ Prices = Sequence[tuple[float, float]]
 def summary(fitted: Fitted, prices: Prices) -> str:
     """The candidates, the choice for each task, notes and warnings, as lines of
     text."""
-    table = candidates(fitted, prices)
-    cells = [[str(cell) for cell in row] for row in (table.columns, *table.cells)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = [
-        "  ".join(
-            f"{row[i]:{'<' if i < 2 else '>'}{width}}" for i, width in enumerate(widths)
-        )
-        for row in cells
-    ]
-    lines += [
+        *_aligned(candidates(fitted, prices)),
         "* chosen; in brackets, the 95 % interval of the accuracy on other trials",
         "",
     ]
     for task, chosen in fitted.chosen.items():
-        lines += [
-            f"{task}: {accuracy(chosen)}",
-            f"  {_described(chosen.choice, fitted)}",
-        ]
+        lines.append(f"{task}: {accuracy(chosen)}")
+        lines.append(f"  {_described(chosen.choice, fitted)}")
         if fitted.early is not None:
             early = _described(fitted.early.choices[task], fitted)
             lines.append(f"  before {fitted.early.until_s:g} s: {early}")
     lines += ["", *_by_unit(fitted.dataset.units)]
-    if any(moves(measures.feature(name)) for name in fitted.dataset.names):
+    if any(map(moves, map(measures.feature, fitted.dataset.names))):
         frame = "along the skin" if fitted.dataset.chain is None else "in the world"
         lines.append(f"contact motion is measured {frame}")
     return "\n".join([*lines, *fitted.notes, *warnings(fitted)])
+
+
+def _aligned(table: Table) -> list[str]:
+    """The lines of a table: two columns to the left, the others to the right."""
+    rows = [list(map(str, row)) for row in (table.columns, *table.cells)]
+    columns = []
+    for i, column in enumerate(zip(*rows, strict=True)):
+        width = max(map(len, column))
+        columns.append([c.ljust(width) if i < 2 else c.rjust(width) for c in column])
+    return list(map("  ".join, zip(*columns, strict=True)))
 
 
 def _by_unit(units: Mapping[str, str]) -> list[str]:
@@ -82,24 +82,23 @@ def candidates(fitted: Fitted, prices: Prices) -> Table:
         pairs = {(grid.features, grid.projection) for grid in candidate.grids}
         row: Row = {"features": candidate.name, "projection": candidate.projection}
         for task, chosen in fitted.chosen.items():
-            star = (
-                "*"
-                if (chosen.choice.features, chosen.choice.projection) in pairs
-                else " "
-            )
+            choice = chosen.choice
+            star = "*" if (choice.features, choice.projection) in pairs else " "
             result = chosen.candidates[i]
             row[task] = f"{result.accuracy:.1%} ({interval(result)}){star}"
         us, kilobytes = prices[i]
-        rows.append({**row, "us per decision": round(us, 1), "kB": round(kilobytes, 1)})
+        row["us per decision"] = round(us, 1)
+        row["kB"] = round(kilobytes, 1)
+        rows.append(row)
     return Table("candidates", "Candidates", rows, ("us per decision",), narrow=3)
 
 
 def accuracy(chosen: Chosen) -> str:
     """The nested accuracy of a task in words."""
+    result = chosen.accuracy
     numbers = (
-        f"{chosen.accuracy.accuracy:.1%} of {chosen.accuracy.total} trials are "
-        f"classified correctly (95 % interval {interval(chosen.accuracy)}), each by a "
-        "model chosen and fitted without "
+        f"{result.accuracy:.1%} of {result.total} trials are classified correctly "
+        f"(95 % interval {interval(result)}), each by a model chosen and fitted without "
     )
     if chosen.left_out == TRIAL:
         return f"{numbers}this trial"
@@ -124,31 +123,7 @@ def _described(choice: Choice, fitted: Fitted) -> str:
 def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that make a model worse, or make it look better than it is."""
     dataset = fitted.dataset
-    lines = []
-    untouched = [
-        path for path, labels in dataset.untouched if NO_CONTACT not in labels.values()
-    ]
-    if untouched:
-        line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
-        line += _files(untouched)
-        if (
-            len(untouched) / (len(dataset.trials) + len(dataset.untouched))
-            > MISSING_SHARE
-        ):
-            line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
-        lines.append(line)
-    for lacking, paths in dataset.left_out.items():
-        total = len({trial.path for trial in dataset.trials} | set(paths))
-        lines.append(
-            f"warning: {len(paths)} of {total} recordings are left out for lack of "
-            f"{lacking}: {_files(paths)}"
-        )
-    if dataset.unused:
-        lines.append(
-            "warning: only the first of several contacts is used in "
-            f"{_files(dataset.unused)}; "
-            "`python -m train split` makes a recording of each contact"
-        )
+    lines = [*_untouched(dataset), *_left_out(dataset)]
     longest = max(
         float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
     )
@@ -157,60 +132,99 @@ def warnings(fitted: Fitted) -> list[str]:
             f"warning: the window of {fitted.window_s:g} s is too long: every "
             f"recording ends within {longest:.2f} s of the onset"
         )
-    return [
-        *lines,
-        *(line for task in fitted.chosen for line in _task_warnings(fitted, task)),
-    ]
+    for task in fitted.chosen:
+        lines += _task_warnings(fitted, task)
+    return lines
 
 
-def _task_warnings(fitted: Fitted, task: str) -> list[str]:
+def _untouched(dataset: DataSet) -> Iterator[str]:
+    """A sentence on the recordings without a contact whose labels name one."""
+    paths = [path for path, labels in dataset.untouched if _names_contact(labels)]
+    if not paths:
+        return
+    line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
+    line += _files(paths)
+    total = len(dataset.trials) + len(dataset.untouched)
+    if len(paths) / total > MISSING_SHARE:
+        line = f"warning: {line}; `python -m train thresholds` proposes thresholds"
+    yield line
+
+
+def _names_contact(labels: Mapping[str, str]) -> bool:
+    return NO_CONTACT not in labels.values()
+
+
+def _left_out(dataset: DataSet) -> Iterator[str]:
+    """Sentences on recordings, and on contacts of a recording, that are not used."""
+    used = {trial.path for trial in dataset.trials}
+    for lacking, paths in dataset.left_out.items():
+        yield (
+            f"warning: {len(paths)} of {len(used.union(paths))} recordings are left out "
+            f"for lack of {lacking}: {_files(paths)}"
+        )
+    if dataset.unused:
+        yield (
+            "warning: only the first of several contacts is used in "
+            f"{_files(dataset.unused)}; `python -m train split` makes a recording of "
+            "each contact"
+        )
+
+
+def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
     """The sentences that concern a single task."""
-    dataset = fitted.dataset
     classifier = fitted.classifier
     choice = fitted.chosen[task].choice
-    space = classifier.spaces_[task]
     components = classifier.components_[task]
-    lines = []
-    if any(
-        measures.feature(name).quantity == "joint_angle" for name in choice.features
-    ):
-        share = posture_accuracy(dataset, task)
-        lines.append(
-            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset "
-            f"alone give {share:.1%} of the labels (1-NN, leave-one-out), so the "
-            "model may recognise places instead of objects; leave posture out of "
-            "--features to judge touch alone"
-        )
+    if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
+        yield _posture(fitted.dataset, task)
     if choice.components > components and choice.projection == "pca":
-        lines.append(
+        yield (
             f"warning: {task}: the trials span {components} components, "
             f"{choice.components - components} fewer than asked for"
         )
-    rows = classifier.rows_[space][:, :components]
+    yield from _geometry(fitted, task)
+    gap = classifier.projections_[classifier.spaces_[task]].gap_
+    if gap < CLOSE_EIGENVALUES:
+        yield (
+            f"warning: {task}: two components explain the same variance to within "
+            f"{gap:.1e}; which of them is kept is arbitrary"
+        )
+
+
+def _posture(dataset: DataSet, task: str) -> str:
+    """A sentence on what the joint angles tell of a task before any touch."""
+    share = posture_accuracy(dataset, task)
+    return (
+        f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
+        f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
+        "recognise places instead of objects; leave posture out of --features to judge "
+        "touch alone"
+    )
+
+
+def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
+    """Sentences on trials that lie at the same place, or far outside."""
+    classifier = fitted.classifier
+    space = classifier.spaces_[task]
+    rows = classifier.rows_[space][:, : classifier.components_[task]]
     equal = tied_across_labels(rows, classifier.labels_[task])
     if equal:
-        lines.append(
+        yield (
             f"warning: {task}: {equal} trials have the same coordinates as a trial "
             "with another label; the earlier trial counts as nearer, so their order "
             "decides the label"
         )
-    projection = classifier.projections_[space]
     members = classifier.members_[space]
     _, different = np.unique(fitted.X[members], axis=0, return_index=True)
-    steps = coarseness(rows[different], projection.grid_.unit)
+    steps = coarseness(rows[different], classifier.projections_[space].grid_.unit)
     if steps < FEWEST_UNITS:
-        farthest = dataset.trials[members[(rows**2).sum(axis=1).argmax()]].path
-        lines.append(
+        farthest = members[(rows**2).sum(axis=1).argmax()]
+        yield (
             f"warning: {task}: half of the trials lie within {steps:.0f} of the "
-            f"model's steps from another trial, because {farthest} lies far outside "
-            "all others; leave it out if the recording is wrong"
+            "model's steps from another trial, because "
+            f"{fitted.dataset.trials[farthest].path} lies far outside all others; "
+            "leave it out if the recording is wrong"
         )
-    if projection.gap_ < CLOSE_EIGENVALUES:
-        lines.append(
-            f"warning: {task}: two components explain the same variance to within "
-            f"{projection.gap_:.1e}; which of them is kept is arbitrary"
-        )
-    return lines
 
 
 def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
@@ -251,14 +265,10 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
         finite = joints[np.isfinite(joints).all(axis=1)]
         at_onset.append(finite[0] if len(finite) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
-    angles = np.array(at_onset)[labels != ""]
-    labels = labels[labels != ""]
-    nearest = (
-        NearestNeighbors(n_neighbors=1)
-        .fit(angles)
-        .kneighbors(return_distance=False)[:, 0]
-    )
-    return float((labels[nearest] == labels).mean())
+    told = labels != ""
+    neighbours = NearestNeighbors(n_neighbors=1).fit(np.array(at_onset)[told])
+    nearest = neighbours.kneighbors(return_distance=False)[:, 0]
+    return float((labels[told][nearest] == labels[told]).mean())
 
 
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
@@ -267,25 +277,22 @@ def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:
     The paths have no suffix. If a recording has several trials, they are numbered from
     1. Names that are no text have escapes.
     """
-    folder = Path(
-        os.path.commonpath([trial.path.resolve().parent for trial in dataset.trials])
-    )
-    paths = [
-        t.path.resolve().relative_to(folder).with_suffix("") for t in dataset.trials
-    ]
+    paths = [trial.path.resolve() for trial in dataset.trials]
+    folder = Path(os.path.commonpath([path.parent for path in paths]))
     counts = Counter(paths)
-    trials_of = Counter[Path]()
+    numbers = Counter[Path]()
     trials = []
     for path in paths:
-        trials_of[path] += 1
-        number = f" {trials_of[path]}" if counts[path] > 1 else ""
-        trials.append(printable(path.as_posix()) + number)
+        name = printable(path.relative_to(folder).with_suffix("").as_posix())
+        if counts[path] > 1:
+            numbers[path] += 1
+            name += f" {numbers[path]}"
+        trials.append(name)
     return printable(folder.name), tuple(trials)
 
 
 def _files(paths: Sequence[Path]) -> str:
     """The first paths, and the number of the others."""
+    text = ", ".join(map(str, paths[:NAMED]))
     rest = len(paths) - NAMED
-    return ", ".join(map(str, paths[:NAMED])) + (
-        f" and {rest} more" if rest > 0 else ""
-    )
+    return f"{text} and {rest} more" if rest > 0 else text

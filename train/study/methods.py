@@ -44,10 +44,11 @@ def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> 
     """The accuracy of extra trees, a widely used method, on X (n, taxels over time)."""
     trees = ExtraTreesClassifier(TREES, random_state=0)
     split = PredefinedSplit(folds)
-    hits = {
-        task: cross_val_predict(trees, X, y[task], cv=split) == y[task] for task in y
-    }
-    return {task: Result(int(right.sum()), len(X)) for task, right in hits.items()}
+    answers = {}
+    for task, labels in y.items():
+        right = cross_val_predict(trees, X, labels, cv=split) == labels
+        answers[task] = Result(int(right.sum()), len(X))
+    return answers
 
 
 def taxels(context: Context) -> NDArray[np.float64]:
@@ -72,52 +73,55 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
     }
     for name, projection in OURS:
         subset = data.of(SETS[name])
-        compared[
-            f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"
-        ] = partial(
+        method = f"{name} ({len(SETS[name])} features), {projection.upper()} + k-NN"
+        compared[method] = partial(
             nested,
             subset.features(WINDOW_S, SAMPLES // 2),
             grid=SearchGrid("IV", projection),
             features=subset.names,
             widths=subset.widths(SAMPLES // 2),
         )
-    compared[f"{TREES} extra trees on every taxel"] = partial(
-        extra_trees, taxels(context)
-    )
+    trees = f"{TREES} extra trees on every taxel"
+    compared[trees] = partial(extra_trees, taxels(context))
     return compared
+
+
+def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
+    """{method: its accuracy} on trials that were left out, and on objects that were
+    left out, as far as the labels tell the objects."""
+    y = context.labels
+    splits = [(y, stratified_folds(y[finest(y)]))]
+    other_tasks = {task: labels for task, labels in y.items() if task != GROUP_TASK}
+    if GROUP_TASK in y and other_tasks:
+        splits.append((other_tasks, group_folds(y[GROUP_TASK])))
+    compared = methods(context)
+    cases = [(method, *split) for split in splits for method in compared.values()]
+    answers = context.workers.map("methods", call, cases)
+    known = dict(zip(compared, answers, strict=False))
+    unseen = dict(zip(compared, answers[len(compared) :], strict=False))
+    return known, unseen
 
 
 def section(context: Context) -> Section:
     """Each method's accuracy on trials that were left out, and on objects that were
     left out."""
     y = context.labels
-    tasks_of_groups = {task: labels for task, labels in y.items() if task != GROUP_TASK}
-    compared = methods(context)
-    splits = [(y, stratified_folds(y[finest(y)]))]
-    if GROUP_TASK in y and tasks_of_groups:
-        splits.append((tasks_of_groups, group_folds(y[GROUP_TASK])))
-    cases = [(method, *split) for split in splits for method in compared.values()]
-    answers = context.workers.map("methods", call, cases)
-    by_name = dict(zip(compared, answers, strict=False))
-    unseen = dict(zip(compared, answers[len(compared) :], strict=False))
-    text = [sentence(task, by_name, unseen) for task in y]
-    by_name[SEARCHED] = grid_search(context.vectors(), y)
-    by_name[GUESS] = {task: majority(labels) for task, labels in y.items()}
-    never = {
-        task: {
-            m: percent(result[task].accuracy)
-            for m, result in unseen.items()
-            if task in result
-        }
-        for task in y
-    }
-    rows: list[Row] = [
-        {"task": task, "method": method, "accuracy %": percent(result[task].accuracy)}
-        | {"objects never met %": never[task].get(method, "")}
-        | score(result[task])
-        for task in y
-        for method, result in by_name.items()
-    ]
+    known, unseen = tested(context)
+    text = [sentence(task, known, unseen) for task in y]
+    known[SEARCHED] = grid_search(context.vectors(), y)
+    known[GUESS] = {task: majority(labels) for task, labels in y.items()}
+    never: dict[str, dict[str, float]] = {task: {} for task in y}
+    for method, results in unseen.items():
+        for task, result in results.items():
+            never[task][method] = percent(result.accuracy)
+    rows: list[Row] = []
+    for task in y:
+        for method, results in known.items():
+            result = results[task]
+            row: Row = {"task": task, "method": method}
+            row["accuracy %"] = percent(result.accuracy)
+            row["objects never met %"] = never[task].get(method, "")
+            rows.append(row | score(result))
     title = "Accuracy of each method on new contacts"
     return Section(
         "Findings",
@@ -139,8 +143,8 @@ def section(context: Context) -> Section:
             figures.bars(
                 "methods",
                 f"{title}; diamonds show objects never met",
-                list(by_name),
-                by_task(by_name),
+                list(known),
+                by_task(known),
                 marks=never,
                 mark="never met",
             )
@@ -156,18 +160,14 @@ def sentence(
 
     def share(method: str) -> str:
         result = known[method][task]
-        new = unseen.get(method, {}).get(task)
-        beside = (
-            ""
-            if new is None
-            else f"; {100 * new.accuracy:.0f} % with objects never met"
-        )
-        return f"{100 * result.accuracy:.0f} % of the contacts right ({interval(result)}{beside})"
+        brackets = interval(result)
+        if task in unseen.get(method, {}):
+            new = unseen[method][task].accuracy
+            brackets += f"; {100 * new:.0f} % with objects never met"
+        return f"{100 * result.accuracy:.0f} % of the contacts right ({brackets})"
 
     best = max(known, key=lambda method: known[method][task].accuracy)
-    better = (
-        "No method here does better"
-        if best == PAPER
-        else f"The best is {best}: {share(best)}"
-    )
+    better = "No method here does better"
+    if best != PAPER:
+        better = f"The best is {best}: {share(best)}"
     return f"{task}: the paper's method gets {share(PAPER)}. {better}."

@@ -1,5 +1,6 @@
 """The cost of another speed, arm or sensor, for simulated data sets."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,10 @@ from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet, Trial
+from train.evaluate import Result
 from train.report import figures
 from train.report.score import grid_search, score, transfer
-from train.report.section import Section, Table
+from train.report.section import Figure, Row, Section, Table
 from train.report.skins import follow, vectors
 from train.simulate.engine import run_physics
 from train.simulate.run import batches_of, file_name, recordings
@@ -32,10 +34,9 @@ def variants(scene: Scene) -> dict[str, Scene]:
     sensor."""
     changed = {}
     for factor in FACTORS:
+        rate = tuple(factor * x for x in scene.rate)
+        stiffness = tuple(factor * x for x in scene.stiffness)
         # The equilibrium point travels the same distance.
-        rate, stiffness = (
-            tuple(factor * x for x in xs) for xs in (scene.rate, scene.stiffness)
-        )
         faster = replace(scene, rate=rate, travel_s=scene.travel_s / factor)
         changed[f"speed x {factor:g}"] = faster
         changed[f"arm stiffness x {factor:g}"] = replace(scene, stiffness=stiffness)
@@ -82,6 +83,32 @@ def simulated_again(scene: Scene, data: DataSet) -> list[FeatureSeries | None]:
     return [contacts.get(file) for file in attempts]
 
 
+def _bars(
+    task: str,
+    changes: Iterable[str],
+    results: Mapping[str, Sequence[Mapping[str, Result]]],
+    plain: float,
+) -> Figure:
+    """The picture of a task's accuracy after each change.
+
+    Args:
+        task: the task.
+        changes: their names.
+        results: {training: {task: result} for each change}.
+        plain: the task's accuracy without a change.
+    """
+    return figures.bars(
+        f"robustness_{task}",
+        f"{task}: accuracy after a change",
+        list(changes),
+        {
+            training: [answer[task] for answer in answers]
+            for training, answers in results.items()
+        },
+        reference={f"no change, {plain:.0%}": 100 * plain},
+    )
+
+
 def section(context: Context) -> Section | None:
     """Accuracy with each change; None where the data set was not simulated here."""
     scene = context.scene
@@ -95,40 +122,24 @@ def section(context: Context) -> Section | None:
     if not np.array_equal(vectors(unchanged), X):
         raise InputError(
             f"the scene {scene.name} gives other trials than these recordings; give "
-            "the scene that "
-            "they were simulated from, simulate it again, or study them without a scene"
+            "the scene that they were simulated from, simulate it again, or study them "
+            "without a scene"
         )
-    changed = [vectors(contacts) for contacts in series]
+    changed = list(map(vectors, series))
     plain = grid_search(X, y)
-    retrained = context.workers.map(
-        "trained with", grid_search, [(x, y) for x in changed]
-    )
-    transferred = context.workers.map(
-        "trained without", transfer, [(X, y, plain, x) for x in changed]
-    )
-    results = dict(zip(TRAINING, (retrained, transferred), strict=True))
-    rows = [
-        {"change": name, "task": task, "training": training, **score(result)}
-        | {"without contact": series[i].count(None)}
-        for i, name in enumerate(changes)
-        for training, answers in results.items()
-        for task, result in answers[i].items()
-    ]
-    pictures = [
-        figures.bars(
-            f"robustness_{task}",
-            f"{task}: accuracy after a change",
-            list(changes),
-            {
-                name: [answer[task] for answer in answers]
-                for name, answers in results.items()
-            },
-            reference={
-                f"no change, {plain[task].accuracy:.0%}": 100 * plain[task].accuracy
-            },
-        )
-        for task in y
-    ]
+    work = context.workers.map
+    retrained = work("trained with", grid_search, [(x, y) for x in changed])
+    kept = work("trained without", transfer, [(X, y, plain, x) for x in changed])
+    results = dict(zip(TRAINING, (retrained, kept), strict=True))
+    rows: list[Row] = []
+    for i, name in enumerate(changes):
+        for training, answers in results.items():
+            for task, result in answers[i].items():
+                row: Row = {"change": name, "task": task, "training": training}
+                row |= score(result)
+                row["without contact"] = series[i].count(None)
+                rows.append(row)
+    pictures = [_bars(task, changes, results, plain[task].accuracy) for task in y]
     return Section(
         "Another speed, arm or sensor",
         [

@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from edge.errors import InputError
@@ -95,24 +96,25 @@ def study(
             "nothing to distinguish; give recordings of two classes or more"
         )
     with nullcontext() if address is None else on_cluster(address):
-        # The last comes first, because it notices when the recordings are of another
-        # scene.
-        sections = [analysis(context) for analysis in reversed(ANALYSES)][::-1]
-        applicable = [section for section in sections if section]
-        if source is not None:
-            numbers = [_numbers(applicable)]
-            numbers += [
-                _again(context, source, i)
-                for i in bar(range(1, seeds), desc="data sets")
-            ]
-            applicable.insert(1, paper.comparison(numbers, seeds * len(dataset.trials)))
-    name = source.name if source is not None else Path(data[0]).name
-    return write(
-        out,
-        f"The paper's analyses, repeated on {name}",
-        _lead(context, constant),
-        applicable,
-    )
+        sections = _analysed(context, seeds)
+    name = Path(data[0]).name if source is None else source.name
+    title = f"The paper's analyses, repeated on {name}"
+    return write(out, title, _lead(context, constant), sections)
+
+
+def _analysed(context: Context, seeds: int) -> list[Section]:
+    """The sections of the analyses that apply to the data set, in their order."""
+    # The last comes first, because it notices when the recordings are of another scene.
+    sections = [analysis(context) for analysis in reversed(ANALYSES)]
+    applicable = list(filter(None, reversed(sections)))
+    scene = context.scene
+    if scene is not None:
+        numbers = [_numbers(applicable)]
+        for i in bar(range(1, seeds), desc="data sets"):
+            numbers.append(_again(context, scene, i))
+        trials = seeds * len(context.dataset.trials)
+        applicable.insert(1, paper.comparison(numbers, trials))
+    return applicable
 
 
 def _lead(context: Context, constant: Sequence[str]) -> list[str]:
@@ -120,7 +122,7 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
     out."""
     dataset = context.dataset
     scene = context.scene
-    layout = context.dataset.layout
+    layout = dataset.layout
     tasks = ", ".join(
         f"{task} ({len(set(y))} classes)" for task, y in context.labels.items()
     )
@@ -149,17 +151,12 @@ def _lead(context: Context, constant: Sequence[str]) -> list[str]:
 
 def _numbers(sections: Sequence[Section]) -> paper.Numbers:
     """Our accuracies in percent, under the names of the paper's tables."""
-    tables = [
-        table
-        for section in sections
-        for table in section.tables
-        if table.name in TABLES
-    ]
-    return {
-        (TABLES[table.name], str(setting), task): accuracy
-        for table in tables
-        for setting, task, accuracy, *_ in table.cells
-    }
+    numbers = {}
+    for table in chain.from_iterable(section.tables for section in sections):
+        if table.name in TABLES:
+            for setting, task, accuracy, *_ in table.cells:
+                numbers[TABLES[table.name], str(setting), task] = accuracy
+    return numbers
 
 
 def _again(context: Context, scene: Scene, i: int) -> paper.Numbers:

@@ -34,12 +34,14 @@ def by_task(results: Results) -> dict[str, list[Result]]:
 def rows(column: str, results: Results, table: str = "") -> list[Row]:
     """A row for each setting and task, with the accuracy in a table of the paper, if
     given."""
-    return [
-        {column: setting, "task": task, **score(result)}
-        | ({"paper %": papers(table, task).get(str(setting), "")} if table else {})
-        for setting, tasks in results.items()
-        for task, result in tasks.items()
-    ]
+    cells = []
+    for setting, tasks in results.items():
+        for task, result in tasks.items():
+            row: Row = {column: setting, "task": task, **score(result)}
+            if table:
+                row["paper %"] = papers(table, task).get(str(setting), "")
+            cells.append(row)
+    return cells
 
 
 def confusion(context: Context) -> Section:
@@ -152,15 +154,12 @@ def _compared(
     """
     answers = context.workers.map(column, grid_search, list(cases.values()))
     results = dict(zip(cases, answers, strict=True))
-    theirs = (
-        {task: papers(table, task) for task in context.labels}
-        if context.scene
-        else None
-    )
+    theirs = None
+    if context.scene is not None:
+        theirs = {task: papers(table, task) for task in context.labels}
     png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
-    cells = Table(
-        column, f"Accuracy with each choice of {column}", rows(column, results, table)
-    )
+    heading = f"Accuracy with each choice of {column}"
+    cells = Table(column, heading, rows(column, results, table))
     return Section(title, [text], [cells], [png])
 
 
@@ -184,26 +183,27 @@ def resolution(context: Context) -> Section:
     cases = [(*skin, data.chain, labels) for skin in skins]
     answers = context.workers.map("taxel resolution", _with_skin, cases)
     taxels = [layout.rows * layout.cols for layout, _ in skins]
-    results, lost = (
-        dict(zip(taxels, values, strict=True)) for values in zip(*answers, strict=True)
-    )
+    results = {}
+    lost = {}
+    for count, (accuracies, without_contact) in zip(taxels, answers, strict=True):
+        results[count] = accuracies
+        lost[count] = without_contact
     title = "Effect of taxel resolution (Table I, Fig. 9)"
-    theirs = {
-        task: {float(n): p for n, p in papers("I", task).items()} for task in labels
-    }
+    theirs = None
+    if context.scene is not None:
+        theirs = {task: papers("I", task) for task in labels}
     png = figures.lines(
         "resolution",
         title,
         taxels,
         by_task(results),
         label="taxels",
-        paper=theirs if context.scene else None,
+        paper=theirs,
         ticks=list(map(str, taxels)),
     )
-    cells = [
-        row | {"without contact": lost[row["taxels"]]}
-        for row in rows("taxels", results, "I")
-    ]
+    cells = rows("taxels", results, "I")
+    for row in cells:
+        row["without contact"] = lost[row["taxels"]]
     return Section(
         title,
         [

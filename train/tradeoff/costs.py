@@ -2,8 +2,9 @@
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -69,42 +70,57 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
     """
     # The longest first: it runs beside the others.
     cases = [Change(ALL, "longer training", raw, given={"quick": False})]
-    for n in EVERY:
-        carried = [w.name for w in wires(dataset.layout) if w.every(rate_hz) == n]
-        price = (
-            f"{carried[0]} are enough" if carried else f"1/{n} of the bits on the wire"
-        )
-        fewer = slice(None, None, n)
-        source = replace(raw, recordings=tuple(part(r, fewer) for r in raw.recordings))
-        cases.append(Change(f"{rate_hz / n:.0f} frames a second", price, source))
-    full = _slowest(wires(dataset.layout))
-    for skin, recordings in coarser(dataset.layout, raw.recordings):
-        saved = 1e3 * (full.frame_s - _slowest(wires(skin)).frame_s)
-        price = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
-        name = counted(skin.rows * skin.cols, "taxel")
-        cases.append(Change(name, price, replace(raw, recordings=tuple(recordings))))
+    cases += _fewer_frames(raw, dataset.layout, rate_hz)
+    cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
     cases.append(Change(name, "only 3 features", dataset, given=paper))
     if dataset.layout.axes:
         cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
+    cases += _fewer_trials(dataset)
+    return cases
+
+
+def _fewer_frames(
+    raw: Recordings, layout: SkinLayout, rate_hz: float
+) -> Iterator[Change]:
+    """Every n-th frame, and the wire that then suffices."""
+    for n in EVERY:
+        price = f"1/{n} of the bits on the wire"
+        carried = [wire.name for wire in wires(layout) if wire.every(rate_hz) == n]
+        if carried:
+            price = f"{carried[0]} are enough"
+        parts = [part(r, slice(None, None, n)) for r in raw.recordings]
+        source = replace(raw, recordings=tuple(parts))
+        yield Change(f"{rate_hz / n:.0f} frames a second", price, source)
+
+
+def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
+    """Larger taxels, and the shorter frames that they have."""
+    full = _slowest(wires(layout))
+    for skin, recordings in coarser(layout, raw.recordings):
+        saved = 1e3 * (full.frame_s - _slowest(wires(skin)).frame_s)
+        price = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
+        name = counted(skin.rows * skin.cols, "taxel")
+        yield Change(name, price, replace(raw, recordings=tuple(recordings)))
+
+
+def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
+    """A part of the trials, as far as it suffices for a choice."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
     count = len(dataset.trials)
     for folds in PARTS:
-        part_of_set = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
-        left = len(part_of_set.trials)
+        kept = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
+        left = len(kept.trials)
         if left >= FEWEST:
-            name = f"{left} of {count} trials"
             price = f"{counted(count - left, 'recording')} fewer"
-            cases.append(Change(name, price, part_of_set, fewer=True))
-    return cases
+            yield Change(f"{left} of {count} trials", price, kept, fewer=True)
 
 
 def _slowest(choices: Sequence[Wire]) -> Wire:
     """The slowest wiring of AD7147, which has the fewest buses."""
-    return max(
-        (w for w in choices if w.name.startswith("AD7147")), key=lambda w: w.frame_s
-    )
+    chips = [wire for wire in choices if wire.name.startswith("AD7147")]
+    return max(chips, key=attrgetter("frame_s"))
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:
@@ -130,10 +146,9 @@ def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
         like: the skin whose thresholds are taken.
     """
     began = time.process_time()
-    source = change.source
-    quick = change.given.get("quick", True)
-    dataset = source
+    dataset = change.source
     if not isinstance(dataset, DataSet):
+        quick = change.given.get("quick", True)
         dataset = followed(dataset, quick=quick, like=like)
     result = hits(dataset, chosen(dataset, **change.given))
     return result, time.process_time() - began
@@ -142,11 +157,9 @@ def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
 def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float, float]:
     """The percentage points gained by a change on the same trials, and their 95 %
     interval."""
-    trials = list(after if fewer else before)
-    return paired(
-        np.array([before[trial] for trial in trials]),
-        np.array([after.get(trial, False) for trial in trials]),
-    )
+    trials = after if fewer else before
+    were = np.array([before[trial] for trial in trials])
+    return paired(were, np.array([after.get(trial, False) for trial in trials]))
 
 
 def measure(
@@ -203,6 +216,7 @@ def section(measured: Measured) -> Section:
         row: Row = {"change": form["format"], "saves or costs": price}
         row[TIME] = f"{form['decision us']:.0f} us to decide"
         rows.append(row)
+    title = "Accuracy gained or lost by each change"
     return Section(
         "Savings, and the accuracy that they cost",
         [
@@ -216,13 +230,5 @@ def section(measured: Measured) -> Section:
             "other bits when its vector is decided alone. Only whole numbers give the "
             "same bits in any order of summation, and so on every machine.",
         ],
-        [
-            Table(
-                "costs",
-                "Accuracy gained or lost by each change",
-                rows,
-                timed=(TIME,),
-                narrow=1 + len(measured.y),
-            )
-        ],
+        [Table("costs", title, rows, timed=(TIME,), narrow=1 + len(measured.y))],
     )

@@ -119,27 +119,33 @@ def compare_stopping(
         quick: whether the export tries few candidates.
         jobs: processes.
     """
-    y = {task: dataset.labels(task) for task in dataset.tasks}
-    folds = stratified_folds(y[finest(y)], FOLDS)
-    if leave_out != TRIAL:
-        groups = dataset.groups(leave_out)
-        if groups is None:
-            return {}
-        folds = group_folds(groups, FOLDS)
-        y = {t: y[t] for t in y if t != leave_out and groupable(y[t], groups)}
-    if not y:
+    tasks, folds = _folds(dataset, leave_out)
+    if not tasks:
         return {}
-    tests = [folds == k for k in range(FOLDS)]
     options: dict[str, Any] = {
         "leave_out": leave_out,
         "decision_points_s": decision_points_s,
-        "tasks": tuple(y),
+        "tasks": tasks,
         "quick": quick,
         "jobs": 1,
     }
-    cases = [(dataset, test, options) for test in tests]
+    cases = [(dataset, folds == k, options) for k in range(FOLDS)]
     held_out = Workers(jobs).map("deciding early", _held_out, cases)
-    return {task: _compared(task, held_out, decision_points_s) for task in y}
+    return {task: _compared(task, held_out, decision_points_s) for task in tasks}
+
+
+def _folds(
+    dataset: DataSet, leave_out: str
+) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """The tasks that can be tested with single trials or groups left out, and each
+    trial's fold."""
+    y = {task: dataset.labels(task) for task in dataset.tasks}
+    groups = None if leave_out == TRIAL else dataset.groups(leave_out)
+    if groups is None:
+        tasks = tuple(y) if leave_out == TRIAL else ()
+        return tasks, stratified_folds(y[finest(y)], FOLDS)
+    others = [task for task in y if task != leave_out and groupable(y[task], groups)]
+    return tuple(others), group_folds(groups, FOLDS)
 
 
 @dataclass(frozen=True)
@@ -168,12 +174,9 @@ def _held_out(
     model = fitted.sequential
     test_set = replace(dataset.part(test), kernels=fitted.dataset.kernels)
     assert model is not None
-    new = np.stack(
-        [
-            test_set.features(s, fitted.samples, fitted.dataset.names)
-            for s in model.decision_points_s
-        ]
-    )
+    names = fitted.dataset.names
+    points = model.decision_points_s
+    new = np.stack([test_set.features(s, fitted.samples, names) for s in points])
     truth = {task: test_set.labels(task) for task in model.choices}
     return _HeldOut(test, model.stopping_, *model.judged(new, truth))
 
@@ -204,11 +207,13 @@ def _compared(
 
 def _joined(courses: Sequence[Course]) -> Course:
     """Courses of several folds as one that withholds no label."""
-    sure = [
-        np.hstack(part) for part in zip(*(c.confidences for c in courses), strict=True)
-    ]
-    wrong = [np.hstack(part) for part in zip(*(c.wrong for c in courses), strict=True)]
-    return Course(sure, wrong, np.hstack([c.unknown for c in courses]))
+    confidences = zip(*(course.confidences for course in courses), strict=True)
+    wrong = zip(*(course.wrong for course in courses), strict=True)
+    return Course(
+        confidences=list(map(np.hstack, confidences)),
+        wrong=list(map(np.hstack, wrong)),
+        unknown=np.hstack([course.unknown for course in courses]),
+    )
 
 
 def _certified(

@@ -4,6 +4,7 @@ each."""
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -64,22 +65,20 @@ class ParetoFront:
         best: list[OperatingPoint] = []
         for window_s, tasks in points.items():
             result = tasks[task].by_trial
-            if not best or result.accuracy > best[-1].accuracy:
-                after = round(1e3 * (window_s + after_s), 2)
-                best.append(
-                    OperatingPoint(window_s, after, result.accuracy, *result.interval)
-                )
+            accuracy = result.accuracy
+            if not best or accuracy > best[-1].accuracy:
+                ms = round(1e3 * (window_s + after_s), 2)
+                best.append(OperatingPoint(window_s, ms, accuracy, *result.interval))
         return cls(task, tuple(best), quick)
 
     def to_dict(self, digest: str) -> dict[str, Any]:
         """The contents of front.json, for recordings with a digest."""
-        points = [asdict(point) for point in self.points]
         return {
             "format": 3,
             "task": self.task,
             "data_digest": digest,
             "quick": self.quick,
-            "points": points,
+            "points": list(map(asdict, self.points)),
         }
 
     @classmethod
@@ -117,45 +116,56 @@ class ParetoFront:
         fastest_first = sorted(points, key=lambda point: point.milliseconds)
         return cls(task, tuple(fastest_first), quick)
 
-    def pick(self, wanted: str) -> OperatingPoint:
+    def pick(self, wish: str) -> OperatingPoint:
         """The operating point that a user asks for.
 
         Args:
-            wanted: `fast` (the fastest), `accurate` (the most accurate), `balanced`
+            wish: `fast` (the fastest), `accurate` (the most accurate), `balanced`
                 (the most accurate with a window of at most `BALANCED_S`, or else the
                 fastest), a number above 1 (the most accurate within so many
                 milliseconds), or a number from 0 to 1 (the fastest that reaches this
                 accuracy).
 
         Raises:
-            InputError: `wanted` has another form, or no point is as fast or as
-                accurate.
+            InputError: `wish` has another form, or no point is as fast or as accurate.
         """
         first = self.points[0]
         last = self.points[-1]
-        balanced = [
-            first,
-            *(point for point in self.points if point.window_s <= BALANCED_S),
-        ][-1]
-        if wanted in NAMES:
-            return dict(zip(NAMES, (first, balanced, last), strict=True))[wanted]
-        try:
-            number = float(wanted)
-        except ValueError:
-            number = math.nan
-        if not 0.0 < number < math.inf:
-            raise InputError(
-                f"--front must be {', '.join(NAMES)}, milliseconds (above 1) or an "
-                f"accuracy (0 to 1), not {wanted!r}"
-            )
+        if wish == "fast":
+            return first
+        if wish == "accurate":
+            return last
+        if wish == "balanced":
+            return self._last_within("window_s", BALANCED_S) or first
+        number = _number(wish)
         if number > 1.0:
-            able = [
-                point for point in self.points[::-1] if point.milliseconds <= number
-            ]
+            point = self._last_within("milliseconds", number)
             limit = f"the fastest point takes {first.milliseconds:.0f} ms"
         else:
-            able = [point for point in self.points if point.accuracy >= number]
+            able = (point for point in self.points if point.accuracy >= number)
+            point = next(able, None)
             limit = f"the most accurate point reaches {last.accuracy:.3f}"
-        if not able:
-            raise InputError(f"--front {wanted}: {limit}")
-        return able[0]
+        if point is None:
+            raise InputError(f"--front {wish}: {limit}")
+        return point
+
+    def _last_within(self, field: str, limit: float) -> OperatingPoint | None:
+        """The most accurate point of which a field is within a limit."""
+        able = [point for point in self.points if getattr(point, field) <= limit]
+        return able[-1] if able else None
+
+
+def _number(wish: str) -> float:
+    """The number of a wish that is no name.
+
+    Raises:
+        InputError: it is none, or neither a time nor an accuracy.
+    """
+    with suppress(ValueError):
+        number = float(wish)
+        if 0.0 < number < math.inf:
+            return number
+    raise InputError(
+        f"--front must be {', '.join(NAMES)}, milliseconds (above 1) or an accuracy "
+        f"(0 to 1), not {wish!r}"
+    )

@@ -2,7 +2,7 @@
 board."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from train.simulate import scene as scenes
 from train.tradeoff import answer, costs, early, shear
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, chosen, prepared
+from train.tradeoff.choices import WINDOWS_S, Points, chosen, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
@@ -50,11 +50,6 @@ def require_enough(trials: int) -> None:
         raise InputError(
             f"a trade-off needs at least {FEWEST} trials, not {trials}; record more"
         )
-
-
-def rows_by_change(rows: Sequence[Row]) -> dict[str, Row]:
-    """{change: its row}."""
-    return {str(row["change"]): row for row in rows}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +103,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     dataset = ready.dataset
     require_enough(len(dataset.trials))
     main = _main_task(dataset, options.task)
-    order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     workers = Workers(options.jobs)
     choose = partial(chosen, quick=quick)
     results = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
@@ -119,20 +113,12 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     )
     sheared = None
     if dataset.layout.axes:
-        unmet = early.compare_stopping(
-            dataset, WINDOWS_S, leave_out=LEAVE_OUT, quick=quick, jobs=options.jobs
-        )
-        by_kind = {shear.KNOWN: comparisons, shear.UNMET: unmet}
-        measured_with = shear.Answers(points, by_kind)
-        sheared = shear.compared(dataset, measured_with, workers, quick=quick)
+        sheared = _sheared(dataset, points, comparisons, options)
     rows = costs.measure(raw, dataset, points, rate, workers)
     notes = list(ready.notes)
     if quick:
-        gain = rows_by_change(rows)[costs.ALL].get(f"{main}, points", "")
-        notes.append(
-            "These are quick choices. A choice among all candidates gains "
-            f"{main} {gain} points."
-        )
+        notes.append(_quick_note(rows, main))
+    order = sorted(dataset.tasks, key=lambda task: (task != main, task))
     measured = Measured(
         y={task: dataset.labels(task) for task in order},
         board=board,
@@ -154,6 +140,34 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
     return report
+
+
+def _sheared(
+    dataset: DataSet,
+    points: Points,
+    comparisons: Mapping[str, early.StoppingComparison],
+    options: Options,
+) -> shear.Compared:
+    """The choices with shear, measured already for known objects, beside those
+    without."""
+    quick = options.quick
+    jobs = options.jobs
+    unmet = early.compare_stopping(
+        dataset, WINDOWS_S, leave_out=LEAVE_OUT, quick=quick, jobs=jobs
+    )
+    by_kind = {shear.KNOWN: comparisons, shear.UNMET: unmet}
+    sheared = shear.Answers(points, by_kind)
+    return shear.compared(dataset, sheared, Workers(jobs), quick=quick)
+
+
+def _quick_note(rows: Sequence[Row], task: str) -> str:
+    """A sentence on what a choice among all candidates gains."""
+    (every,) = (row for row in rows if row["change"] == costs.ALL)
+    gain = every.get(f"{task}, points", "")
+    return (
+        "These are quick choices. A choice among all candidates gains "
+        f"{task} {gain} points."
+    )
 
 
 def _main_task(dataset: DataSet, task: str | None) -> str:

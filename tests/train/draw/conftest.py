@@ -4,12 +4,16 @@ import pytest
 from matplotlib.figure import Figure
 
 
-@pytest.fixture
-def drawn(monkeypatch):
+@pytest.fixture(scope="module")
+def drawn():
     """The figures that are saved."""
     figures = []
     save = Figure.savefig
-    monkeypatch.setattr(
-        Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k))
-    )
-    return figures
+
+    def spy(figure, *arguments, **options):
+        figures.append(figure)
+        save(figure, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", spy)
+        yield figures

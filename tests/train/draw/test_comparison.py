@@ -1,5 +1,6 @@
 """Touches side by side: a column each, with its decision."""
 
+import numpy as np
 import pytest
 from matplotlib import image
 
@@ -13,22 +14,30 @@ from train.draw import comparison
 TOUCHES = [str(path) for path in demo.recordings()]
 
 
-def test_the_command_draws_several_with_the_decisions_of_a_model(tmp_path, drawn):
-    out = tmp_path / "four.png"
+@pytest.fixture(scope="module")
+def axes(tmp_path_factory, drawn):
+    """(4, 4) axes of four touches with a model's decisions, a column each."""
+    out = tmp_path_factory.mktemp("picture") / "four.png"
     assert main(["show", *TOUCHES, "--model", str(demo.MODEL), "--out", str(out)]) == 0
     assert out.read_bytes()[:4] == b"\x89PNG"
-    (figure,) = drawn
-    said = [text.get_text() for axis in figure.axes for text in axis.texts]
-    assert [text.split("\n")[0] for text in said] == [
-        f"decided: {load(path).labels['category']}" for path in TOUCHES
-    ]
-    titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
-    assert titles[0] == "rigid, fixed\ncardboard box"
-    # The curves of a row share their scale, and each is inside it.
-    for axis in figure.axes[4:16]:
-        (line,) = (curve for curve in axis.lines if len(curve.get_xdata()) > 2)
+    return np.reshape(drawn[0].axes[:16], (4, 4))
+
+
+def test_each_decision_stands_below_its_touch(axes):
+    for axis, path in zip(axes[3], TOUCHES, strict=True):
+        (text,) = axis.texts
+        label = load(path).labels["category"]
+        assert text.get_text().startswith(f"decided: {label}\n")
+
+
+def test_a_column_has_kind_and_object_as_title(axes):
+    assert axes[0, 0].get_title() == "rigid, fixed\ncardboard box"
+
+
+def test_the_curves_of_a_row_share_a_scale_that_holds_each_of_them(axes):
+    for axis in axes[1:].flat:
         assert axis.get_ylim()[0] == 0.0
-        assert max(line.get_ydata()) <= axis.get_ylim()[1]
+        assert max(axis.lines[0].get_ydata()) <= axis.get_ylim()[1]
 
 
 def test_a_dark_page_gets_light_lines_on_a_dark_background(tmp_path):

@@ -5,11 +5,12 @@ import re
 from collections import Counter
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from edge.saving import save
 from tests import browser
-from tests.conftest import rows_of, save_touches
+from tests.conftest import save_touches
 from train.__main__ import main
 from train.evaluate import Result
 from train.study import methods
@@ -22,31 +23,38 @@ from train.study.paper import (
     right_despite_the_object,
 )
 
+PAPERS = {entry.key: entry.percent for entry in entries()}
+HEADLINES = [entry for entry in entries() if entry.headline]
 
-def test_the_papers_numbers_are_46_and_whole_trials_of_140():
-    numbers = entries()
-    assert Counter(e.table for e in numbers) == {"I": 10, "II": 18, "III": 18}
-    assert len({(e.table, e.setting, e.task) for e in numbers}) == 46
-    for entry in numbers:
-        right = entry.percent * 1.4
-        assert abs(right - round(right)) < 0.008, entry
-    plain = [e for e in numbers if (e.table, e.setting) == ("II", "none")]
-    headline = {e.task: e.percent for e in plain}
+
+def test_the_papers_numbers_are_46():
+    assert Counter(e.table for e in entries()) == {"I": 10, "II": 18, "III": 18}
+    assert len(PAPERS) == 46
+
+
+@pytest.mark.parametrize("entry", entries(), ids=lambda entry: "-".join(entry.key))
+def test_a_number_of_the_paper_is_a_share_of_140_trials(entry):
+    assert entry.percent * 1.4 == pytest.approx(round(entry.percent * 1.4), abs=0.008)
+
+
+def test_the_numbers_without_scaling_are_the_headlines_of_section_iv_a():
+    headline = {e.task: e.percent for e in HEADLINES if e.table == "II"}
     assert headline == {"category": 80.0, "mobility": 91.43, "object": 72.14}
 
 
-def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to():
-    """The headlines of section IV-A stand in the tables eight times."""
-    headlines = [e for e in entries() if e.headline]
-    counts = Counter(e.task for e in headlines)
+def test_the_headlines_stand_in_the_tables_eight_times():
+    counts = Counter(e.task for e in HEADLINES)
     assert counts == {"category": 3, "mobility": 2, "object": 3}
-    assert {e.percent for e in headlines} == {80.0, 91.43, 72.14}
-    ours = {(e.table, e.setting, e.task): 100.0 for e in entries()}
-    ours |= {(e.table, e.setting, e.task): e.percent for e in headlines}
+    assert {e.percent for e in HEADLINES} == {80.0, 91.43, 72.14}
+
+
+def test_predictions_are_counted_without_the_numbers_that_a_scene_was_fitted_to():
+    ours = dict.fromkeys(PAPERS, 100.0)
+    ours |= {entry.key: entry.percent for entry in HEADLINES}
     section = comparison([ours], 140)
     assert "agrees with 8 of them" in section.text[0]
     assert "Of the other 38, 0 agree." in section.text[1]
-    assert sum(row["headline"] == "yes" for row in section.tables[0].rows) == 8
+    assert [row["headline"] for row in section.tables[0].rows].count("yes") == 8
 
 
 def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
@@ -57,30 +65,47 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
     low, high = np.transpose([difference(*pair, 140) for pair in pairs])
     out = np.mean((low > 0.0) | (high < 0.0))
     assert 0.03 < out < 0.07
+
+
+def test_more_trials_narrow_the_interval_of_a_difference():
     one = difference(80.0, 85.0, 140)
     eight = difference(80.0, 85.0, 8 * 140)
     assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
+
+
+def test_several_data_sets_count_as_their_mean():
     key = ("I", "1", "t")
     assert mean_of([{key: 80.0}, {key: 90.0}]) == {key: 85.0}
 
 
-def test_an_order_stands_beside_the_data_sets_that_have_it_and_its_chance():
-    paper = {(e.table, e.setting, e.task): e.percent for e in entries()}
-    against = {key: 142.0 - percent for key, percent in paper.items()}
-    section = comparison([paper, paper, against], 420)
-    ranks = section.tables[1].rows
+AGAINST = {key: 142.0 - percent for key, percent in PAPERS.items()}
+
+
+def test_an_order_stands_beside_the_number_of_data_sets_that_have_it():
+    ranks = pd.DataFrame(comparison([PAPERS, PAPERS, AGAINST], 420).tables[1].rows)
     assert len(ranks) == 8
-    assert {row["rank correlation"] for row in ranks} == {1.0}
-    assert {row["positive in data sets"] for row in ranks} == {"2 of 3"}
-    below = {(row["table"], row["task"]): row["negative by chance %"] for row in ranks}
-    # Mobility is within 6 points in Table II, category within 21.
-    assert below["II", "mobility"] > 5.0 > 0.1 >= below["II", "category"]
-    (backwards, *_) = comparison([against], 140).tables[1].rows
-    assert backwards["table"] == "I"
-    assert backwards["task"] == "category"
-    assert backwards["rank correlation"] == -1.0
-    assert backwards["positive in data sets"] == "0 of 1"
-    # Equal settings are ordered by chance alone; ties count as no order.
+    assert (ranks["rank correlation"] == 1.0).all()
+    assert (ranks["positive in data sets"] == "2 of 3").all()
+
+
+def test_the_opposite_order_is_told():
+    first = comparison([AGAINST], 140).tables[1].rows[0]
+    assert first["table"] == "I"
+    assert first["task"] == "category"
+    assert first["rank correlation"] == -1.0
+    assert first["positive in data sets"] == "0 of 1"
+
+
+def test_close_settings_are_more_often_ordered_otherwise_by_chance():
+    """Mobility is within 6 points in Table II, category within 21."""
+    rows = comparison([PAPERS], 420).tables[1].rows
+    chance = {(row["table"], row["task"]): row["negative by chance %"] for row in rows}
+    assert chance["II", "mobility"] > 5.0
+    assert chance["II", "category"] <= 0.1
+
+
+def test_equal_settings_are_ordered_by_chance_alone():
+    """Ties count as no order."""
     assert 40.0 < negative_by_chance([80.0] * 6, 1120) < 50.0
 
 
@@ -110,48 +135,57 @@ def studied(tmp_path_factory):
 def test_every_number_of_the_report_is_in_a_csv(studied):
     text = (studied / "report.html").read_text()
     named = set(re.findall(r'(?:src|srcset|href)="(?!data:image/png)([^"]*)"', text))
-    assert named == {path.name for path in studied.glob("*.csv")}
-    tables = "methods window scaling features resolution"
-    assert {f"{name}.csv" for name in tables.split()} < named
+    tables = {path.name for path in studied.glob("*.csv")}
+    assert named == tables
+    assert tables > {"methods.csv", "window.csv", "scaling.csv", "resolution.csv"}
+    assert "features.csv" in tables
     assert 2 * len(list(studied.glob("*.png"))) == text.count("data:image/png")
 
 
 def test_equal_scalings_are_equal(studied):
     """Methods I and II, and none and III, differ by what centring takes away."""
-    rows = rows_of(studied / "scaling.csv")
-    scaled = {(row["scaling"], row["task"]): row["accuracy %"] for row in rows}
-    for task in ("category", "object"):
-        assert scaled["I", task] == scaled["II", task]
-        assert scaled["none", task] == scaled["III", task]
+    rows = pd.read_csv(studied / "scaling.csv", keep_default_na=False)
+    scaled = rows.pivot(index="task", columns="scaling", values="accuracy %")
+    assert list(scaled.index) == ["category", "object"]
+    assert (scaled["I"] == scaled["II"]).all()
+    assert (scaled["none"] == scaled["III"]).all()
 
 
-def test_easy_touches_are_recognised_and_the_findings_come_first(studied):
+def test_the_findings_come_first(studied):
     text = (studied / "report.html").read_text()
     assert re.findall(r"<h2>([^<]+)", text)[0] == "Findings"
-    compared = rows_of(studied / "methods.csv")
-    assert {r["task"] for r in compared} == {"category", "object"}
-    assert len({r["method"] for r in compared}) == len(methods.OURS) + 4
-    category = [r["accuracy %"] for r in compared if r["task"] == "category"]
-    assert max(map(float, category)) == 100.0
+
+
+def test_easy_touches_are_recognised_by_a_method(studied):
+    best = pd.read_csv(studied / "methods.csv").groupby("task")["accuracy %"].max()
+    assert list(best.index) == ["category", "object"]
+    assert best["category"] == 100.0
+
+
+def test_every_method_has_a_row(studied):
+    compared = pd.read_csv(studied / "methods.csv")
+    assert compared["method"].nunique() == len(methods.OURS) + 4
+
+
+def sentence(papers, other):
+    """The sentence on softness, with so many of 50 trials right by the paper's method
+    and by another, b."""
+
+    def answers(*rights):
+        results = [{"softness": Result(right, 50)} for right in rights]
+        return dict(zip((methods.PAPER, "b"), results, strict=True))
+
+    return methods.sentence("softness", answers(papers, other), answers(41, 42))
+
+
+def test_accuracy_on_objects_never_met_stands_beside_that_on_trials():
+    text = sentence(49, 50)
+    assert "98 % of the contacts right (90 to 100; 82 % with objects never met)" in text
+    assert "The best is b: 100 % of the contacts right (93 to 100; 84 %" in text
 
 
 def test_the_findings_name_no_best_method_below_the_papers():
-    """Whatever is better on trials, accuracy on objects never met stands beside it."""
-
-    def sentence(papers, other):
-        known = {methods.PAPER: papers, "b": other}
-        unseen = {methods.PAPER: 41, "b": 42}
-        results = (
-            {name: {"softness": Result(right, 50)} for name, right in rights.items()}
-            for rights in (known, unseen)
-        )
-        return methods.sentence("softness", *results)
-
-    text = sentence(49, 47)
-    assert "98 % of the contacts right (90 to 100; 82 % with objects never met)" in text
-    assert "never met). No method" in text
-    text = sentence(49, 50)
-    assert "The best is b: 100 % of the contacts right (93 to 100; 84 %" in text
+    assert "never met). No method here does better." in sentence(49, 47)
 
 
 def test_in_a_browser_nothing_overflows_or_is_missing(studied):

@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -24,11 +24,12 @@ from train.commands.tradeoff import cost
 from train.dataset import read
 from train.rules import Course
 from train.tradeoff import answer, board, choices, costs, early, uses
+from train.tradeoff import run as running
 from train.tradeoff.breakaway import breakaway_times
 from train.tradeoff.choices import chosen as make_choice
 from train.tradeoff.choices import followed, unseen
 from train.tradeoff.front import ParetoFront
-from train.tradeoff.run import Options, tradeoff
+from train.tradeoff.run import Options
 from train.tradeoff.wires import spread, wire, wire_time_s, wires
 
 SCENE = Path(__file__).parents[3] / "train" / "scenes" / "cody18.toml"
@@ -337,33 +338,65 @@ def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, ref
     assert not any((tmp_path / "out").iterdir())
 
 
-def test_report_pictures_tables_and_front_are_written(tmp_path, monkeypatch):
-    from train.tradeoff import run as running
+@dataclass(frozen=True)
+class Written:
+    """A report that was written, and the digest of its recordings."""
 
-    data = str(save_touches(tmp_path / "data", 14, rate=50.0))
-    monkeypatch.setattr(running, "FEWEST", 28)
-    monkeypatch.setattr(costs, "PARTS", (1,))
-    monkeypatch.setattr(running, "WINDOWS_S", (0.4, 1.2))
-    monkeypatch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
-    monkeypatch.setattr(costs, "WAITS_S", (0.4,))
-    monkeypatch.setattr(costs, "EVERY", (4,))
+    report: Path
+    digest: str
+
+    @property
+    def text(self):
+        return self.report.read_text()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The report on 28 touches, with few windows and changes."""
+    folder = tmp_path_factory.mktemp("tradeoff")
+    data = str(save_touches(folder / "data", 14, rate=50.0))
     digest = read([data]).digest
-    path = board_file(tmp_path / "board.json", digest)
-    out = tmp_path / "out"
-    report = tradeoff([data], out, str(path), Options(scene=str(SCENE), quick=True))
-    text = report.read_text()
-    assert "http" not in text
-    assert (
-        "62 MB of memory, and the model is ready 812 ms after the start of Python"
-        in text
-    )
-    assert not browser.available() or browser.faults(report) == []
-    assert (out / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
-    saved = {row["change"]: row for row in rows_of(out / "costs.csv")}
-    assert saved["waiting 0.4 s"]["category, points"].startswith("+0 (-")
-    assert saved["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
-    best = ParetoFront.read(out / "front.json", digest)
-    assert best.task == "category"
-    assert best.quick
-    assert "A choice among all candidates gains category +0" in text
-    assert best.points[-1].accuracy > 0.9
+    path = board_file(folder / "board.json", digest)
+    options = Options(scene=str(SCENE), quick=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running, "FEWEST", 28)
+        patch.setattr(costs, "PARTS", (1,))
+        patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
+        patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
+        patch.setattr(costs, "WAITS_S", (0.4,))
+        patch.setattr(costs, "EVERY", (4,))
+        report = running.tradeoff([data], folder / "out", str(path), options)
+    return Written(report, digest)
+
+
+def test_the_report_needs_no_other_page(written):
+    assert "http" not in written.text
+    assert not browser.available() or browser.faults(written.report) == []
+
+
+def test_the_report_tells_memory_and_start_of_the_board(written):
+    ready = "62 MB of memory, and the model is ready 812 ms after the start of Python"
+    assert ready in written.text
+
+
+def test_the_report_tells_what_a_choice_among_all_candidates_gains(written):
+    assert "A choice among all candidates gains category +0" in written.text
+
+
+def test_the_pictures_lie_beside_the_report(written):
+    png = written.report.with_name("tradeoff.png").read_bytes()
+    assert png.startswith(b"\x89PNG")
+
+
+def test_each_change_has_a_row_with_its_price_and_points(written):
+    rows = rows_of(written.report.with_name("costs.csv"))
+    changes = {row["change"]: row for row in rows}
+    assert changes["waiting 0.4 s"]["category, points"].startswith("+0 (-")
+    assert changes["28 of 28 trials"]["saves or costs"] == "0 recordings fewer"
+
+
+def test_the_front_of_quick_choices_lies_beside_the_report(written):
+    front = ParetoFront.read(written.report.with_name("front.json"), written.digest)
+    assert front.task == "category"
+    assert front.quick
+    assert front.points[-1].accuracy > 0.9
