@@ -6,7 +6,9 @@ import io
 import numpy as np
 from matplotlib.image import imread
 
-from train.report.figures import PHONE, confusion
+from train.evaluate import Result
+from train.report import figures
+from train.report.figures import PHONE, STROKES, bars, confusion
 
 
 def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
@@ -16,3 +18,16 @@ def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
     assert first == confusion("n", "t", truth, said)
     assert first.png != confusion("n", "t", truth, truth).png
     assert imread(io.BytesIO(first.narrow)).shape[1] == PHONE * 200
+
+
+def test_more_tasks_than_strokes_have_bars_all_the_same(monkeypatch):
+    tasks = [f"task {i}" for i in range(len(STROKES) + 1)]
+    listed = []
+
+    def spy(canvas, axes, columns):
+        listed.append(axes.get_legend_handles_labels()[1])
+
+    monkeypatch.setattr(figures, "legend", spy)
+    bars("n", "t", ["method"], {task: [Result(1, 2)] for task in tasks})
+    page, phone = listed
+    assert page == phone == tasks
