@@ -7,6 +7,7 @@ import html
 import io
 import re
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -23,18 +24,22 @@ def table_csv(table: Table) -> dict[str, str]:
     """{file name: CSV text} of the table; columns measured by a clock have a file of
     their own."""
     columns = table.columns
-    files = {table.name: [c for c in columns if c not in table.timed]}
+    files = {"": [c for c in columns if c not in table.timed]}
     if table.timed:
-        files[f"{table.name}_timings"] = [columns[0], *table.timed]
+        files["_timings"] = [columns[0], *table.timed]
     texts = {}
-    for name, figure in files.items():
+    for suffix, names in files.items():
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerows(
-            [figure, *([row.get(c, "") for c in figure] for row in table.rows)]
-        )
-        texts[f"{name}.csv"] = text.getvalue()
+        writer = csv.DictWriter(text, names, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table.rows)
+        texts[file_name(table.name, f"{suffix}.csv")] = text.getvalue()
     return texts
+
+
+def file_name(name: str, suffix: str) -> str:
+    """A file's name from that of a table or figure, which may hold a task's name."""
+    return re.sub(r"[^\w.-]+", "_", name) + suffix
 
 
 def _text(text: str) -> str:
@@ -143,12 +148,11 @@ def write(
     """
     files: dict[str, bytes] = {}
     for section in sections:
-        files |= {f"{figure.name}.png": figure.png for figure in section.figures}
-        for table in section.tables:
-            if table.rows:
-                files |= {
-                    name: text.encode() for name, text in table_csv(table).items()
-                }
+        for figure in section.figures:
+            files[file_name(figure.name, ".png")] = figure.png
+        for table in filter(attrgetter("rows"), section.tables):
+            for name, text in table_csv(table).items():
+                files[name] = text.encode()
     files["report.html"] = page(title, lead, sections).encode()
     for name, data in files.items():
         with write_whole(out / name) as file:

@@ -5,6 +5,7 @@ import csv
 import io
 import re
 
+import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
@@ -32,6 +33,18 @@ def test_text_from_elsewhere_is_escaped():
     text = page(HOSTILE, [HOSTILE], [Section(HOSTILE, [HOSTILE], [table()])])
     assert "<script>" not in text
     assert text.count("&lt;script&gt;") == 6  # title twice, lead, heading, text, cell
+
+
+@pytest.mark.parametrize("task", ["../up", "a/b", HOSTILE])
+def test_a_task_of_any_name_stays_in_the_folder_of_the_report(tmp_path, task):
+    out = tmp_path / "report"
+    figures = [Figure(f"confusion_{task}", "A plot", b"\x89PNG", b"")]
+    tables = [Table(f"answer_{task}", "A table", [{"n": 1}])]
+    report = write(out, "Title", [], [Section("One", [], tables, figures)])
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+    (linked,) = re.findall('href="([^"]+)"', report.read_text())
+    assert (out / linked).read_text() == "n\n1\n"
+    assert len(list(out.glob("confusion_*.png"))) == 1
 
 
 def test_a_table_is_the_same_in_its_csv():
