@@ -24,7 +24,7 @@ from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import contacts
-from train.draw.recording import UNITS, curves, units
+from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
@@ -62,6 +62,7 @@ def draw(
             f"{len(recordings)} recordings are too many side by side; give {MOST}"
         )
     inks: dict[str, Any] = {
+        **PLAIN_TEXT,
         "font.size": 12,
         "axes.prop_cycle": cycler(color=INKS[dark]),
     }

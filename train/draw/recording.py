@@ -4,6 +4,7 @@ arm."""
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -27,9 +28,12 @@ FRAMES = 6
 ARROW = 2.0
 """Taxels that the longest arrow of shear spans."""
 HORIZON_S = 2.0
+PLAIN_TEXT: dict[Any, Any] = {"text.parse_math": False}
+"""A label with two dollar signs is no formula."""
 UNITS = {"newton": "N", "metre": "m", "taxel": "taxels", "count": "counts"}
 
 
+@mpl.rc_context(PLAIN_TEXT)
 def draw(
     recording: Recording,
     out: Path,

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from edge.errors import InputError
 from edge.model.info import ModelInfo
 from edge.writing import write_whole
-from train.draw.recording import UNITS
+from train.draw.recording import PLAIN_TEXT, UNITS
 from train.draw.sketch import link_positions
 from train.report.section import counted
 from train.touch_map import Touch, TouchMap
@@ -55,6 +56,7 @@ def _task(contacts: TouchMap, touches: Sequence[Touch], wish: str | None) -> str
     return chosen
 
 
+@mpl.rc_context(PLAIN_TEXT)
 def draw(
     contacts: TouchMap,
     out: Path,

@@ -33,6 +33,7 @@ STYLE: dict[Any, Any] = {
     "grid.alpha": 0.25,
     "axes.axisbelow": True,
     "hatch.linewidth": 0.6,
+    "text.parse_math": False,  # a label with two dollar signs is no formula
 }
 WIDE = 7.6
 PHONE = 3.6

@@ -24,6 +24,14 @@ def test_the_sketch_is_drawn_below_the_curves(tmp_path):
     assert sketched.stat().st_size > plain.stat().st_size
 
 
+@pytest.mark.parametrize("beside", [[], [str(TOUCH)]])
+def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
+    touch = load(TOUCH)
+    labels = {"object": r"a $\frac$ b"}
+    save(tmp_path / "a.npz", replace(touch, meta={**touch.meta, "labels": labels}))
+    assert main(["show", str(tmp_path / "a.npz"), *beside]) == 0
+
+
 def test_shear_adds_arrows(tmp_path):
     touch = load(TOUCH)
     quarter = (touch.frames // 4).astype(np.int16)

@@ -30,7 +30,7 @@ def touch(n, place, label, confidence=1.0):
 @pytest.fixture
 def path(tmp_path):
     rng = np.random.default_rng(5)
-    labels = ["rigid-fixed", "soft-movable", "soft-fixed", None]
+    labels = ["rigid-fixed", "soft-movable", r"no $\frac$ formula", None]
     places = rng.normal([0.4, -0.2, -0.3], 0.05, (20, 3)).tolist()
     touches = [
         touch(n, place, labels[n % 4], n % 3 / 2) for n, place in enumerate(places)

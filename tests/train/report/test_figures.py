@@ -20,6 +20,11 @@ def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
     assert imread(io.BytesIO(first.narrow)).shape[1] == PHONE * 200
 
 
+def test_a_label_with_dollar_signs_is_no_formula():
+    labels = np.array([r"a $\frac$ b", "c"])
+    assert confusion("n", r"no $\frac$ either", labels, labels).png
+
+
 def test_more_tasks_than_strokes_have_bars_all_the_same(monkeypatch):
     tasks = [f"task {i}" for i in range(len(STROKES) + 1)]
     listed = []
