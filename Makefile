@@ -230,6 +230,7 @@ docs: $(VENV)/.docs
 
 risk: $(DEV)
 	$(BIN)/python -m tests.bench.risk $(RISK)
+	$(BIN)/python -m tests.bench.exports $(EXPORTS)
 
 shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)

@@ -140,6 +140,16 @@ class Answers:
         plain = self.right[~self.doubtful]
         return plain.mean() if len(plain) else 0.0
 
+    def is_told(self, usual):
+        """Whether most touches are in doubt, or the answers without a doubt are right
+        about as often as the `usual` ones."""
+        return share(self.doubtful) >= ENOUGH or self.trusted >= usual - WORSE
+
+
+def share(facts):
+    """The share of facts (n,) that hold; 0 of none."""
+    return facts.sum() / max(len(facts), 1)
+
 
 def answers(model, recordings, shift):
     """{task: the answers to shifted touches}; a touch that is not felt has none."""
@@ -164,22 +174,17 @@ def answers(model, recordings, shift):
 
 def row(name, task, judged, usual):
     """The row of a shift and a task, beside the accuracy on usual touches."""
-    count = len(judged.right)
-    right, doubt = (
-        facts.sum() / max(count, 1) for facts in (judged.right, judged.doubtful)
-    )
-    held = doubt >= ENOUGH or judged.trusted >= usual - WORSE
     return {
         "shift": name,
         "task": task,
-        "answers": count,
-        "right": f"{right:.0%}",
-        "in doubt": f"{doubt:.0%}",
+        "answers": len(judged.right),
+        "right": f"{share(judged.right):.0%}",
+        "in doubt": f"{share(judged.doubtful):.0%}",
         "right without doubt": "-"
         if judged.doubtful.all()
         else f"{judged.trusted:.0%}",
         "wrong and sure": (judged.sure & ~judged.right).sum(),
-        "held": "yes" if held else "no",
+        "held": "yes" if judged.is_told(usual) else "no",
     }
 
 
