@@ -31,6 +31,7 @@ from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import load_arrays
 from edge.writing import write_whole
+from train.vectors import Integers
 
 ROUNDS = 7
 CALLS = 200
@@ -104,7 +105,7 @@ def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
 
 def answers(
     model: onnx.ModelProto, vectors: NDArray[Any], tasks: list[str]
-) -> tuple[NDArray[np.int64], float, float]:
+) -> tuple[Integers, float, float]:
     """The labels (tasks * n) of vectors, and the median microseconds of one decision.
 
     Last comes the share of the distances with other bits where each vector is decided

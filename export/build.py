@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from onnx import TensorProto, numpy_helper
 
 from train.projection import MOST_STEPS, Projection
+from train.vectors import Floats, Integers
 
 OPSET = 18
 
@@ -104,7 +104,7 @@ class Builder:
         """Name of the squared lengths (n, 1) of vectors x (n, p)."""
         return self.node("ReduceSumSquare", x, [1], keepdims=1)
 
-    def taken(self, x: str, columns: NDArray[np.int64], width: int) -> str:
+    def taken(self, x: str, columns: Integers, width: int) -> str:
         """Name of some columns of x (n, width); of x itself where they are all."""
         return x if len(columns) == width else self.node("Gather", x, columns, axis=1)
 
@@ -190,7 +190,7 @@ def project(
     x: str,
     width: int,
     decision_points: Sequence[Projection],
-    columns: Sequence[NDArray[np.int64]],
+    columns: Sequence[Integers],
 ) -> tuple[str, str]:
     """Nodes that take features (n, p) to whole coordinates; see
     `train.projection.Projection`.
@@ -231,9 +231,7 @@ def project(
     return z, build.node("Add", far, farther)
 
 
-def widened(
-    arrays: Sequence[NDArray[np.float64]], width: int
-) -> list[NDArray[np.float64]]:
+def widened(arrays: Sequence[Floats], width: int) -> list[Floats]:
     """Arrays with columns of zeros added up to a width, for coordinates that are always
     0."""
     return [

@@ -16,6 +16,7 @@ from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet
 from train.evaluate import finest
 from train.parts import part
+from train.vectors import Floats
 
 TRIALS = 24
 """Trials whose frames a golden file holds."""
@@ -47,7 +48,7 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     return part(whole, slice(first, last + 2))
 
 
-def write(path: Path, model: Model, dataset: DataSet, X: NDArray[np.float64]) -> None:
+def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
     """Run the exported model on trials and vectors, and store its outputs.
 
     Vectors are the trials' own, training vectors (distance exactly 0), others between
@@ -100,9 +101,7 @@ def _starts(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
     return np.cumsum([0, *map(len, parts)])
 
 
-def _vectors(
-    model: Model, series: Sequence[FeatureSeries], X: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _vectors(model: Model, series: Sequence[FeatureSeries], X: Floats) -> Floats:
     """The vectors of `write`."""
     rng = np.random.default_rng(20120101)
     of_trials = np.stack([model.info.vector(course) for course in series])
@@ -116,9 +115,7 @@ def _vectors(
     return np.concatenate([of_trials, rows, mixed, wrong])
 
 
-def _early_vectors(
-    model: Model, series: Sequence[FeatureSeries]
-) -> NDArray[np.float64]:
+def _early_vectors(model: Model, series: Sequence[FeatureSeries]) -> Floats:
     """(decision points, m, width): the trials, which were trained with, and points
     between them."""
     info = model.info

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import onnx
-from numpy.typing import NDArray
 from onnx import helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
@@ -27,6 +26,7 @@ from export.build import OPSET, Builder, project, widened
 from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
 from train.pipeline import ContactClassifier, Space
 from train.stopping import SequentialClassifier
+from train.vectors import Booleans, Floats, Integers
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
@@ -37,9 +37,9 @@ def _squares(
     build: Builder,
     task: str,
     z: str,
-    rows: Sequence[NDArray[np.float64]],
+    rows: Sequence[Floats],
     components: Sequence[int],
-    absent: NDArray[np.bool_],
+    absent: Booleans,
 ) -> tuple[str, str]:
     """Squared distances (n, rows) of points z (n, c) to rows (rows, c), less |z|^2, and
     |z|^2.
@@ -69,7 +69,7 @@ def _squares(
 def _vote(
     build: Builder,
     task: str,
-    labels: NDArray[np.int64],
+    labels: Integers,
     classes: int,
     neighbours: str,
     k: int,
@@ -250,7 +250,7 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
 
 
 def _label_distances(
-    build: Builder, task: str, squares: str, labels: NDArray[np.int64], classes: int
+    build: Builder, task: str, squares: str, labels: Integers, classes: int
 ) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
     rows)."""

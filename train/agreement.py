@@ -3,9 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from train.vectors import Labels
+from train.vectors import Labels, Strings
 
 
 def products(y: Labels) -> dict[str, tuple[str, str]]:
@@ -28,7 +27,7 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     return pairs
 
 
-def _determines(a: NDArray[np.str_], b: NDArray[np.str_]) -> bool:
+def _determines(a: Strings, b: Strings) -> bool:
     """Whether the labels b follow from the labels a."""
     pairs = {(x, z) for x, z in zip(a.tolist(), b.tolist(), strict=True) if x and z}
     return len(pairs) == len({x for x, _ in pairs})

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.agreement import products
 from train.feature_sets import expand
 from train.pipeline import Choice
 from train.projection import KINDS
 from train.search import NEIGHBOURS, SHRINKAGES, SearchGrid
-from train.vectors import Labels
+from train.vectors import Integers, Labels
 
 PLAIN = (
     ("paper",),
@@ -290,7 +289,7 @@ def _scaled(
     return tuple(replace(grid, scaling=method) for method, grid in scaled)
 
 
-def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.int64]:
+def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> Integers:
     """(choices,) rank of the price of each choice's features, projection and targets,
     from 0.
 
@@ -311,7 +310,7 @@ def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> NDArray[np.in
     return np.array([ranking.index(kind) for kind in kinds])
 
 
-def places_of(candidate: Candidate, choices: Sequence[Choice]) -> NDArray[np.int64]:
+def places_of(candidate: Candidate, choices: Sequence[Choice]) -> Integers:
     """Indices of the choices that belong to a candidate."""
     names = {(grid.features, grid.projection) for grid in candidate.grids}
     return np.flatnonzero([(c.features, c.projection) in names for c in choices])

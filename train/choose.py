@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from train.agreement import families
 from train.candidates import Candidate, costs, features_of, places_of
@@ -27,7 +26,7 @@ from train.labels import NO_CONTACT
 from train.pipeline import Choice
 from train.progress import bar
 from train.stopping import Early, held_out
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Integers, Labels, Vectors
 
 EARLY_SHARES = (0.25, 0.5, 0.75)
 """Parts of the full window at which the settings of the earlier decision points are
@@ -38,7 +37,7 @@ WINDOW_MARGIN = 0.02
 """Accuracy that is not worth twice the wait."""
 
 
-Plan = tuple[NDArray[np.int64], Sequence[Mapping[str, Choice]]]
+Plan = tuple[Integers, Sequence[Mapping[str, Choice]]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
 
 
@@ -84,9 +83,7 @@ class Chosen:
     left_out: str
     candidates: tuple[Promise, ...] = ()
     picks: tuple[Choice, ...] = ()
-    folds: NDArray[np.int64] = field(
-        default_factory=lambda: np.zeros(0, np.int64), repr=False
-    )
+    folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
     known: Choice | None = None
     known_by_fold: tuple[Choice, ...] = ()
@@ -130,11 +127,11 @@ class Choosing:
         """Whether entire groups are left out for a task."""
         return self._groups is not None and task in self._groups.tasks
 
-    def _features(self, window_s: float) -> NDArray[np.float64]:
+    def _features(self, window_s: float) -> Floats:
         """(n, p) of every candidate."""
         return self._dataset.with_kernels(window_s).features(window_s, self._samples)
 
-    def _vectors(self, X: NDArray[np.float64]) -> Vectors:
+    def _vectors(self, X: Floats) -> Vectors:
         """The trials, with the features (n, p) of every candidate."""
         widths = tuple(self._widths.values())
         return Vectors(X, self._y, self._dataset.names, widths)
@@ -177,13 +174,13 @@ class Choosing:
             groups = answers(vectors, self._groups.folds, unseen, nested=nested)
         return trials, groups
 
-    def _right(self, window_s: float) -> dict[str, NDArray[np.float64]]:
+    def _right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
         vectors = self._vectors(self._features(window_s))
         what = f"{window_s:g} s"
         trials, groups = self._tables(vectors, self.tried, what, nested=False)
-        right: dict[str, NDArray[np.float64]] = {}
+        right: dict[str, Floats] = {}
         for task in self._y:
             table = groups if self._is_grouped(task) else trials
             answers = table.held_out(task)[:, table.tested[task]]
@@ -229,7 +226,7 @@ class Choosing:
 
     def choose(
         self, window_s: float
-    ) -> tuple[dict[str, Chosen], NDArray[np.int64], list[dict[str, Choice]]]:
+    ) -> tuple[dict[str, Chosen], Integers, list[dict[str, Choice]]]:
         """Each task's settings.
 
         Returns:
@@ -430,7 +427,7 @@ def _of_tasks(choices: Mapping[str, Choice], tasks: Sequence[str]) -> dict[str, 
     return {task: choices[task] for task in tasks}
 
 
-def _recounted(result: Promise, hits: NDArray[np.bool_]) -> Promise:
+def _recounted(result: Promise, hits: Booleans) -> Promise:
     """A result with other answers to the same trials."""
     assert result.hits is not None
     more = int(hits.sum()) - int(result.hits.sum())
@@ -439,7 +436,7 @@ def _recounted(result: Promise, hits: NDArray[np.bool_]) -> Promise:
 
 def _right_together(
     family: Sequence[str], vectors: Vectors, plan: Plan, jobs: int
-) -> dict[str, NDArray[np.bool_]]:
+) -> dict[str, Booleans]:
     """{task: whether the label named without a trial's fold is right} of tasks that are
     decided together, for the trials with a fold and a label."""
     folds, choices = plan

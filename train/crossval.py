@@ -10,21 +10,19 @@ accumulated over k.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.projection import Grid, Spectrum, on_grid
 from train.scaling import centred_and_scaled, finite
 from train.threads import single_thread
+from train.vectors import Booleans, Floats, Integers, Strings
 
 MAX_COMPONENTS = 20
 MAX_K = 20
 
 
-def votes_right(
-    neighbours: NDArray[np.int64], labels: NDArray[np.int64], truth: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def votes_right(neighbours: Integers, labels: Integers, truth: Integers) -> Booleans:
     """Whether the vote of the first 1, 2, ... k neighbours gives the truth.
 
     Args:
@@ -46,14 +44,14 @@ def votes_right(
 
 
 def neighbours(
-    X: NDArray[np.float64],
-    tested: NDArray[np.float64] | None = None,
+    X: Floats,
+    tested: Floats | None = None,
     *,
     scaling: str = "none",
     max_components: int = MAX_COMPONENTS,
     max_k: int = MAX_K,
     features: Sequence[str] = FEATURES,
-) -> NDArray[np.int64]:
+) -> Integers:
     """Each trial's neighbours among the others: (n, components, k) rows, nearest first.
 
     Coordinates and distances are those of a `Projection` and of the exported graph, to
@@ -100,7 +98,7 @@ def neighbours(
     return rows
 
 
-def accuracies(rows: NDArray[np.int64], y: NDArray[np.str_]) -> NDArray[np.float64]:
+def accuracies(rows: Integers, y: Strings) -> Floats:
     """Leave-one-out accuracy (components, k) from `neighbours` and labels (n,)."""
     _, labels = np.unique(y, return_inverse=True)
     right = votes_right(rows, labels, labels[:, None])

@@ -33,7 +33,7 @@ from train.pipeline import Choice, columns_of, types_of
 from train.scaling import centred_and_scaled, finite
 from train.search import Decomposition, SearchGrid
 from train.threads import single_thread
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
 
 FOLDS = 10
 SEED = 2012
@@ -65,8 +65,8 @@ class Result:
     total: int
     components: int = 0
     k: int = 0
-    said: NDArray[np.str_] | None = None
-    hits: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    said: Strings | None = None
+    hits: Booleans | None = field(default=None, repr=False, compare=False)
 
     @property
     def accuracy(self) -> float:
@@ -103,9 +103,7 @@ def finest(y: Labels) -> str:
     return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
 
 
-def stratified_folds(
-    y: NDArray[np.str_], count: int = FOLDS, seed: int = SEED
-) -> NDArray[np.int64]:
+def stratified_folds(y: Strings, count: int = FOLDS, seed: int = SEED) -> Integers:
     """(n,) folds in which each class is spread evenly; the same for the same labels."""
     order = np.random.default_rng(seed).permutation(len(y))
     order = order[np.argsort(y[order], kind="stable")]
@@ -114,7 +112,7 @@ def stratified_folds(
     return folds
 
 
-def group_folds(groups: NDArray[np.str_], count: int = 20) -> NDArray[np.int64]:
+def group_folds(groups: Strings, count: int = 20) -> Integers:
     """(n,) folds of entire groups: one group each, or several where there are over
     `count`."""
     names, members = np.unique(groups, return_inverse=True)
@@ -133,25 +131,25 @@ class _Fit:
     """
 
     vectors: Vectors
-    classes: Mapping[str, NDArray[np.int64]]
-    train: NDArray[np.int64]
-    test: NDArray[np.int64]
+    classes: Mapping[str, Integers]
+    train: Integers
+    test: Integers
 
     @classmethod
     def of(
         cls,
         vectors: Vectors,
-        classes: Mapping[str, NDArray[np.int64]],
-        left_out: NDArray[np.bool_],
+        classes: Mapping[str, Integers],
+        left_out: Booleans,
     ) -> _Fit:
         """The fit without some trials, by a mask (n,), which answers these."""
         return cls(
             vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out)
         )
 
-    def counted(self, grid: SearchGrid) -> list[tuple[list[str], NDArray[np.int64]]]:
+    def counted(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
         """A grid's tasks, by how often each of the `train` trials counts for them."""
-        by_counts: dict[bytes, tuple[list[str], NDArray[np.int64]]] = {}
+        by_counts: dict[bytes, tuple[list[str], Integers]] = {}
         for task, labels in self.classes.items():
             if not grid.tasks or task in grid.tasks:
                 names = np.where(labels < 0, "", "labelled")
@@ -161,9 +159,7 @@ class _Fit:
                 by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
         return list(by_counts.values())
 
-    def decomposition(
-        self, grid: SearchGrid, counts: NDArray[np.int64]
-    ) -> Decomposition:
+    def decomposition(self, grid: SearchGrid, counts: Integers) -> Decomposition:
         """The scaled vectors of a grid's features, where each trial counts so often."""
         vectors = self.vectors
         rows = np.repeat(self.train, counts)
@@ -182,9 +178,9 @@ class _Fit:
         self,
         task: str,
         grid: SearchGrid,
-        near: NDArray[np.int64],
-        members: NDArray[np.int64],
-    ) -> NDArray[np.bool_]:
+        near: Integers,
+        members: Integers,
+    ) -> Booleans:
         """(candidates, test) whether a grid's candidates are right, by the neighbours
         among some of the trials."""
         labels = self.classes[task]
@@ -195,9 +191,9 @@ class _Fit:
         return np.asarray(rows.reshape(-1, len(self.test)))
 
 
-def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, NDArray[np.bool_]]:
+def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, Booleans]:
     """{task: (candidates, test) whether each candidate is right}."""
-    answers: dict[str, list[NDArray[np.bool_]]] = {task: [] for task in fit.classes}
+    answers: dict[str, list[Booleans]] = {task: [] for task in fit.classes}
     decomposed = None
     with single_thread():
         for grid in grids:
@@ -216,9 +212,7 @@ def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, NDArray[np.boo
     return {task: np.concatenate(right) for task, right in answers.items()}
 
 
-def _directions(
-    targets: Sequence[str], classes: Mapping[str, NDArray[np.int64]]
-) -> int:
+def _directions(targets: Sequence[str], classes: Mapping[str, Integers]) -> int:
     return max(sum(int(classes[target].max()) for target in targets), 1)
 
 
@@ -239,11 +233,11 @@ class Rule:
             standard error.
     """
 
-    prices: NDArray[np.int64] | None = None
-    allowed: NDArray[np.int64] | None = None
+    prices: Integers | None = None
+    allowed: Integers | None = None
     margin: float = 0.0
 
-    def choose(self, right: NDArray[np.bool_] | NDArray[np.float64]) -> int:
+    def choose(self, right: Booleans | Floats) -> int:
         """The candidate chosen by answers (candidates, n): whether they are right, or
         what share of them."""
         candidates = np.arange(len(right)) if self.allowed is None else self.allowed
@@ -280,18 +274,18 @@ class AnswerTable:
             left-out trials count in the choice by all trials.
     """
 
-    folds: NDArray[np.int64]
+    folds: Integers
     choices: dict[str, list[Choice]]
     right: dict[str, NDArray[Any]] = field(repr=False)
-    tested: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+    tested: Mapping[str, Booleans] = field(default_factory=dict, repr=False)
     repeated: tuple[AnswerTable, ...] = ()
 
     @classmethod
     def empty(
         cls,
-        folds: NDArray[np.int64],
+        folds: Integers,
         choices: dict[str, list[Choice]],
-        classes: Mapping[str, NDArray[np.int64]],
+        classes: Mapping[str, Integers],
     ) -> AnswerTable:
         """A table without answers, for `enter`; see `_Fit` for the classes."""
         right = {}
@@ -302,9 +296,7 @@ class AnswerTable:
             right[task] = np.tile(~tested[task], shape)
         return cls(folds, choices, right, tested)
 
-    def enter(
-        self, pair: tuple[int, int], answers: Mapping[str, NDArray[np.bool_]]
-    ) -> None:
+    def enter(self, pair: tuple[int, int], answers: Mapping[str, Booleans]) -> None:
         """Take in the answers {task: (candidates, tests)} of the fit without a pair of
         folds to the trials of both."""
         folds = self.folds[np.isin(self.folds, pair)]
@@ -317,7 +309,7 @@ class AnswerTable:
                     right[:, folds == other] | ~tested
                 )
 
-    def held_out(self, task: str) -> NDArray[np.float64]:
+    def held_out(self, task: str) -> Floats:
         """(candidates, n) share of right answers to each trial, by the fits without its
         fold in this table and in the `repeated` ones."""
         right = self.right[task][self.folds, :, np.arange(len(self.folds))].T
@@ -337,9 +329,7 @@ class AnswerTable:
             for fold, right in enumerate(self.right[task])
         ]
 
-    def by_other_fold(
-        self, task: str, folds: NDArray[np.int64], rule: Rule
-    ) -> list[int]:
+    def by_other_fold(self, task: str, folds: Integers, rule: Rule) -> list[int]:
         """[fold] the candidate chosen without the trials of one of other folds (n,).
 
         The fits behind the answers may have seen these trials, which take no part in
@@ -375,12 +365,12 @@ def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
     return replace(first, right=right)
 
 
-def fold_numbers(folds: NDArray[np.int64]) -> range:
+def fold_numbers(folds: Integers) -> range:
     """The numbers of the folds (n,), from 0."""
     return range(int(folds.max()) + 1)
 
 
-def _pairs(folds: NDArray[np.int64], nested: bool) -> list[tuple[int, int]]:
+def _pairs(folds: Integers, nested: bool) -> list[tuple[int, int]]:
     """The folds that the fits leave out: each alone, and each two where `nested`."""
     numbers = fold_numbers(folds)
     if nested:
@@ -388,14 +378,14 @@ def _pairs(folds: NDArray[np.int64], nested: bool) -> list[tuple[int, int]]:
     return list(zip(numbers, numbers, strict=True))
 
 
-def fits(folds: NDArray[np.int64], nested: bool) -> int:
+def fits(folds: Integers, nested: bool) -> int:
     """How many fits `evaluate` makes."""
     return len(_pairs(folds, nested))
 
 
 def evaluate(
     vectors: Vectors,
-    folds: NDArray[np.int64],
+    folds: Integers,
     grids: Sequence[SearchGrid],
     *,
     jobs: int = 1,
@@ -438,14 +428,14 @@ def evaluate(
     return table
 
 
-def _classes(labels: NDArray[np.str_]) -> NDArray[np.int64]:
+def _classes(labels: Strings) -> Integers:
     """(n,) class indices of labels; -1 where one is missing."""
     names = np.unique(labels[labels != ""])
     return np.where(labels == "", -1, names.searchsorted(labels))
 
 
 def _choices(
-    task: str, grids: Sequence[SearchGrid], classes: Mapping[str, NDArray[np.int64]]
+    task: str, grids: Sequence[SearchGrid], classes: Mapping[str, Integers]
 ) -> list[Choice]:
     """The candidates of a task."""
     choices: list[Choice] = []

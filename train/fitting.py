@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from joblib import cpu_count
-from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from edge.errors import InputError
@@ -34,7 +33,7 @@ from train.mix import Mixing, mix
 from train.pipeline import Choice, ContactClassifier
 from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Labels, Strings, Vectors
 
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
@@ -70,7 +69,7 @@ class Fitted:
     measured: DataSet
     window_s: float
     samples: int
-    X: NDArray[np.float64] = field(repr=False)
+    X: Floats = field(repr=False)
     chosen: dict[str, Chosen]
     candidates: tuple[Candidate, ...]
     classifier: ContactClassifier
@@ -375,7 +374,7 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
 
 
 def _choose_mixed(
-    loaded: Loaded, y: Labels, is_own: NDArray[np.bool_], options: FitOptions
+    loaded: Loaded, y: Labels, is_own: Booleans, options: FitOptions
 ) -> Settings:
     """The settings where simulated trials stand beside the owner's."""
     dataset = loaded.dataset
@@ -515,7 +514,7 @@ def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:
     return _leaks(dataset.part(dataset.is_own), felt)
 
 
-def _leaks(dataset: DataSet, y: Mapping[str, NDArray[np.str_]]) -> list[str]:
+def _leaks(dataset: DataSet, y: Mapping[str, Strings]) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in
     contact."""
     recordings = [t.recording for t in dataset.trials]

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.recording import Recording
 from train.agreement import families
 from train.dataset import DataSet
 from train.evaluate import FOLDS, SEED, finest, group_folds, stratified_folds
 from train.search import SearchGrid
-from train.vectors import Labels
+from train.vectors import Integers, Labels, Strings
 
 FEWEST_GROUPS = 3
 """Objects that a class needs before entire objects can be left out."""
@@ -41,7 +40,7 @@ differences that are small beside the features' spread, which do not carry over 
 objects."""
 
 
-def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
+def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
     """(n,) kind of thing in each, where all are simulated and some kind has several
     objects.
 
@@ -55,7 +54,7 @@ def kinds_of(recordings: Sequence[Recording]) -> NDArray[np.str_] | None:
     return np.array(kinds) if len(set(kinds)) < len(set(objects)) else None
 
 
-def groupable(labels: NDArray[np.str_], groups: NDArray[np.str_]) -> bool:
+def groupable(labels: Strings, groups: Strings) -> bool:
     """Whether every class has enough groups that entire groups can be left out."""
     classes = set(labels.tolist())
     return len(classes) > 1 and all(
@@ -80,11 +79,11 @@ class Groups:
     """
 
     name: str
-    members: NDArray[np.str_]
+    members: Strings
     tasks: frozenset[str]
-    folds: NDArray[np.int64]
+    folds: Integers
 
-    def count(self, labels: NDArray[np.str_]) -> int:
+    def count(self, labels: Strings) -> int:
         """Number of groups among the trials that have a label (n,)."""
         return len(set(self.members[labels != ""].tolist()))
 
@@ -124,7 +123,7 @@ def groups_of(
     return None
 
 
-def _memberships(dataset: DataSet, leave_out: str) -> dict[str, NDArray[np.str_]]:
+def _memberships(dataset: DataSet, leave_out: str) -> dict[str, Strings]:
     """{name: (n,) the group of each trial}, those that are left out first if they can
     be first."""
     if leave_out == TRIAL:
@@ -146,8 +145,8 @@ class Divisions:
         groups: entire groups; None where no task has enough of them.
     """
 
-    folds: NDArray[np.int64]
-    others: tuple[NDArray[np.int64], ...]
+    folds: Integers
+    others: tuple[Integers, ...]
     groups: Groups | None
 
     @classmethod

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.touch.kernels import (
     BITS,
@@ -12,15 +11,14 @@ from edge.touch.kernels import (
     convolved,
     shifted,
 )
+from train.vectors import Integers
 
 MOST_TOUCHES = 500
 """Touches that are enough for a table."""
 GOLDEN = (np.sqrt(5.0) + 1.0) / 2.0
 
 
-def kernel_table(
-    touches: Sequence[NDArray[np.int64]], biases: int, alike: bool
-) -> KernelTable:
+def kernel_table(touches: Sequence[Integers], biases: int, alike: bool) -> KernelTable:
     """Shifts and biases for the kernels of one feature. No label takes part.
 
     A bias is a quantile of its convolution's results on these touches. The quantiles of

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.metrics import precision_recall_fscore_support
 
 from edge.model.model import Model
@@ -26,7 +25,7 @@ from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
 from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
-from train.vectors import Vectors
+from train.vectors import Integers, Strings, Vectors
 
 QUARTERS = 4
 """The learning curve has a point for each of these parts of the training trials."""
@@ -49,8 +48,8 @@ class Answers:
     """
 
     classes: list[str]
-    truth: NDArray[np.str_]
-    answers: NDArray[np.str_]
+    truth: Strings
+    answers: Strings
     explained: dict[int, Explanation]
 
     @property
@@ -73,8 +72,8 @@ def _left_out(
     vectors: Vectors,
     task: str,
     choices: Mapping[str, Choice],
-    test: NDArray[np.int64],
-) -> tuple[list[NDArray[np.str_]], dict[int, Explanation]]:
+    test: Integers,
+) -> tuple[list[Strings], dict[int, Explanation]]:
     """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
     them.
 
@@ -119,7 +118,7 @@ def _left_out(
     return answers, explained
 
 
-def _space(model: ContactClassifier, task: str, labels: NDArray[np.int64]) -> Space:
+def _space(model: ContactClassifier, task: str, labels: Integers) -> Space:
     """The space of a task, whose trials have these labels (n,)."""
     key = model.spaces_[task]
     c = model.components_[task]

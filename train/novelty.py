@@ -24,12 +24,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from edge.model.novelty import Novelty
 from train.threads import single_thread
+from train.vectors import Booleans, Floats, Integers, Strings
 
 NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
 TAIL = 0.1
@@ -52,8 +52,6 @@ STORED_BITS = 15
 WHITENING_BITS = 24
 FARTHEST = 2.0**22
 """Coordinates are cut off here, so that squared distances stay below 2^53."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -94,9 +92,7 @@ class NoveltySpace:
     points: tuple[NoveltyPoint, ...]
 
     @classmethod
-    def of(
-        cls, X: Floats, labels: NDArray[np.str_], widths: Sequence[int]
-    ) -> NoveltySpace:
+    def of(cls, X: Floats, labels: Strings, widths: Sequence[int]) -> NoveltySpace:
         """The space of some trials.
 
         Args:
@@ -203,9 +199,7 @@ def _coordinates(z: Floats, point: NoveltyPoint) -> Floats:
     return np.asarray(np.clip(whole, -FARTHEST, FARTHEST))
 
 
-def _point(
-    mean: Floats, gain: Floats, z: Floats, labels: NDArray[np.str_]
-) -> NoveltyPoint:
+def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
     """The constants of a decision point at which trials have the components z."""
     within = z.copy()
     for label in np.unique(labels):
@@ -228,8 +222,8 @@ def _point(
 
 def held_out_scores(
     X: Floats,
-    labels: NDArray[np.str_],
-    folds: NDArray[np.int64],
+    labels: Strings,
+    folds: Integers,
     widths: Sequence[int],
     jobs: int = 1,
 ) -> Floats:
@@ -252,8 +246,8 @@ def held_out_scores(
 
 def _fold_scores(
     X: Floats,
-    labels: NDArray[np.str_],
-    left_out: NDArray[np.bool_],
+    labels: Strings,
+    left_out: Booleans,
     widths: Sequence[int],
 ) -> Floats:
     with single_thread():

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 from scipy.special import expit
@@ -24,10 +23,10 @@ from edge.touch.features import FEATURES
 from train.agreement import factors_of
 from train.projection import Projection
 from train.scaling import finite, widths_of
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
 
 
-def vote(labels: NDArray[np.int64]) -> NDArray[np.int64]:
+def vote(labels: Integers) -> Integers:
     """(n,) majority of the neighbours' labels (n, k), nearest first.
 
     A tie goes to the nearest neighbour among the tied.
@@ -37,9 +36,7 @@ def vote(labels: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.take_along_axis(labels, votes.argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
-def squared_distances(
-    X: NDArray[np.float64], rows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def squared_distances(X: Floats, rows: Floats) -> Floats:
     """(m, n) squared distances of points X (m, c) to rows (n, c); exact for those of a
     `Grid`."""
     if not X.shape[1]:
@@ -48,8 +45,8 @@ def squared_distances(
 
 
 def label_distances(
-    squares: NDArray[np.float64], labels: NDArray[np.int64], classes: int, unit: float
-) -> NDArray[np.float64]:
+    squares: Floats, labels: Integers, classes: int, unit: float
+) -> Floats:
     """(m, classes) distance of each label, from squared distances (m, n) to the trials.
 
     It is the mean distance of the label's nearest trials; `nearest_of_label` says of
@@ -65,7 +62,7 @@ def label_distances(
     return out
 
 
-def slope(gaps: NDArray[np.float64]) -> float:
+def slope(gaps: Floats) -> float:
     """By how much the log odds of being right change with the gap, without an
     intercept.
 
@@ -140,9 +137,7 @@ class Choice:
             return space
         return (*space, self.shrinkage, self.targets or (task,))
 
-    def counts(
-        self, labels: NDArray[np.str_], is_own: NDArray[np.bool_] | None = None
-    ) -> NDArray[np.int64]:
+    def counts(self, labels: Strings, is_own: Booleans | None = None) -> Integers:
         """(n,) how often each trial counts: 0 without a label, else by the weights.
 
         Args:
@@ -156,7 +151,7 @@ class Choice:
 
 
 def fittable(
-    choices: Mapping[str, Choice], y: Labels, is_own: NDArray[np.bool_] | None
+    choices: Mapping[str, Choice], y: Labels, is_own: Booleans | None
 ) -> dict[str, Choice]:
     """The choices of the tasks that y has labels for, with k at most the number of
     their trials.
@@ -181,8 +176,8 @@ class Decided(NamedTuple):
             `label_distances`, `ContactClassifier.slopes_` and `edge.model.agreement`.
     """
 
-    labels: NDArray[np.int64]
-    distances: NDArray[np.float64]
+    labels: Integers
+    distances: Floats
 
 
 class ContactClassifier:
@@ -229,9 +224,9 @@ class ContactClassifier:
 
     def fit(
         self,
-        X: NDArray[np.float64],
+        X: Floats,
         y: Labels,
-        is_own: NDArray[np.bool_] | None = None,
+        is_own: Booleans | None = None,
         complete: bool = True,
     ) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
@@ -256,12 +251,10 @@ class ContactClassifier:
             self.slopes_ = self._slopes(vectors)
         return self
 
-    def _set_spaces(
-        self, y: Labels, is_own: NDArray[np.bool_] | None
-    ) -> dict[Space, NDArray[np.int64]]:
+    def _set_spaces(self, y: Labels, is_own: Booleans | None) -> dict[Space, Integers]:
         """Set `spaces_`; {space: (n,) how often each trial counts in it}."""
         self.spaces_: dict[str, Space] = {}
-        counts: dict[Space, NDArray[np.int64]] = {}
+        counts: dict[Space, Integers] = {}
         for task, choice in self.choices.items():
             how_often = choice.counts(y[task], is_own)
             uneven = () if (how_often == 1).all() else how_often.tobytes()
@@ -277,15 +270,13 @@ class ContactClassifier:
                 )
         return counts
 
-    def _fit_spaces(
-        self, X: NDArray[np.float64], y: Labels, counts: dict[Space, NDArray[np.int64]]
-    ) -> None:
+    def _fit_spaces(self, X: Floats, y: Labels, counts: dict[Space, Integers]) -> None:
         """Fit the projection of each space, and project its trials."""
         widths = widths_of(X.shape[1], self.features, self.widths)
-        self.columns_: dict[Space, NDArray[np.int64]] = {}
+        self.columns_: dict[Space, Integers] = {}
         self.projections_: dict[Space, Projection] = {}
-        self.members_: dict[Space, NDArray[np.int64]] = {}
-        self.rows_: dict[Space, NDArray[np.float64]] = {}
+        self.members_: dict[Space, Integers] = {}
+        self.rows_: dict[Space, Floats] = {}
         for space, how_often in counts.items():
             tasks = [task for task in self.spaces_ if self.spaces_[task] == space]
             choice = self.choices[tasks[0]]
@@ -311,8 +302,8 @@ class ContactClassifier:
 
     def _set_labels(self, y: Labels) -> None:
         """Set what is known of each task's labels and coordinates."""
-        self.classes_: dict[str, NDArray[np.str_]] = {}
-        self.labels_: dict[str, NDArray[np.int64]] = {}
+        self.classes_: dict[str, Strings] = {}
+        self.labels_: dict[str, Integers] = {}
         self.components_: dict[str, int] = {}
         for task, space in self.spaces_.items():
             labels = y[task][self.members_[space]]
@@ -346,9 +337,7 @@ class ContactClassifier:
                     gaps[task] += model._gaps(task, vectors.X[met], labels[met])
         return {task: slope(np.array(task_gaps)) for task, task_gaps in gaps.items()}
 
-    def _gaps(
-        self, task: str, X: NDArray[np.float64], labels: NDArray[np.str_]
-    ) -> list[float]:
+    def _gaps(self, task: str, X: Floats, labels: Strings) -> list[float]:
         """By how much nearer than any other the right label is to each of the vectors
         (m, p)."""
         distances = self._to_labels(task, self.squares(task, X))
@@ -358,18 +347,16 @@ class ContactClassifier:
         gaps: list[float] = (distances.min(axis=1) - to_right).tolist()
         return gaps
 
-    def _to_labels(
-        self, task: str, squares: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _to_labels(self, task: str, squares: Floats) -> Floats:
         """(m, classes) `label_distances` of squares (m, members)."""
         classes = len(self.classes_[task])
         return label_distances(squares, self.labels_[task], classes, self.unit(task))
 
-    def project(self, space: Space, X: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, space: Space, X: Floats) -> Floats:
         """Coordinates (m, c) of vectors (m, p)."""
         return self.projections_[space].transform(X[:, self.columns_[space]])
 
-    def squares(self, task: str, X: NDArray[np.float64]) -> NDArray[np.float64]:
+    def squares(self, task: str, X: Floats) -> Floats:
         """(m, members) squared distances of vectors (m, p) to the trials of the task's
         space."""
         space = self.spaces_[task]
@@ -382,21 +369,19 @@ class ContactClassifier:
         """The unit of a task's coordinates, a power of two."""
         return self.projections_[self.spaces_[task]].grid_.unit
 
-    def neighbours(
-        self, task: str, X: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def neighbours(self, task: str, X: Floats) -> tuple[Floats, Integers]:
         """Distances and training rows (m, k) for vectors (m, p), nearest first."""
         squares = self.squares(task, X)
         rows = self.nearest(task, squares)
         distances = np.sqrt(np.take_along_axis(squares, rows, axis=1))
         return distances, self.members_[self.spaces_[task]][rows]
 
-    def nearest(self, task: str, squares: NDArray[np.float64]) -> NDArray[np.int64]:
+    def nearest(self, task: str, squares: Floats) -> Integers:
         """(m, k) places of the smallest squares (m, members); of equal ones the
         first."""
         return np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
 
-    def decide(self, X: NDArray[np.float64]) -> dict[str, Decided]:
+    def decide(self, X: Floats) -> dict[str, Decided]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
         graph's votes."""
         labels = {}
@@ -414,7 +399,7 @@ class ContactClassifier:
 
 def columns_of(
     names: Sequence[str], features: Sequence[str], widths: Sequence[int]
-) -> NDArray[np.int64]:
+) -> Integers:
     """The columns of vectors of `features` that hold the `names` ones, rising; all if
     empty."""
     is_named = [not names or name in names for name in features]

@@ -19,6 +19,7 @@ from sklearn.utils.validation import check_is_fitted
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.scaling import centred_and_scaled, column_means
+from train.vectors import Booleans, Floats, Integers
 
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""
@@ -51,8 +52,8 @@ rounding."""
 
 
 def _centred(
-    X: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    X: Floats,
+) -> tuple[Floats, Floats, Booleans]:
     """Mean (p,), X minus the mean, and whether each column has no variance (p,)."""
     mean = column_means(X)
     centred = X - mean
@@ -66,7 +67,7 @@ def _centred(
     return mean, centred, still
 
 
-def _signs(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _signs(axes: Floats) -> Floats:
     """(c,) the sign of each axis' largest entry; the first of nearly equal entries
     counts."""
     sizes = np.abs(axes)
@@ -77,8 +78,8 @@ def _signs(axes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def principal_axes(
-    X: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    X: Floats,
+) -> tuple[Floats, Floats, Floats]:
     """Mean, components and singular values of X (n, p), as many as its numerical rank.
 
     They come from a full singular value decomposition in float64, which keeps small
@@ -115,7 +116,7 @@ class Spectrum:
         scores: (n, r) coordinates of the rows along the eigenvectors.
     """
 
-    def __init__(self, X: NDArray[np.float64]) -> None:
+    def __init__(self, X: Floats) -> None:
         self._given = X
         _, self.rows, _ = _centred(X)
         n, p = self.rows.shape
@@ -128,21 +129,21 @@ class Spectrum:
         roots = np.sqrt(self.values)
         self.scores = self._vectors * roots if self._dual else self.rows @ self._vectors
 
-    def _lift(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _lift(self, directions: Floats) -> Floats:
         """Directions (r, c) among the eigenvectors as weights of the columns (p, c)."""
         if not self._dual:
             return self._vectors @ directions
         over = directions / np.sqrt(self.values)[:, None]
         return np.asarray(self.rows.T @ (self._vectors @ over))
 
-    def scores_of(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scores_of(self, rows: Floats) -> Floats:
         """(m, r) coordinates along the eigenvectors of rows (m, p), which are centred
         already."""
         if not self._dual:
             return np.asarray(rows @ self._vectors)
         return np.asarray((rows @ self.rows.T) @ (self._vectors / np.sqrt(self.values)))
 
-    def leading(self, count: int) -> NDArray[np.float64]:
+    def leading(self, count: int) -> Floats:
         """(c, p) the first principal axes up to sign, faster than by `principal_axes`.
 
         The fast way is taken if the last axis has more than `WELL_CONDITIONED` of the
@@ -163,9 +164,7 @@ class Spectrum:
             return np.ascontiguousarray(self._lift(np.eye(len(self.values), count)).T)
         return principal_axes(self._given)[1][:count]
 
-    def discriminants(
-        self, labels: NDArray[np.int64], shrinkage: float
-    ) -> NDArray[np.float64]:
+    def discriminants(self, labels: Integers, shrinkage: float) -> Floats:
         """(p, c) the directions that separate the classes, at most classes - 1.
 
         They are the eigenvectors of (W + s I)^-1 B, where W and B are the within-class
@@ -187,9 +186,7 @@ class Spectrum:
         weights = self._lift(self.directions(labels, shrinkage))
         return np.asarray(weights * _signs(weights.T))
 
-    def directions(
-        self, labels: NDArray[np.int64], shrinkage: float
-    ) -> NDArray[np.float64]:
+    def directions(self, labels: Integers, shrinkage: float) -> Floats:
         """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by
         `scores`."""
         if not shrinkage > 0.0:
@@ -213,7 +210,7 @@ class Spectrum:
         return np.asarray(directions / np.sqrt(variance))
 
 
-def on_grid(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def on_grid(weights: Floats) -> Floats:
     """Weights (p, c) rounded to whole multiples of one power of two.
 
     The absolute multiples of a column add up to less than 2^29, since by Cauchy and
@@ -266,9 +263,9 @@ class Grid:
     @classmethod
     def of(
         cls,
-        d: NDArray[np.float64],
+        d: Floats,
         components: int,
-        projected: NDArray[np.float64] | None = None,
+        projected: Floats | None = None,
     ) -> Grid:
         """The grid for training rows.
 
@@ -293,9 +290,7 @@ class Grid:
         """The limit, in units, at which a query's coordinates are clipped."""
         return float(2.0 ** (self.bits + 1))
 
-    def project(
-        self, d: NDArray[np.float64], weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def project(self, d: Floats, weights: Floats) -> Floats:
         """Coordinates (n, c), multiples of `unit`, of differences (n, p) by weights of
         `on_grid`.
 
@@ -353,7 +348,7 @@ class Projection(TransformerMixin, BaseEstimator):
         self.shrinkage = shrinkage
         self.widths = widths
 
-    def fit(self, X: NDArray[np.float64], y: NDArray[Any] | None = None) -> Projection:
+    def fit(self, X: Floats, y: NDArray[Any] | None = None) -> Projection:
         """Fit to X (n, p) and, if `kind` is `lda`, to the labels y (n,) or (n, tasks).
 
         The discriminants of several tasks are put side by side.
@@ -374,9 +369,7 @@ class Projection(TransformerMixin, BaseEstimator):
         self.grid_ = Grid.of(d, self.weights_.shape[1], projected)
         return self
 
-    def _axes(
-        self, d: NDArray[np.float64], y: NDArray[Any] | None
-    ) -> tuple[NDArray[np.float64], float]:
+    def _axes(self, d: Floats, y: NDArray[Any] | None) -> tuple[Floats, float]:
         """Weights (p, rank) before rounding, and the gap."""
         if self.kind == "pca":
             _, axes, values = principal_axes(d)
@@ -397,7 +390,7 @@ class Projection(TransformerMixin, BaseEstimator):
         ]
         return np.hstack(weights), 1.0
 
-    def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+    def transform(self, X: Floats) -> Floats:
         """Coordinates (n, c), multiples of `grid_.unit`, of vectors (n, p)."""
         check_is_fitted(self)
         d = (np.asarray(X, dtype=np.float64) - self.mean_) * self.gain_

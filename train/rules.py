@@ -29,11 +29,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 from scipy.stats import beta
 
 from edge.model.stopping import TEST_SHARE, StoppingRule
+from train.vectors import Booleans, Floats, Integers
 
 RISK = 0.1
 """Probability that a certificate is wrong."""
@@ -53,9 +53,7 @@ def upper_limit(wrong: int, trials: int, level: float) -> float:
     )
 
 
-def stops(
-    confidence: NDArray[np.float64], rule: StoppingRule, unknown: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def stops(confidence: Floats, rule: StoppingRule, unknown: Booleans) -> Integers:
     """(n,) the decision point at which a rule decides, as `edge.Classifier` does.
 
     Args:
@@ -83,12 +81,12 @@ class Course:
         withheld: whether the task names nothing for an unknown contact.
     """
 
-    confidences: Sequence[NDArray[np.float64]]
-    wrong: Sequence[NDArray[np.bool_]]
-    unknown: NDArray[np.bool_]
+    confidences: Sequence[Floats]
+    wrong: Sequence[Booleans]
+    unknown: Booleans
     withheld: bool = False
 
-    def under(self, rule: StoppingRule) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def under(self, rule: StoppingRule) -> tuple[Integers, Booleans]:
         """(n,) the decision point at which a rule decides, and whether the answer is
         wrong."""
         every = np.arange(self.unknown.shape[1])
@@ -112,7 +110,7 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
 
 
 def certify(
-    course: Course, seconds: NDArray[np.float64], level: float = TEST_SHARE * RISK
+    course: Course, seconds: Floats, level: float = TEST_SHARE * RISK
 ) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the
     safest first.
@@ -150,7 +148,7 @@ def following(
     own: Sequence[StoppingRule],
     product: Sequence[StoppingRule],
     course: Course,
-    seconds: NDArray[np.float64],
+    seconds: Floats,
 ) -> list[StoppingRule]:
     """The rules of a factor: those of its product, and before them its own that err
     less often.

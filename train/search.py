@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.neighbors import NearestNeighbors
 
 from train.pipeline import Choice
 from train.projection import Spectrum
+from train.vectors import Floats, Integers
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
@@ -74,9 +74,7 @@ class SearchGrid:
         ]
 
 
-def _nearest(
-    known: NDArray[np.float64], tested: NDArray[np.float64], k: int
-) -> NDArray[np.int64]:
+def _nearest(known: Floats, tested: Floats, k: int) -> Integers:
     """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in
     their order.
 
@@ -99,9 +97,7 @@ def _nearest(
     return np.take_along_axis(rows, order, axis=1)
 
 
-def _rounded(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rounded(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Coordinates (n, c) and (m, c) in whole steps, so coarse that squared distances
     are exact.
 
@@ -132,21 +128,19 @@ class Decomposition:
 
     def __init__(
         self,
-        rows: NDArray[np.float64],
-        new: NDArray[np.float64],
-        labels: Mapping[str, NDArray[np.int64]],
-        first: NDArray[np.int64],
+        rows: Floats,
+        new: Floats,
+        labels: Mapping[str, Integers],
+        first: Integers,
     ) -> None:
         self._spectrum = Spectrum(rows)
         self._new = new
         self._labels = labels
         self._first = first
-        self._new_scores: NDArray[np.float64] | None = None
-        self._along: dict[
-            tuple[str, float], tuple[NDArray[np.float64], NDArray[np.float64]]
-        ] = {}
+        self._new_scores: Floats | None = None
+        self._along: dict[tuple[str, float], tuple[Floats, Floats]] = {}
 
-    def neighbours(self, grid: SearchGrid, task: str) -> NDArray[np.int64]:
+    def neighbours(self, grid: SearchGrid, task: str) -> Integers:
         """(projections, m, k) places among the trials, for each projection of a
         grid."""
         k = min(grid.neighbours[-1], len(self._first))
@@ -171,9 +165,7 @@ class Decomposition:
             places.append(_nearest(*_rounded(*coordinates), k))
         return np.stack(places)
 
-    def _discriminants(
-        self, task: str, shrinkage: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _discriminants(self, task: str, shrinkage: float) -> tuple[Floats, Floats]:
         """Coordinates (trials, c) and (m, c) along the discriminants of a task's
         labels."""
         if self._new_scores is None:

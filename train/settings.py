@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from train.candidates import Candidate
 from train.choose import Chosen, EarlySettings
 from train.pipeline import Choice
+from train.vectors import Integers
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Settings:
     """
 
     chosen: dict[str, Chosen]
-    folds: NDArray[np.int64]
+    folds: Integers
     without: list[dict[str, Choice]]
     tried: Sequence[Candidate]
     window_s: float

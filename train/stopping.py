@@ -33,7 +33,6 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit
 
@@ -46,7 +45,7 @@ from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
 from train.pipeline import Choice, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
-from train.vectors import Vectors
+from train.vectors import Booleans, Floats, Integers, Strings, Vectors
 
 FEWEST = 20
 """Trials that calibration needs."""
@@ -84,11 +83,11 @@ class Early:
     by_fold: Sequence[Mapping[str, Choice]]
 
 
-Answers = dict[str, tuple[NDArray[np.str_], NDArray[np.float64]]]
+Answers = dict[str, tuple[Strings, Floats]]
 """{task: labels and margins, (decision points, m) each}."""
 
 
-def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answers:
+def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
     """The answers of models, one for each decision point, to vectors (points, m, p)."""
     points = [_answers(model, x) for model, x in zip(models, X, strict=True)]
     by_task = {}
@@ -99,9 +98,7 @@ def answers(models: Sequence[ContactClassifier], X: NDArray[np.float64]) -> Answ
     return by_task
 
 
-def _answers(
-    model: ContactClassifier, x: NDArray[np.float64]
-) -> dict[str, tuple[Any, ...]]:
+def _answers(model: ContactClassifier, x: Floats) -> dict[str, tuple[Any, ...]]:
     """{task: labels and margins} of vectors (m, p)."""
     answered = {}
     for task, (labels, distances) in model.decide(x).items():
@@ -113,7 +110,7 @@ def _answers(
 
 def held_out(
     vectors: Vectors,
-    folds: NDArray[np.int64],
+    folds: Integers,
     fold_choices: Sequence[AtPoints],
     jobs: int = 1,
 ) -> list[Answers]:
@@ -132,7 +129,7 @@ def held_out(
     return list(Parallel(n_jobs=jobs)(work))
 
 
-def _fold(vectors: Vectors, left_out: NDArray[np.bool_], choices: AtPoints) -> Answers:
+def _fold(vectors: Vectors, left_out: Booleans, choices: AtPoints) -> Answers:
     training = vectors.part(~left_out)
     models = []
     with single_thread():
@@ -156,9 +153,9 @@ class Curve:
     @classmethod
     def of(
         cls,
-        margins: NDArray[np.float64],
-        excess: NDArray[np.float64],
-        right: NDArray[np.bool_],
+        margins: Floats,
+        excess: Floats,
+        right: Booleans,
     ) -> Curve:
         """The most likely curve for some answers; arrays of one shape."""
         columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
@@ -176,8 +173,8 @@ class Curve:
 
     def with_mean(
         self,
-        margins: NDArray[np.float64],
-        excess: NDArray[np.float64],
+        margins: Floats,
+        excess: Floats,
         share: float,
     ) -> Curve:
         """The curve with the intercept at which the mean probability is `share`."""
@@ -192,24 +189,22 @@ class Curve:
         shift = float(brentq(surplus, -reach, reach))
         return replace(self, intercept=self.intercept + shift)
 
-    def probabilities(
-        self, margins: NDArray[np.float64], excess: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def probabilities(self, margins: Floats, excess: Floats) -> Floats:
         """That labels with these margins are right, in the shape of the margins."""
         logits = self.slope * margins + self.intercept - self.doubt * excess
         return np.asarray(expit(logits))
 
 
 def _logistic(
-    columns: NDArray[np.float64],
-    right: NDArray[np.bool_],
-    prior: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    columns: Floats,
+    right: Booleans,
+    prior: Floats,
+) -> Floats:
     """(3,) weights of columns (m, 3) for the log odds of being right."""
     solution = prior
     pull = np.array([PULL, DOUBT_PULL, PULL])
 
-    def loss(parameters: NDArray[np.float64]) -> float:
+    def loss(parameters: Floats) -> float:
         logits = columns @ parameters
         log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
         return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
@@ -229,7 +224,7 @@ def _logistic(
     return solution
 
 
-def excess_of(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.float64]:
+def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     """(points, n) by how much the logarithm of the novelty (points, n) is above that of
     half of the trials; 0 below."""
     typical = np.array([row[0] for row in novelty.limits])[:, None]
@@ -237,7 +232,7 @@ def excess_of(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.float
     return np.asarray(np.log(ratios))
 
 
-def unlike(novelty: Novelty, scores: NDArray[np.float64]) -> NDArray[np.bool_]:
+def unlike(novelty: Novelty, scores: Floats) -> Booleans:
     """(points, n) whether contacts are unknown, from their novelty (points, n)."""
     limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
     return np.asarray(scores > limits[:, None])
@@ -252,8 +247,8 @@ class HeldOut:
         margins: {task: (decision points, n) the label's margin}.
     """
 
-    right: dict[str, NDArray[np.bool_]]
-    margins: dict[str, NDArray[np.float64]]
+    right: dict[str, Booleans]
+    margins: dict[str, Floats]
 
 
 class SequentialClassifier:
@@ -298,11 +293,11 @@ class SequentialClassifier:
 
     def fit(
         self,
-        X: NDArray[np.float64],
-        y: Mapping[str, NDArray[np.str_]],
-        folds: NDArray[np.int64],
+        X: Floats,
+        y: Mapping[str, Strings],
+        folds: Integers,
         fold_choices: Sequence[Mapping[str, Choice]],
-        is_own: NDArray[np.bool_] | None = None,
+        is_own: Booleans | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
 
@@ -367,7 +362,7 @@ class SequentialClassifier:
     def _held_out(
         self,
         vectors: Vectors,
-        folds: NDArray[np.int64],
+        folds: Integers,
         fold_choices: Sequence[AtPoints],
     ) -> HeldOut:
         """Answers to each trial by models with some settings, without its fold."""
@@ -401,7 +396,7 @@ class SequentialClassifier:
                 self.decision_points_.append(model)
         return vectors
 
-    def _fit_novelty(self, vectors: Vectors, folds: NDArray[np.int64]) -> None:
+    def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
         """Fit the space of novelty, and set its limits by held-out trials."""
         most = finest({task: vectors.y[task] for task in self.choices})
         labels = vectors.y[most]
@@ -418,9 +413,9 @@ class SequentialClassifier:
     def _certify(
         self,
         answered: HeldOut,
-        folds: NDArray[np.int64],
-        tested: Mapping[str, NDArray[np.bool_]],
-    ) -> dict[str, tuple[list[StoppingRule], NDArray[np.bool_]]]:
+        folds: Integers,
+        tested: Mapping[str, Booleans],
+    ) -> dict[str, tuple[list[StoppingRule], Booleans]]:
         """{task: its certified rules, and whether the full window is wrong (n,)}."""
         scores = {}
         for task, right in answered.right.items():
@@ -440,8 +435,8 @@ class SequentialClassifier:
     def _calibrate(
         self,
         answered: HeldOut,
-        tested: Mapping[str, NDArray[np.bool_]],
-        rules: Mapping[str, tuple[list[StoppingRule], NDArray[np.bool_]]],
+        tested: Mapping[str, Booleans],
+        rules: Mapping[str, tuple[list[StoppingRule], Booleans]],
     ) -> None:
         """Set the stopping rules and curves of each task."""
         self.stopping_ = {}
@@ -475,10 +470,8 @@ class SequentialClassifier:
         return self.decision_points_[-1].products_
 
     def judged(
-        self, X: NDArray[np.float64], y: Mapping[str, NDArray[np.str_]]
-    ) -> tuple[
-        dict[str, NDArray[np.bool_]], dict[str, NDArray[np.float64]], dict[str, Course]
-    ]:
+        self, X: Floats, y: Mapping[str, Strings]
+    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, Course]]:
         """Hits and confidences (points, m) and course of each task, for trials that are
         new.
 
@@ -507,10 +500,10 @@ class SequentialClassifier:
 
     def _courses(
         self,
-        scores: Mapping[str, NDArray[np.float64]],
-        right: Mapping[str, NDArray[np.bool_]],
-        unknown: NDArray[np.bool_],
-        tested: Mapping[str, NDArray[np.bool_]],
+        scores: Mapping[str, Floats],
+        right: Mapping[str, Booleans],
+        unknown: Booleans,
+        tested: Mapping[str, Booleans],
     ) -> dict[str, Course]:
         """{task: its course}, from each task's own answers and confidences for rules
         (points, n).
@@ -537,10 +530,10 @@ def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
 
 
 def _curve(
-    margins: NDArray[np.float64],
-    excess: NDArray[np.float64],
-    right: NDArray[np.bool_],
-    honest: NDArray[np.bool_],
+    margins: Floats,
+    excess: Floats,
+    right: Booleans,
+    honest: Booleans,
 ) -> Curve:
     """The curve of answers, with the mean probability of honest ones."""
     share = float(honest.mean())
@@ -548,12 +541,12 @@ def _curve(
 
 
 def cross_fitted(
-    margins: NDArray[np.float64],
-    excess: NDArray[np.float64],
-    right: NDArray[np.bool_],
-    folds: NDArray[np.int64],
-    tested: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+    margins: Floats,
+    excess: Floats,
+    right: Booleans,
+    folds: Integers,
+    tested: Booleans,
+) -> Floats:
     """(points, n) confidences for rules, each fold's by the curve of the other folds'
     tested."""
     confidences = np.zeros(right.shape)

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from edge.touch.features import FEATURES
 from train.scaling import widths_of
 
-Labels = Mapping[str, NDArray[np.str_]]
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+Strings = NDArray[np.str_]
+
+Labels = Mapping[str, Strings]
 """{task: (n,) labels}; empty where a trial has none, which then does not count."""
 
 
@@ -27,11 +32,11 @@ class Vectors:
             see `train.pipeline.Choice.counts`.
     """
 
-    X: NDArray[np.float64] = field(repr=False)
+    X: Floats = field(repr=False)
     y: Labels = field(repr=False)
     features: Sequence[str] = FEATURES
     widths: Sequence[int] | None = None
-    is_own: NDArray[np.bool_] | None = field(default=None, repr=False)
+    is_own: Booleans | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> tuple[int, ...]:
