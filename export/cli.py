@@ -193,7 +193,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(summary(fitted, prices), file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if held_out:
-        print(tested(Model(path), former, held_out), file=sys.stderr)
+        print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     if arguments.report:
         from train.model_report import write  # loads matplotlib
 
@@ -226,7 +226,9 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
     )
 
 
-def tested(model: Model, former: Model | None, recordings: Sequence[Path]) -> str:
+def held_out_text(
+    model: Model, former: Model | None, recordings: Sequence[Path]
+) -> str:
     """The accuracy on recordings that were not fitted, also of a former model."""
     summary = _scored(model, recordings)
     lines = [_heading(model), summary.text()]

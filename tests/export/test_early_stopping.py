@@ -5,6 +5,7 @@ import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -231,28 +232,51 @@ def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
     assert {*asked.flags} == {*plain.flags, "uncertified"}
 
 
-def test_a_touch_unlike_all_others_waits_and_names_no_object_but_says_what_it_is_like(
-    early, make_touch, monkeypatch
-):
-    error = 0.0
+@pytest.fixture
+def hasty(early, monkeypatch):
+    """The model that stops at the first decision point, and its smallest error."""
+    smallest = []
     for task, stopping in early.info.stopping.items():
-        hasty = replace(stopping.rules[0], confidence=0.0)
-        hurried = replace(stopping, rules=(hasty,))
+        rule = replace(stopping.rules[0], confidence=0.0)
+        hurried = replace(stopping, rules=(rule,))
         monkeypatch.setitem(early.info.stopping, task, hurried)
-        error = max(error, hurried.smallest_error)
+        smallest.append(hurried.smallest_error)
+    return early, max(smallest)
+
+
+@pytest.fixture
+def strange(make_touch):
+    """A touch unlike all others."""
     known = make_touch(kind="hard", seed=50)
-    strange = replace(known, frames=np.minimum(known.frames.astype(int) * 40, 65535))
-    met = decided(early, known, error)
-    unmet = decided(early, strange, error)
-    waited = decided(early, strange, None)
-    assert early.info.novelty.task == "object"
-    for events, seconds, flagged in ((met, 0.3, False), (unmet, 1.2, True)):
-        assert {event.window_s for event in events.values()} == {seconds}
-        assert {"unknown" in event.flags for event in events.values()} == {flagged}
-    assert {event.window_s for event in waited.values()} == {1.2}
-    assert all("unknown" in event.flags for event in waited.values())
-    assert unmet["object"].label == "unknown" != waited["object"].label
-    assert unmet["category"].label == "rigid-fixed"
+    return replace(known, frames=np.minimum(known.frames.astype(int) * 40, 65535))
+
+
+def stops_of(events):
+    """The windows of decisions, and whether they are flagged as unknown."""
+    return {(event.window_s, "unknown" in event.flags) for event in events.values()}
+
+
+def test_a_touch_like_others_does_not_wait(hasty, make_touch):
+    model, error = hasty
+    events = decided(model, make_touch(kind="hard", seed=50), error)
+    assert stops_of(events) == {(0.3, False)}
+
+
+def test_a_touch_unlike_all_others_waits_and_is_flagged(hasty, strange):
+    model, error = hasty
+    assert stops_of(decided(model, strange, error)) == {(1.2, True)}
+    assert stops_of(decided(model, strange, None)) == {(1.2, True)}
+
+
+def test_a_touch_unlike_all_others_names_no_object_but_says_what_it_is_like(
+    hasty, strange
+):
+    model, error = hasty
+    events = decided(model, strange, error)
+    assert model.info.novelty.task == "object"
+    assert events["object"].label == "unknown"
+    assert events["category"].label == "rigid-fixed"
+    assert decided(model, strange, None)["object"].label != "unknown"
 
 
 def test_an_error_that_no_task_certifies_is_refused_with_what_would_do(early):
@@ -379,57 +403,78 @@ def add_trials(sequential, more, labels):
     sequential.space_ = add_novelty_rows(sequential.space_, more)
 
 
-@pytest.mark.parametrize("new", [False, True])
-def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(
-    early, folder, tmp_path, new
-):
-    """Two tasks; two labels of the further trials are new.
+FURTHER = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
+"""Labels of three further trials; `d` and `z` are new."""
+COUNTED = {"t": {1: "a"}, "u": {0: "y", 2: "x"}}
+"""{task: {further trial: the label that counts}}, where no label may be new."""
+ALL_COUNTED = {"t": {0: "d", 1: "a", 2: "d"}, "u": {0: "y", 1: "z", 2: "x"}}
+
+
+@pytest.fixture(
+    scope="module", params=[False, True], ids=["known labels", "new labels"]
+)
+def lesson(early, tmp_path_factory, request):
+    """A model of two tasks, taught further trials, and the estimators with their rows.
 
     Without new labels, each trial has a label for one task, and the tasks are of one
     space. With them, no more than the two trials of `d` vote, and one task takes one of
     the features.
     """
+    new = request.param
     rng = np.random.default_rng(1)
     y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
     X, more, queries = (rng.normal(size=(3, n, early.info.width)) for n in (45, 3, 9))
     of_u = ("contact_area",) if new else FEATURES
     choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1, features=of_u)}
-    path = tmp_path / "model.onnx"
+    path = tmp_path_factory.mktemp("taught") / "model.onnx"
     sequential, before = fitted_model(path, early.info, choices, X, y)
-    labels = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
-    data = taught(before, ["one", "two", "three"], more, labels, new_labels=new)
-    (tmp_path / "taught.onnx").write_bytes(data)
-    model = Model(tmp_path / "taught.onnx")
-
-    counted = {"t": {1: "a"}, "u": {0: "y", 2: "x"}}
+    data = taught(before, ["one", "two", "three"], more, FURTHER, new_labels=new)
+    path.write_bytes(data)
+    model = Model(path)
     if new:
-        counted = {task: {i: labels[i][task] for i in range(3)} for task in y}
         choices["t"] = Choice("none", 4, 2)
-    add_trials(sequential, more, counted)
+    add_trials(sequential, more, ALL_COUNTED if new else COUNTED)
     described = replace(before.info, rows=48, tasks=model.info.tasks)
-    (tmp_path / "oracle.onnx").write_bytes(to_onnx(sequential, described))
-    oracle = Model(tmp_path / "oracle.onnx")
-    for point, vectors in enumerate(np.concatenate([queries, more], axis=1)):
-        expected = oracle.run(vectors, point)
-        for key, values in model.run(vectors, point).items():
+    oracle = path.with_name("oracle.onnx")
+    oracle.write_bytes(to_onnx(sequential, described))
+    return SimpleNamespace(
+        new=new, model=model, more=more, queries=queries, oracle=Model(oracle)
+    )
+
+
+def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(lesson):
+    vectors = np.concatenate([lesson.queries, lesson.more], axis=1)
+    for point, at_point in enumerate(vectors):
+        expected = lesson.oracle.run(at_point, point)
+        for key, values in lesson.model.run(at_point, point).items():
             assert (values == expected[key]).all(), key
 
-    assert model.info.rows == 48
-    assert model.info.taught == 3
-    tasks = model.info.tasks
-    assert {task: (tasks[task].labels[2:], tasks[task].k) for task in tasks} == (
-        {"t": (("c", "d"), 2), "u": (("z",), 1)}
-        if new
-        else {"t": (("c",), 3), "u": ((), 1)}
-    )
-    renew(folder / "out" / "golden.npz", tmp_path / "golden.npz", model, more)
-    golden = np.load(tmp_path / "golden.npz")
-    assert (golden["decision_point_vectors"][:, -3:] == more).all()
-    assert (golden["vectors"][-3:] == more[-1]).all()
-    with pytest.raises(
-        InputError, match=r"taught 3 trials after its error rates were certified"
-    ):
-        stopping_rules(model, 0.2)
+
+def test_a_taught_model_says_how_many_trials_and_which_labels_it_has(lesson):
+    info = lesson.model.info
+    assert info.rows == 48
+    assert info.taught == 3
+    added = {name: (task.labels[2:], task.k) for name, task in info.tasks.items()}
+    if lesson.new:
+        assert added == {"t": (("c", "d"), 2), "u": (("z",), 1)}
+    else:
+        assert added == {"t": (("c",), 3), "u": ((), 1)}
+
+
+def test_the_golden_file_of_a_taught_model_holds_the_further_trials(
+    lesson, folder, tmp_path
+):
+    renewed = tmp_path / "golden.npz"
+    renew(folder / "out" / "golden.npz", renewed, lesson.model, lesson.more)
+    golden = np.load(renewed)
+    assert (golden["decision_point_vectors"][:, -3:] == lesson.more).all()
+    assert (golden["vectors"][-3:] == lesson.more[-1]).all()
+
+
+def test_a_taught_model_has_no_error_rate(lesson):
+    sentence = "taught 3 trials after its error rates were certified"
+    with pytest.raises(InputError, match=sentence):
+        stopping_rules(lesson.model, 0.2)
 
 
 def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):

@@ -1,6 +1,9 @@
 """`make export` as a user meets it."""
 
+import io
 import shutil
+from contextlib import redirect_stderr, redirect_stdout
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -9,7 +12,7 @@ from edge.errors import InputError
 from edge.model.model import Model
 from edge.statistics import wilson
 from export.__main__ import main
-from export.cli import tested
+from export.cli import held_out_text
 from tests.conftest import PAPER, export
 
 
@@ -21,27 +24,53 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     assert capsys.readouterr().err == said
 
 
-def test_it_prints_the_candidates_and_each_choice(recordings, tmp_path, capsys):
-    export(tmp_path, "--data", recordings, "--quick")
-    out = capsys.readouterr()
-    lines = out.err.splitlines()
+@pytest.fixture(scope="module")
+def printed(recordings, tmp_path_factory):
+    """What a quick export prints, and the description of its model."""
+    folder = tmp_path_factory.mktemp("quick")
+    out = io.StringIO()
+    err = io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        export(folder, "--data", recordings, "--quick")
+    lines = err.getvalue().splitlines()
+    info = Model(folder / "model.onnx").info
+    return SimpleNamespace(out=out.getvalue(), lines=lines, info=info)
+
+
+def line_of(printed, task):
+    """The line that says how accurate a task is."""
+    (line,) = (line for line in printed.lines if line.startswith(f"{task}:"))
+    return line
+
+
+def test_it_prints_the_candidates_with_a_star_for_each_task(printed):
     sets = ("paper ", "contact joints ", "moments ")
-    rows = [line for line in lines if line.startswith(sets)]
-    names = ["paper pca", "contact joints lda", "moments joints lda"]
-    assert [" ".join(row[:21].split()) for row in rows] == names
-    assert sum(row.count("*") for row in rows) == 2  # one a task
-    category, object_ = (
-        line for line in lines if line.startswith(("category:", "object:"))
-    )
-    assert "of 16 trials are classified correctly (95 % interval " in object_
+    rows = [line for line in printed.lines if line.startswith(sets)]
+    names = [" ".join(row[:21].split()) for row in rows]
+    assert names == ["paper pca", "contact joints lda", "moments joints lda"]
+    assert "".join(rows).count("*") == 2
+
+
+def test_it_prints_the_accuracy_of_each_task(printed):
+    told = "of 16 trials are classified correctly (95 % interval "
+    assert told in line_of(printed, "object")
     low, high = wilson(6.4, 6.4)
-    interval = f"(95 % interval {100 * low:.0f} to {100 * high:.0f})"
-    assert f"of 16 trials are classified correctly {interval}" in category
-    info = Model(tmp_path / "model.onnx").info
-    assert f"{info.tasks['category'].accuracy:.1%}" in category
-    taken = [feature for task in info.tasks.values() for feature in task.features]
-    assert set(info.features) == set(taken)
-    assert out.out.splitlines()[1].endswith("golden.npz")
+    interval = f"{told}{100 * low:.0f} to {100 * high:.0f})"
+    assert interval in line_of(printed, "category")
+    assert f"{printed.info.tasks['category'].accuracy:.1%}" in line_of(
+        printed, "category"
+    )
+
+
+def test_the_model_measures_what_its_tasks_take(printed):
+    taken = [task.features for task in printed.info.tasks.values()]
+    assert set(printed.info.features) == set().union(*taken)
+
+
+def test_it_prints_its_files(printed):
+    model, golden = printed.out.splitlines()
+    assert model.endswith(" kB)")
+    assert golden.endswith("golden.npz")
 
 
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
@@ -176,7 +205,7 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
     export(tmp_path, "--data", recordings, *words, *held_out)
     comparison = capsys.readouterr().err.splitlines()[-2:]
     files = sorted(recordings.iterdir())
-    text = tested(Model(path), Model(exported / "model.onnx"), files)
+    text = held_out_text(Model(path), Model(exported / "model.onnx"), files)
     assert text.splitlines()[-2:] == comparison
     assert "0 gained, 0 lost" not in comparison[-1]
 

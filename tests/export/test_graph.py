@@ -1,6 +1,7 @@
 """The ONNX graph against Python's whole numbers, the estimators and ONNX's own
 reference."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -109,6 +110,29 @@ def hard_set(kind, draw):
     return X, queries
 
 
+def by_hand(fitted, rows, points, k):
+    """The answers to points in whole numbers (m, c), from rows (n, c)."""
+    (projection,) = fitted.projections_.values()
+    unit = projection.grid_.unit
+    answers = {"distances": [], "neighbours": [], "label": []}
+    for point in points:
+        nearest, squares = exact.nearest(rows, point, k)
+        assert max(squares) < 2**53
+        answers["distances"].append([exact.distance(squares[j], unit) for j in nearest])
+        answers["neighbours"].append(nearest)
+        voters = fitted.labels_["t"][nearest].tolist()
+        answers["label"].append(exact.winner(voters))
+    return answers
+
+
+def coordinates_of(graph):
+    """The name of the coordinates, which become an output; the last Clip gives them."""
+    *_, last = (node for node in graph.node if node.op_type == "Clip")
+    (name,) = last.output
+    graph.output.append(onnx.helper.make_empty_tensor_value_info(name))
+    return name
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     kind=st.sampled_from("plain lattice duplicates offset outlier far".split()),
@@ -126,28 +150,22 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     fitted = fit(X, {"t": Choice(scaling, 6, k, projection)}, labels=4)
     data = to_onnx(fitted, describe(fitted, samples=8))
     proto = onnx.load_from_string(data)
-    # The last Clip gives the coordinates.
-    z_name = [node.output[0] for node in proto.graph.node if node.op_type == "Clip"][-1]
-    proto.graph.output.append(onnx.helper.make_empty_tensor_value_info(z_name))
-    [space] = fitted.projections_
-    p = fitted.projections_[space]
+    z_name = coordinates_of(proto.graph)
+    [(space, p)] = fitted.projections_.items()
     c = fitted.components_["t"]
-    rows, points = (exact.coordinates(v, p, c) for v in (X, queries))
+    rows = exact.coordinates(X, p, c)
+    points = exact.coordinates(queries, p, c)
+    expected = by_hand(fitted, rows, points, k)
     assert (fitted.rows_[space][:, :c] / p.grid_.unit).tolist() == rows.tolist()
-    outputs = [z_name, "t_distances", "t_neighbours", "t_label"]
+    outputs = [z_name, *(f"t_{name}" for name in expected)]
     runs = engines(proto.SerializeToString(), outputs).values()
-    answers = [run(queries) for run in runs]
-    for z, distances, neighbours, label in answers:
-        assert z[:, :c].tolist() == points.tolist()
-        for i, point in enumerate(points):
-            nearest, squares = exact.nearest(rows, point, k)
-            assert max(squares) < 2**53
-            assert neighbours[i].tolist() == nearest
-            wanted = [exact.distance(squares[j], p.grid_.unit) for j in nearest]
-            assert distances[i].tolist() == wanted
-            assert label[i] == exact.winner(fitted.labels_["t"][nearest].tolist())
-    for ours, theirs in zip(*answers, strict=True):
-        assert ours.tobytes() == theirs.tobytes()
+    ours, theirs = (run(queries) for run in runs)
+    z, *answers = ours
+    assert z[:, :c].tolist() == points.tolist()
+    for (name, values), seen in zip(expected.items(), answers, strict=True):
+        assert seen.tolist() == values, name
+    for name, mine, other in zip(outputs, ours, theirs, strict=True):
+        assert mine.tobytes() == other.tobytes(), name
 
 
 def test_an_ulp_more_in_every_feature_changes_no_bit(export):
@@ -186,26 +204,38 @@ def test_every_scaling_and_number_of_voters_agree_down_to_the_last_tie(export, c
     assert differences(fitted, model.run(queries), queries) == []
 
 
-def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
+OF_TWO_SPACES = {
+    "a": Choice("IV", 20, 2),
+    "b": Choice("IV", 3, 4),
+    "c": Choice("none", 7, 1),
+    "d": Choice("IV", 20, 5),
+}
+"""Tasks of which three share a space."""
+
+
+def test_tasks_of_one_space_have_their_own_neighbours(export):
     X = features(50)
-    choices = {
-        "a": Choice("IV", 20, 2),
-        "b": Choice("IV", 3, 4),
-        "c": Choice("none", 7, 1),
-        "d": Choice("IV", 20, 5),
-    }
-    fitted, model = export(X, choices)
+    fitted, model = export(X, OF_TWO_SPACES)
     assert fitted.components_ == {"a": 20, "b": 3, "c": 7, "d": 20}
     queries = np.concatenate([X, features(40, seed=1)])
     assert differences(fitted, model.run(queries), queries) == []
+
+
+def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
+    _, model = export(features(50), OF_TWO_SPACES)
     proto = onnx.load(model.path)
-    operators = [n.op_type for n in proto.graph.node]
-    assert operators.count("MatMul") == 2  # projections: scaling IV, none
-    assert operators.count("Gemm") == 4  # distances
-    large = [t.dims for t in proto.graph.initializer if np.prod(t.dims) >= 50 * 7]
+    operators = Counter(node.op_type for node in proto.graph.node)
+    assert operators["MatMul"] == 2  # projections: scaling IV, none
+    assert operators["Gemm"] == 4  # distances
+    shapes = [tuple(tensor.dims) for tensor in proto.graph.initializer]
+    matrices = Counter(shape for shape in shapes if len(shape) == 2)
+    weights = {(120, 7): 1, (120, 20): 1}
     # A task's rows are its own, so that it can be taught alone.
-    assert sorted(map(tuple, large)) == [(7, 50), *[(20, 50)] * 3, (120, 7), (120, 20)]
-    assert [o.domain for o in proto.opset_import] == [""]
+    rows = {(7, 50): 1, (20, 50): 3}
+    ballots = {(6, 5): 4}
+    assert matrices == weights | rows | ballots
+    (opset,) = proto.opset_import
+    assert opset.domain == ""
 
 
 def test_features_within_the_training_set_are_in_range_and_far_ones_are_not(export):

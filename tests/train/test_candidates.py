@@ -1,6 +1,7 @@
 """The candidates, and their order of cost."""
 
 import numpy as np
+import pytest
 
 from tests.train.test_agreement import TASKS
 from train.candidates import (
@@ -87,20 +88,31 @@ def test_settings_that_are_fixed_are_held():
     assert grid.neighbours == (2,)
 
 
-def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried():
-    for joints, sets in ((False, ("contact",)), (True, ("contact", "joints"))):
-        tried = candidates(TASKS, joints=joints, drawn=True)
-        assert [(candidate.sets, candidate.projection) for candidate in tried] == [
-            (sets, "lda")
-        ]
-        grids = [grid for candidate in tried for grid in candidate.grids]
-        assert min(min(grid.shrinkages) for grid in grids) == 0.3
-        # Ten directions at most: as many as the most components.
-        assert {grid.most_directions for grid in grids} == {10}
-        assert max(max(grid.components) for grid in grids) == 10
-    plain = [grid for candidate in candidates(TASKS) for grid in candidate.grids]
-    assert min(min(grid.shrinkages) for grid in plain) < 0.3
-    assert {grid.most_directions for grid in plain} == {None}
+def numbers_of(tried):
+    """The least shrinkage, and the most directions and components of candidates."""
+    grids = [grid for candidate in tried for grid in candidate.grids]
+    return {
+        "shrinkage": np.min([grid.shrinkages for grid in grids]),
+        "directions": {grid.most_directions for grid in grids},
+        "components": np.max([grid.components for grid in grids]),
+    }
+
+
+@pytest.mark.parametrize(
+    ("joints", "sets"), [(False, ("contact",)), (True, ("contact", "joints"))]
+)
+def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried(joints, sets):
+    (candidate,) = candidates(TASKS, joints=joints, drawn=True)
+    assert candidate.sets == sets
+    assert candidate.projection == "lda"
+    numbers = numbers_of([candidate])
+    assert numbers == {"shrinkage": 0.3, "directions": {10}, "components": 10}
+
+
+def test_of_other_things_less_shrinkage_and_all_directions_are_tried():
+    numbers = numbers_of(candidates(TASKS))
+    assert numbers["shrinkage"] < 0.3
+    assert numbers["directions"] == {None}
 
 
 def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():

@@ -1,6 +1,7 @@
 """The choice of settings and of the window."""
 
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,31 +23,35 @@ EARLY = ("contact", "contact joints", "sqrt_joints")
 TWO = ("max_force", "contact_area")
 
 
-@pytest.mark.parametrize("arm", [True, False])
-def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
-    arm, make_touch, tmp_path
-):
-    """The number of neighbours is that of the full window, as the graph has one."""
-    for kind in ("hard", "soft"):
-        for seed in range(6):
-            touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
-            save(tmp_path / f"{kind}-{seed}.npz", touch)
+def early_settings(make_touch, folder, arm, k):
+    """The settings before the full window, where those of the full window take k
+    neighbours."""
+    for kind, seed in product(("hard", "soft"), range(6)):
+        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
+        save(folder / f"{kind}-{seed}.npz", touch)
     tried = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    dataset = load_trials([tmp_path], Measurement(features_of(tried)))
+    dataset = load_trials([folder], Measurement(features_of(tried)))
     y = {"softness": dataset.labels("softness")}
     choosing = Choosing(dataset, y, tried, Divisions.of(dataset, y), samples=40)
-    k = 3
     chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
-    settings = choosing.early(1.2, chosen)
-    if not arm:
-        assert settings is None
-        return
+    return choosing.early(1.2, chosen)
+
+
+def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
+    make_touch, tmp_path
+):
+    settings = early_settings(make_touch, tmp_path, arm=True, k=3)
     early = settings.settings
     assert early.until_s == 1.2
     assert early.choices["softness"].features == expand(["contact", "joints"])
     assert len(early.by_fold) == 10
-    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {k}
+    # The number of neighbours is that of the full window, as the graph has one.
+    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
     assert settings.known == early
+
+
+def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
+    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
 
 
 @pytest.fixture
@@ -101,50 +106,62 @@ def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(se
     }
 
 
-def test_tasks_that_agree_are_scored_as_they_are_decided_together():
-    """Against models fitted without each fold; each task by itself decides
-    otherwise."""
+@pytest.fixture(scope="module")
+def agreeing():
+    """Trials of a category that is the pair of two other tasks' labels, the settings of
+    each task, and folds."""
     rng = np.random.default_rng(1)
-    mobility, softness = (
-        np.array(list(pair))[rng.integers(0, 2, 60)] for pair in ("fm", "rs")
-    )
-    y = {
-        "mobility": mobility,
-        "softness": softness,
-        "category": np.char.add(softness, mobility),
-    }
+    places = rng.integers(0, 2, (2, 60))
+    mobility = np.array(["f", "m"])[places[0]]
+    softness = np.array(["r", "s"])[places[1]]
+    category = np.char.add(softness, mobility)
+    y = {"mobility": mobility, "softness": softness, "category": category}
     X = rng.normal(size=(60, 6))
     X[:, 0] += mobility == "m"
     X[:, 3] += softness == "s"
     choices = {task: Choice("IV", 2, 3, "lda") for task in y}
-    folds = np.arange(60) % 5
+    return Vectors(X, y, TWO, (3, 3)), choices, np.arange(60) % 5
+
+
+@pytest.fixture(scope="module")
+def hits(agreeing):
+    """{task: whether models without a trial's fold name its label}, and the same of
+    category where it is decided by itself."""
+    vectors, choices, folds = agreeing
+    right = {task: np.zeros(60, dtype=bool) for task in (*choices, "alone")}
+    for fold in range(5):
+        test = folds == fold
+        X = vectors.X[test]
+        model = ContactClassifier.of(choices, vectors.part(~test))
+        said = {task: decision.labels for task, decision in model.decide(X).items()}
+        near = model.nearest("category", model.squares("category", X))
+        said["alone"] = vote(model.labels_["category"][near])
+        for task, labels in said.items():
+            of_task = "category" if task == "alone" else task
+            named = model.classes_[of_task][labels]
+            right[task][test] = named == vectors.y[of_task][test]
+    return right
+
+
+def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits):
+    vectors, choices, folds = agreeing
     none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
     chosen = {
         task: Chosen(choice, none_right, none_right, "trial")
         for task, choice in choices.items()
     }
     plans = {"trial": (folds, [choices] * 5)}
-    decided = decided_together(chosen, Vectors(X, y, TWO, (3, 3)), plans)
-    alone = np.zeros(60, dtype=bool)
-    together = {task: np.zeros(60, dtype=bool) for task in y}
-    for fold in range(5):
-        train = folds != fold
-        test = folds == fold
-        model = ContactClassifier(choices, TWO, (3, 3))
-        model.fit(X[train], {task: labels[train] for task, labels in y.items()})
-        for task, (labels, *_) in model.decide(X[test]).items():
-            together[task][test] = model.classes_[task][labels] == y[task][test]
-        near = model.nearest("category", model.squares("category", X[test]))
-        votes = vote(model.labels_["category"][near])
-        alone[test] = model.classes_["category"][votes] == y["category"][test]
-    for task, settings in decided.items():
-        assert (settings.accuracy.hits == together[task]).all()
-        assert (
-            settings.accuracy.right == settings.by_trial.right == together[task].sum()
-        )
+    for task, settings in decided_together(chosen, vectors, plans).items():
+        assert (settings.accuracy.hits == hits[task]).all()
+        assert settings.accuracy.right == hits[task].sum()
+        assert settings.by_trial.right == hits[task].sum()
         assert settings.by_fold == (choices,) * 5
-    assert (together["category"] == (together["mobility"] & together["softness"])).all()
-    assert (alone != together["category"]).any()
+
+
+def test_a_category_is_right_where_both_of_its_factors_are(hits):
+    both = hits["mobility"] & hits["softness"]
+    assert (hits["category"] == both).all()
+    assert (hits["category"] != hits["alone"]).any()
 
 
 FEW = {
@@ -169,23 +186,36 @@ def touches(make_touch, folder, seconds, late_s):
     return str(folder)
 
 
-def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(
-    make_touch, tmp_path
-):
-    late = touches(make_touch, tmp_path / "late", 6.0, 1.8)
-    fitted = train.fit(late, **FEW)
-    assert fitted.window_s == 2.4
-    told = fitted.chosen["kind"]
+@pytest.fixture(scope="module")
+def late(make_touch, tmp_path_factory):
+    """A model of touches that differ from 1.8 s on."""
+    return train.fit(
+        touches(make_touch, tmp_path_factory.mktemp("late"), 6.0, 1.8), **FEW
+    )
+
+
+def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(late):
+    assert late.window_s == 2.4
+    (note,) = [note for note in late.notes if "the window is" in note]
+    assert "the window is 2.4 s" in note
+    assert "100% at 2.4 s, 100% at 4.8 s" in note
+
+
+def test_accuracies_are_those_at_the_chosen_window(late):
+    told = late.chosen["kind"]
     for result in (told.accuracy, told.by_trial, *told.candidates):
         assert result.accuracy == 1.0
         assert result.interval == wilson(8, 8)
-    (note,) = [note for note in fitted.notes if "the window is" in note]
-    assert "the window is 2.4 s" in note
-    assert "100% at 2.4 s, 100% at 4.8 s" in note
-    points = fitted.sequential.decision_points_s
+
+
+def test_a_longer_window_has_no_more_decision_points(late):
+    points = late.sequential.decision_points_s
     assert points[-1] == 2.4
     assert len(points) <= 12
-    early = train.fit(touches(make_touch, tmp_path / "early", 6.0, 0.4), **FEW)
+
+
+def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_path):
+    early = train.fit(touches(make_touch, tmp_path, 6.0, 0.4), **FEW)
     assert early.window_s == 1.2
 
 

@@ -240,6 +240,18 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
         series_of(touch(PEAKS, joints=angles), ["joint_change"], joints=joints)
 
 
+def exactly(transform, forces):
+    """The transformed forces of fractions of a newton, to 40 digits."""
+    with mpmath.workdps(40):
+        exact = [mpmath.mpf(force.numerator) / force.denominator for force in forces]
+        transformed = {
+            "log": lambda force: mpmath.log(force + mpmath.mpf(1) / 10),
+            "sqrt": mpmath.sqrt,
+            "relative": lambda force: force / max(exact),
+        }[transform]
+        return [float(transformed(force)) for force in exact]
+
+
 @settings(max_examples=30)
 @given(
     peaks=st.lists(st.integers(10, 65535), min_size=5, max_size=5),
@@ -247,17 +259,9 @@ def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):
 )
 def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transform):
     seen = vector_of(touch(peaks), f"{transform}_skin_force")
-    force = [Fraction(p + (p // 2 if p // 2 > 9 else 0), 100) for p in peaks]
-    with mpmath.workdps(40):
-        exact = [mpmath.mpf(f.numerator) / f.denominator for f in force]
-        if transform == "log":
-            exact = [mpmath.log(v + mpmath.mpf(1) / 10) for v in exact]
-        elif transform == "sqrt":
-            exact = [mpmath.sqrt(v) for v in exact]
-        else:
-            exact = [v / max(exact) for v in exact]
-        exact = [float(v) for v in exact]
+    halves = [peak // 2 if peak // 2 > SKIN.threshold_counts else 0 for peak in peaks]
+    forces = [Fraction(p + half, 100) for p, half in zip(peaks, halves, strict=True)]
+    roundings = 4 * 2.0**-53
     # A logarithm near 0 keeps the rounding of its argument.
-    assert seen == pytest.approx(
-        exact, rel=4 * 2.0**-53, abs=4 * 2.0**-53 if transform == "log" else 0
-    )
+    rest = roundings if transform == "log" else 0
+    assert seen == pytest.approx(exactly(transform, forces), rel=roundings, abs=rest)

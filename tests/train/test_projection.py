@@ -118,37 +118,24 @@ def exact_distances(rows, labels, shrinkage):
     """Squared distances of integer rows among their discriminants, to 50 digits."""
     with mpmath.workdps(50):
         n = len(rows)
-        classes = sorted(set(labels))
         X = mpmath.matrix(rows)
-        mean = mpmath.matrix([[mpmath.fsum(X[:, j]) / n for j in range(X.cols)]])
-        own = {c: [i for i, label in enumerate(labels) if label == c] for c in classes}
-        means = {
-            c: sum((X[i, :] for i in m), 0 * mean) / len(m) for c, m in own.items()
-        }
-        within = sum(
-            (
-                (X[i, :] - means[c]).T * (X[i, :] - means[c])
-                for c in classes
-                for i in own[c]
-            ),
-            mpmath.zeros(X.cols),
-        )
-        between = sum(
-            (len(own[c]) * (means[c] - mean).T * (means[c] - mean) for c in classes),
-            mpmath.zeros(X.cols),
-        )
-        total = sum((X[i, j] - mean[j]) ** 2 for i in range(n) for j in range(X.cols))
-        shrunk = within + shrinkage * total / n * mpmath.eye(X.cols)
+        centred = X - mpmath.ones(n) * X / n
+        # The mean of each row's class.
+        shares = [
+            [mpmath.mpf(a == b) / labels.count(b) for b in labels] for a in labels
+        ]
+        means = mpmath.matrix(shares) * centred
+        scatter = centred.T * centred
+        between = means.T * means
+        ridge = shrinkage * sum(scatter[i, i] for i in range(X.cols)) / n
+        shrunk = scatter - between + ridge * mpmath.eye(X.cols)
         # With shrunk = L L', the directions are L'^-1 v for the eigenvectors v of L^-1
         # B L'^-1.
         inverse = mpmath.cholesky(shrunk) ** -1
         values, vectors = mpmath.eigsy(inverse * between * inverse.T)
-        out = np.zeros((n, n))
-        for k in range(X.cols):
-            if values[k] > mpmath.mpf(10) ** -20:
-                z = X * (inverse.T * vectors[:, k]) * mpmath.sqrt(n)
-                out += [[float((z[i] - z[j]) ** 2) for j in range(n)] for i in range(n)]
-        return out
+        z = np.array((X * inverse.T * vectors * mpmath.sqrt(n)).tolist())
+        z = z[:, np.array(values.tolist())[:, 0] > mpmath.mpf(10) ** -20]
+        return ((z[:, None] - z) ** 2).sum(axis=2).astype(float)
 
 
 ROWS = [
