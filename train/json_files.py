@@ -3,19 +3,21 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from edge.config import decode_json, parse_json
+from edge.config import ConfigTable, decode_json, parse_json
 from edge.files import parsing, read_bytes
 
 
-def read_json(path: str | os.PathLike[str]) -> Any:
-    """The value of a JSON file; see `edge.config.parse_json`.
+def json_table(path: Path) -> ConfigTable:
+    """The table in a JSON file, which is empty where there is no such file.
 
     Raises:
-        InputError: it cannot be read, or is not JSON.
+        InputError: the file cannot be read, or is no JSON table.
     """
-    return parse_json(read_bytes(path), os.fspath(path))
+    raw = parse_json(read_bytes(path), str(path)) if path.is_file() else {}
+    return ConfigTable(raw, str(path))
 
 
 @contextmanager

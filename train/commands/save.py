@@ -10,7 +10,7 @@ taxels in `frames`.
 import argparse
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -77,11 +77,6 @@ def check_alike(paths: Sequence[Path], recordings: Sequence[Recording]) -> None:
             )
 
 
-def tasks_of(recordings: Sequence[Recording]) -> list[str]:
-    """The tasks for which some recording has a label."""
-    return sorted(set().union(*(recording.labels for recording in recordings)))
-
-
 def valid_of(recording: Recording) -> NDArray[np.bool_]:
     """(n, rows, cols) which taxels could be read."""
     valid = np.True_ if recording.valid is None else recording.valid
@@ -90,7 +85,7 @@ def valid_of(recording: Recording) -> NDArray[np.bool_]:
 
 def joint_columns(recording: Recording) -> list[str]:
     """A name for each joint."""
-    names = recording.joint_names or [str(i + 1) for i in range(recording.dof or 0)]
+    names = recording.joint_names or range(1, (recording.dof or 0) + 1)
     return [f"joint_{name}" for name in names]
 
 
@@ -100,14 +95,14 @@ class Long:
 
     Attributes:
         trial: (n,) name of each frame's recording.
-        labels: {task: (n,) labels; None where a recording has none}.
+        labels: (n, tasks) by the task's name; empty where a recording has none.
         t: (n,) seconds.
         frames, valid, shear, joints: as those of `Recording`; None where they are.
         joint_columns: a name for each joint.
     """
 
     trial: NDArray[Any]
-    labels: Mapping[str, NDArray[Any]]
+    labels: pd.DataFrame
     t: NDArray[np.float64]
     frames: NDArray[np.uint16]
     valid: NDArray[np.bool_]
@@ -118,21 +113,23 @@ class Long:
     @classmethod
     def of(cls, names: Sequence[str], recordings: Sequence[Recording]) -> Self:
         """The frames of recordings that fit together."""
+
+        def joined(name: str) -> Any:
+            parts = [getattr(recording, name) for recording in recordings]
+            return None if parts[0] is None else np.concatenate(parts)
+
         lengths = [len(recording.t) for recording in recordings]
-        labels = {}
-        for task in tasks_of(recordings):
-            texts = [recording.labels.get(task) for recording in recordings]
-            labels[task] = np.repeat(np.array(texts, dtype=object), lengths)
-        shear = [r.shear for r in recordings if r.shear is not None]
-        joints = [r.joints for r in recordings if r.joints is not None]
+        row = np.repeat(np.arange(len(lengths)), lengths)
+        labels = pd.DataFrame([r.labels for r in recordings])
+        labels = labels.sort_index(axis=1).iloc[row].reset_index(drop=True)
         return cls(
-            trial=np.repeat(np.array(names, dtype=object), lengths),
+            trial=np.array(names, dtype=object)[row],
             labels=labels,
-            t=np.concatenate([recording.t for recording in recordings]),
-            frames=np.concatenate([recording.frames for recording in recordings]),
-            valid=np.concatenate([valid_of(recording) for recording in recordings]),
-            shear=np.concatenate(shear) if shear else None,
-            joints=np.concatenate(joints) if joints else None,
+            t=joined("t"),
+            frames=joined("frames"),
+            valid=np.concatenate(list(map(valid_of, recordings))),
+            shear=joined("shear"),
+            joints=joined("joints"),
             joint_columns=joint_columns(recordings[0]),
         )
 
@@ -140,15 +137,16 @@ class Long:
         """A column for each taxel, and for each axis of its shear."""
         columns: dict[str, Any] = {}
         places = list(np.ndindex(self.frames.shape[1:]))
+        missing = ~self.valid
         for row, col in places:
-            counts = pd.array(self.frames[:, row, col], dtype="UInt16")
-            counts[~self.valid[:, row, col]] = pd.NA
-            columns[f"taxel_{row}_{col}"] = counts
+            counts = self.frames[:, row, col]
+            array = pd.arrays.IntegerArray(counts, missing[:, row, col])
+            columns[f"taxel_{row}_{col}"] = array
         if self.shear is not None:
             for row, col in places:
-                shear = self.shear[:, row, col]
-                columns[f"taxel_{row}_{col}_along"] = shear[:, 0]
-                columns[f"taxel_{row}_{col}_around"] = shear[:, 1]
+                along, around = self.shear[:, row, col].T
+                columns[f"taxel_{row}_{col}_along"] = along
+                columns[f"taxel_{row}_{col}_around"] = around
         return columns
 
 
@@ -185,16 +183,13 @@ def write_hdf5(out: Path, long: Long) -> None:
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as target:
         target.create_dataset("trial", data=long.trial, dtype=text)
-        for task, labels in long.labels.items():
-            texts = [label or "" for label in labels]
-            target.create_dataset(f"labels/{task}", data=texts, dtype=text)
-        target["t"] = long.t
-        target["frames"] = long.frames
-        target["valid"] = long.valid
-        if long.shear is not None:
-            target["shear"] = long.shear
+        for task, labels in long.labels.fillna("").items():
+            target.create_dataset(f"labels/{task}", data=labels, dtype=text)
+        for name in ("t", "frames", "valid", "shear", "joints"):
+            array = getattr(long, name)
+            if array is not None:
+                target[name] = array
         if long.joints is not None:
-            target["joints"] = long.joints
             target["joints"].attrs["names"] = long.joint_columns
     with write_whole(out) as file:
         file.write(buffer.getvalue())

@@ -2,10 +2,11 @@
 
 import argparse
 import io
+import math
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pandas as pd
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
 
 from edge.config import shown
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
-from train.importers.reading import EMPTY, LARGEST_BYTES, Table, needs
+from train.importers.reading import EMPTY, LARGEST_BYTES, Table, needs, numbered
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = LARGEST_BYTES // 8
@@ -30,58 +31,56 @@ def read_arrays(path: Path) -> Arrays:
     Raises:
         InputError: the file cannot be read, or is too large.
     """
-    with parsing(str(path), "a table", "; save it as text"):
-        data = read_bytes(path, LARGEST_BYTES)
+    data = read_bytes(path, LARGEST_BYTES)
+    file = io.BytesIO(data)
+    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
         suffix = path.suffix.lower()
         if suffix == ".npy":
-            stored = {"": np.lib.format.read_array(io.BytesIO(data))}
-            _check_size(path, stored[""].size)
+            stored = {"": np.lib.format.read_array(file)}
+            _check_size(stored[""].size)
         elif suffix == ".npz":
-            stored = _npz(path, data)
+            stored = _npz(file)
         elif suffix == ".mat" and not data.startswith(b"MATLAB 7.3"):
-            stored = _mat(path, data)
+            stored = _mat(file)
         else:
-            stored = _hdf5(path, data)
-        return {
-            name: array
-            for name, array in stored.items()
-            if isinstance(array, np.ndarray)
-        }
+            stored = _hdf5(file)
+    return {
+        name: array for name, array in stored.items() if isinstance(array, np.ndarray)
+    }
 
 
-def _npz(path: Path, data: bytes) -> Arrays:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        _check_size(path, sum(item.file_size for item in archive.infolist()) // 8)
-    return dict(np.load(io.BytesIO(data)))
+def _npz(file: BinaryIO) -> Arrays:
+    with zipfile.ZipFile(file) as archive:
+        _check_size(sum(item.file_size for item in archive.infolist()) // 8)
+    return dict(np.load(file))
 
 
-def _mat(path: Path, data: bytes) -> Arrays:
-    sizes = whosmat(io.BytesIO(data))
-    _check_size(path, sum(int(np.prod(shape, dtype=object)) for _, shape, _ in sizes))
-    contents = loadmat(io.BytesIO(data))
+def _mat(file: BinaryIO) -> Arrays:
+    _check_size(sum(math.prod(shape) for _, shape, _ in whosmat(file)))
+    contents = loadmat(file)
     return {name: value for name, value in contents.items() if name[:2] != "__"}
 
 
-def _hdf5(path: Path, data: bytes) -> Arrays:
-    with needs("h5py", f"{path}: reading HDF5 and MATLAB 7.3"):
+def _hdf5(file: BinaryIO) -> Arrays:
+    with needs("h5py", "reading HDF5 and MATLAB 7.3"):
         import h5py
     arrays: Arrays = {}
 
     def collect(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset):
-            _check_size(path, int(np.prod(item.shape, dtype=object)))
+            _check_size(math.prod(item.shape or ()))
             arrays[name.replace("/", ".")] = item[()]
 
-    with h5py.File(io.BytesIO(data), "r") as file:
-        file.visititems(collect)
+    with h5py.File(file, "r") as stored:
+        stored.visititems(collect)
     return arrays
 
 
-def _check_size(path: Path, values: int) -> None:
+def _check_size(values: int) -> None:
     if values > MOST_VALUES:
         raise InputError(
-            f"{path}: holds {values} values, more than the {MOST_VALUES} that are read; "
-            "save it in parts"
+            f"holds {values} values, more than the {MOST_VALUES} that are read; save it "
+            "in parts"
         )
 
 
@@ -97,11 +96,11 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
     Raises:
         InputError: no axis, or more than one, can be the time's.
     """
-    axis = None if options.axis is None else options.axis - 1
     numbers = _numbers(arrays, options)
     if not numbers:
-        raise InputError(f"{path}: {EMPTY}")
-    frames = _frames(path, numbers, axis)
+        raise InputError(EMPTY)
+    axis = None if options.axis is None else options.axis - 1
+    frames = _frames(numbers, axis)
     names: list[str] = []
     blocks: list[NDArray[Any]] = []
     form: list[str] = []
@@ -110,20 +109,21 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
         if array.size == 1 != frames:
             continue
         title = name or "the array"
-        place = _time_axis(path, title, array, frames, axis)
+        place = _time_axis(title, array, frames, axis)
         if array.ndim > 1:
             form.append(f"time is axis {place + 1} of {title}")
         if array.ndim > 3:
             raise InputError(
-                f"{path}: {title} has {array.ndim} dimensions; give --trials where the "
-                "first is the trial, or save frames x rows x columns"
+                f"{title} has {array.ndim} dimensions; give --trials where the first is "
+                "the trial, or save frames x rows x columns"
             )
         time_first = np.moveaxis(array, place, 0)
         if array.ndim == 3:
             shape = time_first.shape[1:]
         block = time_first.reshape(frames, -1)
-        names += _names(name, block.shape[1])
         blocks.append(block)
+        is_column = name and block.shape[1] == 1
+        names += [name] if is_column else numbered(name, block.shape[1])
     data = pd.DataFrame(np.hstack(blocks), columns=names)
     return Table(path, data, named="" not in numbers, shape=shape, form=tuple(form))
 
@@ -137,7 +137,7 @@ def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
         by_name = name in named or name == "trial" or TIME.fullmatch(name)
         is_used = by_name or not options.taxels or not named
         if is_used and array.dtype.kind in "iufb" and array.size:
-            numbers[name] = array.reshape(-1) if _is_vector(array) else array
+            numbers[name] = array.ravel() if _is_vector(array) else array
     return numbers
 
 
@@ -147,13 +147,7 @@ def _is_vector(array: NDArray[Any]) -> bool:
     return array.ndim == 0 or (array.ndim == 2 and 1 in array.shape)
 
 
-def _names(name: str, columns: int) -> list[str]:
-    if columns == 1 and name:
-        return [name]
-    return [f"{name}.{i}".strip(".") for i in range(1, columns + 1)]
-
-
-def _frames(path: Path, arrays: Arrays, axis: int | None) -> int:
+def _frames(arrays: Arrays, axis: int | None) -> int:
     """The number of frames: that of the times, or what all arrays share."""
     for name, array in arrays.items():
         if TIME.fullmatch(name) and array.ndim == 1:
@@ -161,43 +155,39 @@ def _frames(path: Path, arrays: Arrays, axis: int | None) -> int:
     largest = max(arrays.values(), key=np.size)
     if axis is not None:
         if axis >= largest.ndim:
-            raise InputError(f"{path}: --axis must be 1 to {largest.ndim}")
+            raise InputError(f"--axis must be 1 to {largest.ndim}")
         return int(largest.shape[axis])
     if len(arrays) == 1:
         return len(largest)
-    shared = set.intersection(*(set(array.shape) for array in arrays.values()))
+    sizes = {name: array.shape for name, array in arrays.items()}
+    shared = set.intersection(*map(set, sizes.values()))
     if len(shared) == 1:
         return int(shared.pop())
-    sizes = {name: array.shape for name, array in arrays.items()}
     raise InputError(
-        f"{path}: which axis is the time? The arrays are {shown(sizes)}; give --axis, "
-        "or name those to be used by --taxels and --joints"
+        f"which axis is the time? The arrays are {shown(sizes)}; give --axis, or name "
+        "those to be used by --taxels and --joints"
     )
 
 
-def _time_axis(
-    path: Path, title: str, array: NDArray[Any], frames: int, axis: int | None
-) -> int:
+def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -> int:
     """The axis of an array that has so many entries."""
     places = [place for place, size in enumerate(array.shape) if size == frames]
     if axis in places:
         return axis
     if not places:
         raise InputError(
-            f"{path}: {title} of {array.shape} has no axis of {frames} frames; name "
-            "those to be used by --taxels and --joints, or give --axis"
+            f"{title} of {array.shape} has no axis of {frames} frames; name those to be "
+            "used by --taxels and --joints, or give --axis"
         )
     if len(places) > 1:
         raise InputError(
-            f"{path}: which axis of {title} {array.shape} is the time? Give --axis"
+            f"which axis of {title} {array.shape} is the time? Give --axis"
         )
     return places[0]
 
 
-def trials_of(
-    path: Path, arrays: Arrays, task: str
-) -> Iterator[tuple[str, dict[str, str], Arrays]]:
-    """The name, labels and arrays of each trial of a file that holds several.
+def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Arrays]]:
+    """The labels and arrays of each trial of a file that holds several.
 
     Trials are the entries of a cell array or of a structure, or the first axis that all
     arrays share. What is a text or a number for each trial is a label, named by its
@@ -206,13 +196,12 @@ def trials_of(
     Raises:
         InputError: the arrays do not share an axis of trials.
     """
-    entries = _entries(path, arrays)
-    count = len(next(iter(entries.values())))
-    for i in range(count):
+    entries = _entries(arrays)
+    for values in zip(*entries.values(), strict=True):
         labels: dict[str, str] = {}
         of_trial: Arrays = {}
-        for name, values in entries.items():
-            value = np.asarray(values[i])
+        for name, stored in zip(entries, values, strict=True):
+            value = np.asarray(stored)
             if value.dtype.names:  # a structure within it is no value
                 continue
             if value.size == 1:  # without the array that MATLAB puts around a value
@@ -222,19 +211,10 @@ def trials_of(
                 labels[task if is_label else name] = str(value)
             else:
                 of_trial[name] = value
-        yield f"{path.stem}_{i:03}", labels, of_trial
+        yield labels, of_trial
 
 
-def _of_structures(cells: NDArray[Any]) -> NDArray[Any]:
-    """Cells as one array of structures, where each is a structure of equal fields."""
-    structures = [np.ravel(cell) for cell in cells.flat]
-    names = {structure.dtype.names for structure in structures}
-    if len(names) != 1 or None in names or any(len(s) != 1 for s in structures):
-        return cells
-    return np.concatenate(structures)
-
-
-def _entries(path: Path, arrays: Arrays) -> Arrays:
+def _entries(arrays: Arrays) -> Arrays:
     """The entries of each array or field, one for each trial."""
     entries: Arrays = {}
     for name, stored in arrays.items():
@@ -247,10 +227,19 @@ def _entries(path: Path, arrays: Arrays) -> Arrays:
             entries[name] = array
     sizes = {name: len(values) for name, values in entries.items()}
     if not any(sizes.values()):
-        raise InputError(f"{path}: {EMPTY}")
+        raise InputError(EMPTY)
     if len(set(sizes.values())) != 1:
         raise InputError(
-            f"{path}: its arrays have {shown(sizes)} trials; leave out the arrays "
-            "that do not have one entry for each trial"
+            f"its arrays have {shown(sizes)} trials; leave out the arrays that do not "
+            "have one entry for each trial"
         )
     return entries
+
+
+def _of_structures(cells: NDArray[Any]) -> NDArray[Any]:
+    """Cells as one array of structures, where each is a structure of equal fields."""
+    structures = [np.ravel(cell) for cell in cells.flat]
+    kinds = {(structure.dtype.names, len(structure)) for structure in structures}
+    if len(kinds) == 1 and structures[0].dtype.names and len(structures[0]) == 1:
+        return np.concatenate(structures)
+    return cells

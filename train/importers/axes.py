@@ -3,18 +3,20 @@
 import argparse
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from edge.config import shown
 from edge.errors import InputError
-from train.importers.reading import Table, numbers_of
+from train.importers.reading import Table, numbered
 
-LETTERS = "xyz"
-LAST = re.compile(r"(?P<stem>.*?\d)[ _.-]*(?P<axis>[xyz])", re.I)
+LETTERS = list("xyz")
+LAST = re.compile(r"(?P<word>.*?\d)(?P<rest>)[ _.-]*(?P<axis>[xyz])", re.I)
 """A name that ends in its axis, such as s1_x or force2Z."""
 FIRST = re.compile(r"(?P<word>[a-z]*?)(?P<axis>[xyz])[ _.-]*(?P<rest>\d.*)", re.I)
 """A name with its axis before its number, such as Fx_1, z12, or x.3 of an array x."""
@@ -26,7 +28,7 @@ def axis_letters(text: str) -> str:
     Raises:
         ArgumentTypeError: they are not x, y and z in some order.
     """
-    if sorted(text.lower()) != list(LETTERS):
+    if sorted(text.lower()) != LETTERS:
         raise argparse.ArgumentTypeError(
             f"must be x, y and z in some order, such as xyz, not {text[:20]!r}"
         )
@@ -61,7 +63,7 @@ class Axes:
     flipped: str = ""
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> "Axes | None":
+    def of(cls, options: argparse.Namespace) -> Self | None:
         """The axes that the options name; None for one axis.
 
         Raises:
@@ -74,11 +76,9 @@ class Axes:
             raise InputError("--flip needs --axes, such as --axes xyz")
         return None
 
-    def split(
-        self, values: NDArray[np.float64], where: object
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Normal values (n, taxels) and shear (n, taxels, 2) of values (n, ..., 3) of
-        x, y and z.
+    def split(self, values: NDArray[np.float64], where: object) -> NDArray[np.float64]:
+        """(n, taxels, 3) the normal axis, and those along the rows and around the
+        columns, of values (n, ..., 3) of x, y and z.
 
         Raises:
             InputError: the values of a taxel are not three.
@@ -87,10 +87,10 @@ class Axes:
             raise InputError(
                 f"{where}: --axes needs values of x, y and z, not {values.shape[1:]}"
             )
-        signs = [-1.0 if letter in self.flipped else 1.0 for letter in LETTERS]
+        signs = np.where(np.isin(LETTERS, list(self.flipped)), -1.0, 1.0)
         turned = values.reshape(len(values), -1, 3) * signs
-        places = [LETTERS.index(letter) for letter in (self.along, self.around)]
-        return turned[..., LETTERS.index(self.normal)], turned[..., places]
+        places = map(LETTERS.index, (self.normal, self.along, self.around))
+        return turned[..., list(places)]
 
     @property
     def text(self) -> str:
@@ -102,43 +102,36 @@ class Axes:
         )
 
 
-@dataclass(frozen=True)
-class Parted:
-    """A table whose taxels have three axes.
+@dataclass(frozen=True, kw_only=True)
+class Parted(Table):
+    """A table of the normal axis, by names without the letter, and all other columns.
 
     Attributes:
         whole: the table as it stands.
-        table: its normal axis, by names without the letter, and all other columns.
-        columns: {name of a taxel: {letter of an axis: its column in the whole table}}.
+        axes: the columns of the whole table, a row for each taxel, a column for each
+            letter.
     """
 
     whole: Table
-    table: Table
-    columns: Mapping[str, Mapping[str, str]]
+    axes: pd.DataFrame
 
-    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
+    def values(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(n, taxels, 3) values x, y and z of some taxels.
 
         Raises:
             InputError: one of them has no such columns.
         """
-        for name in taxels:
-            if name not in self.columns:
-                raise InputError(f"{self.whole.path}: taxel {name} has one axis alone")
-        numbers = [
-            numbers_of(self.whole, self.columns[name][letter])
-            for name in taxels
-            for letter in LETTERS
-        ]
-        return np.column_stack(numbers).reshape(-1, len(taxels), 3)
+        for name in names:
+            if name not in self.axes.index:
+                raise InputError(f"{self.path}: taxel {name} has one axis alone")
+        columns = self.axes.loc[list(names)].to_numpy()
+        return self.whole.numbers(columns.flat).reshape(-1, *columns.shape)
 
 
 def lettered(name: str) -> tuple[str, str] | None:
     """The letter of a column's axis, and its name without it; None without one."""
-    if last := LAST.fullmatch(name):
-        return last["axis"].lower(), last["stem"]
-    if first := FIRST.fullmatch(name):
-        return first["axis"].lower(), first["word"] + first["rest"]
+    if match := LAST.fullmatch(name) or FIRST.fullmatch(name):
+        return match["axis"].lower(), match["word"] + match["rest"]
     return None
 
 
@@ -156,57 +149,62 @@ def parted(table: Table, normal: str) -> Parted:
     Raises:
         InputError: the columns of the axes do not belong together.
     """
-    lettered_columns = _by_letters(table)
-    columns = lettered_columns or _three_by_three(table)
-    odd = sorted(taxel for taxel, axes in columns.items() if len(axes) < 3)
-    if odd:
+    axes = _by_letters(table)
+    shape = table.shape
+    if axes.empty:
+        axes = _three_by_three(table)
+        shape = ()
+    odd = axes.index[axes.isna().any(axis=1)]
+    if len(odd):
         raise InputError(
-            f"{table.path}: {shown(odd[:3])} lacks one of the axes x, y, z; leave --axes "
-            "out, or mend the names"
+            f"{table.path}: {shown(sorted(odd)[:3])} lacks one of the axes x, y, z; "
+            "leave --axes out, or mend the names"
         )
-    of_axes = {name for axes in columns.values() for name in axes.values()}
-    normals = {axes[normal]: taxel for taxel, axes in columns.items()}
-    others = [name for name in table.names if name not in of_axes]
-    of_normal = [name for name in table.names if name in normals]
-    data = table.data[[*others, *of_normal]].rename(columns=normals)
+    taxel_of = dict(zip(axes[normal], axes.index, strict=True))
+    others = table.data.drop(columns=axes.to_numpy().ravel())
+    normals = table.data[[name for name in table.names if name in taxel_of]]
+    data = pd.concat([others, normals.rename(columns=taxel_of)], axis=1)
     if not data.columns.is_unique:
         twice = data.columns[data.columns.duplicated()][0]
         raise InputError(
             f"{table.path}: {twice} names a column and a taxel of three axes; rename one "
             "of them"
         )
-    shape = table.shape if lettered_columns else ()
-    part = replace(table, data=data, shape=shape, file_names=())
-    return Parted(table, part, columns)
+    return Parted(
+        path=table.path,
+        data=data,
+        named=table.named,
+        shape=shape,
+        form=table.form,
+        whole=table,
+        axes=axes,
+    )
 
 
-def _by_letters(table: Table) -> dict[str, dict[str, str]]:
-    """{taxel: {letter: column}} of the columns whose names have a letter."""
+def _by_letters(table: Table) -> pd.DataFrame:
+    """The columns whose names have a letter: a row for each taxel, a column for each
+    letter."""
     columns: dict[str, dict[str, str]] = defaultdict(dict)
     for name in table.names:
         if parts := lettered(name):
             letter, taxel = parts
             columns[taxel][letter] = name
-    return columns
+    return pd.DataFrame(columns, index=LETTERS).T
 
 
-def _three_by_three(table: Table) -> dict[str, dict[str, str]]:
-    """{taxel: {letter: column}} of a table whose values stand in threes.
+def _three_by_three(table: Table) -> pd.DataFrame:
+    """The columns of a table whose values stand in threes, as `_by_letters`.
 
     Raises:
         InputError: they do not.
     """
-    threes = {stem: n for stem, n in table.arrays.items() if len(n) % 3 == 0}
+    threes = [names for names in table.arrays.values() if len(names) % 3 == 0]
     is_array = table.shape[-1:] == (3,)
     if (table.named and not is_array) or len(threes) != 1:
         raise InputError(
             f"{table.path}: no columns are named by an axis, such as s1_x, s1_y and "
             f"s1_z; it has {shown(table.names)}"
         )
-    ((stem, names),) = threes.items()
-    return {
-        f"{stem}.{place + 1}".strip("."): dict(
-            zip(LETTERS, names[3 * place : 3 * place + 3], strict=True)
-        )
-        for place in range(len(names) // 3)
-    }
+    names = np.reshape(threes[0], (-1, 3))
+    stem = threes[0][0].rpartition(".")[0]
+    return pd.DataFrame(names, numbered(stem, len(names)), LETTERS)

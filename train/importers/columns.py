@@ -4,9 +4,8 @@ out."""
 import argparse
 import math
 import re
-from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from edge.config import shown
 from edge.errors import InputError
 from train.importers.axes import lettered
-from train.importers.reading import Table, numbers_of
+from train.importers.reading import Table, numbered, numbers_of
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 UNITS = (*UNITS_S, "iso")
@@ -28,8 +27,9 @@ TIME = re.compile(
 )
 """Names of a column of times, with its unit if they tell it."""
 ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
-RUNNING = re.compile(
-    r"(?P<stem>.*?)(?P<first>\d{1,9})(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?"
+RUNNING = (
+    r"\A(?P<stem>.*?)(?P<first>\d{1,9})"
+    r"(?:(?:[_x]|, ?|\]\[)(?P<second>\d{1,9}))?\]?\Z"
 )
 """A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2]."""
 EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
@@ -39,9 +39,6 @@ DOUBTFUL_BELOW = 3.0
 """Median steps that are certainly seconds, and that may be seconds or milliseconds."""
 LONGEST_STEPS = {"s": SECONDS_AT_MOST, "ms": 2e3, "us": 2e6, "ns": math.inf}
 """Longest median steps that are taken for these units."""
-
-_Number = tuple[int, int, str]
-"""The numbers in a name, the second 0 if it has one, and the name."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +54,13 @@ class Meaning:
         unit_from: how the unit is known.
     """
 
-    taxels: tuple[str, ...]
-    joints: tuple[str, ...]
-    left_out: tuple[str, ...]
+    taxels: list[str]
+    joints: list[str]
+    left_out: list[str]
     shape: tuple[int, ...]
     time: str | None
-    unit: str = "s"
-    unit_from: str = ""
+    unit: str
+    unit_from: str
 
     def text(self, label: str, shape: Sequence[int]) -> str:
         """A line that says what was taken."""
@@ -121,8 +118,7 @@ def _term(table: Table, term: str) -> list[str]:
     if parts:
         return parts
     ends = term.split("-")
-    numbers = [str(number) for number in range(1, len(names) + 1)]
-    for places in (names, numbers):
+    for places in (names, numbered("", len(names))):
         if len(ends) <= 2 and set(ends) <= set(places):
             first = places.index(ends[0])
             last = places.index(ends[-1])
@@ -152,13 +148,10 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
                 f"{table.path}: column {name} is named both as a taxel and as time or "
                 "joint"
             )
-    left_out = tuple(name for name in rest if name not in taxels)
-    shape = table.shape or shape
-    known = Meaning(tuple(taxels), tuple(joints), left_out, shape, time)
-    if time is None:
-        return known
+    left_out = [name for name in rest if name not in taxels]
     unit, source = _unit(table, time, options)
-    return replace(known, unit=unit, unit_from=source)
+    shape = table.shape or shape
+    return Meaning(taxels, joints, left_out, shape, time, unit, source)
 
 
 def _time_column(
@@ -170,23 +163,27 @@ def _time_column(
         if len(times) > 1:
             raise InputError(f"{table.path}: --time names several columns; name one")
     else:
-        times = [n for n in table.names if TIME.fullmatch(n) and n not in joints]
-        dates = [name for name in table.names if is_date(table, name)]
-        if not times and len(dates) == 1:
-            times = dates
+        times = _times(table, joints)
     if not times and options.rate is None:
         raise InputError(
             f"{table.path}: no column is a time; give --rate HZ or --time COL"
         )
     if not times:
         return None
-    time = times[0]
     if options.rate is not None:
         raise InputError(
-            f"{table.path}: has a column of times, {quoted(time)}, beside --rate; "
+            f"{table.path}: has a column of times, {quoted(times[0])}, beside --rate; "
             "leave --rate out, or name another time by --time"
         )
-    return time
+    return times[0]
+
+
+def _times(table: Table, joints: Sequence[str]) -> list[str]:
+    """The columns that are called a time, or else the only one of dates."""
+    named = filter(TIME.fullmatch, table.names)
+    times = [name for name in named if name not in joints]
+    dates = [name for name in table.names if is_date(table, name)]
+    return times or dates * (len(dates) == 1)
 
 
 def is_date(table: Table, name: str) -> bool:
@@ -203,11 +200,10 @@ def _taxels(
     """The taxels, and their shape where their names tell it."""
     if options.taxels:
         return columns(table, options.taxels), ()
-    if table.shape:
-        size = math.prod(table.shape)
-        arrays = [names for names in table.arrays.values() if len(names) == size]
-        if len(arrays) == 1:
-            return arrays[0], ()
+    arrays = table.arrays.values()
+    whole = [names for names in arrays if len(names) == math.prod(table.shape)]
+    if table.shape and len(whole) == 1:
+        return whole[0], ()
     if table.named or not rest:
         return _running(table, rest)
     return rest, ()
@@ -216,53 +212,45 @@ def _taxels(
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
-    stems = _numbered(rest)
-    grids = {stem: group for stem, group in stems.items() if _is_grid(group)}
-    several = {stem: group for stem, group in grids.items() if len(group) > 1}
-    groups = several or grids
-    names = [[name for _, _, name in group] for group in groups.values()]
-    if len(groups) > 1:
+    grids = list(_grids(rest))
+    grids = [grid for grid in grids if len(grid[0]) > 1] or grids
+    if len(grids) > 1:
+        spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
-            f"{table.path}: are the taxels {' or '.join(map(spanned, names))}? Name them "
-            "by --taxels, and joint angles by --joints"
+            f"{table.path}: are the taxels {spans}? Name them by --taxels, and joint "
+            "angles by --joints"
         )
-    if not groups:
+    if not grids:
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
         raise InputError(
             f"{table.path}: no columns are named as taxels, such as s1 to s16; name them "
             f"by --taxels{three}, among {shown(list(rest))}"
         )
-    (((_, is_flat), group),) = groups.items()
-    if is_flat:
-        return names[0], ()
-    rows = len({row for row, _, _ in group})
-    return names[0], (rows, len(group) // rows)
+    return grids[0]
 
 
-def _numbered(names: Sequence[str]) -> dict[tuple[str, bool], list[_Number]]:
-    """{(stem, whether it has one number alone): the names with this stem, in the order
-    of their numbers}."""
-    stems = defaultdict(list)
-    for name in names:
-        if number := RUNNING.fullmatch(name):
-            stem = number["stem"], number["second"] is None
-            stems[stem].append((int(number["first"]), int(number["second"] or 0), name))
-    return {stem: sorted(group) for stem, group in stems.items()}
+def _grids(names: Sequence[str]) -> Iterator[tuple[list[str], tuple[int, ...]]]:
+    """The names of each stem whose numbers count up without a gap, the first from 0 or
+    1, in the order of their numbers; and their shape, where they have two."""
+    parts = pd.Series(names, names, object).str.extract(RUNNING)
+    parts = parts.dropna(subset="first")
+    is_flat = parts["second"].isna()
+    places = parts[["first", "second"]].fillna(0).astype(int)
+    for (_, flat), group in places.groupby([parts["stem"], is_flat], sort=False):
+        low = group.min()
+        shape = group.max() - low + 1
+        is_grid = len(group) == len(group.drop_duplicates()) == shape.prod()
+        if is_grid and low["first"] <= 1:
+            ordered = group.sort_values(["first", "second"]).index
+            yield list(ordered), () if flat else tuple(shape.tolist())
 
 
-def _is_grid(group: Sequence[_Number]) -> bool:
-    """Whether numbers count up without a gap in each of their two dimensions, in the
-    first from 0 or 1."""
-    places = {place[:2] for place in group}
-    firsts, seconds = (
-        range(min(axis), max(axis) + 1) for axis in zip(*places, strict=True)
-    )
-    size = len(firsts) * len(seconds)
-    return firsts[0] <= 1 and len(places) == len(group) == size
-
-
-def _unit(table: Table, time: str, options: argparse.Namespace) -> tuple[str, str]:
+def _unit(
+    table: Table, time: str | None, options: argparse.Namespace
+) -> tuple[str, str]:
     """The unit of times, and how it is known."""
+    if time is None:
+        return "s", "by --rate"
     name = TIME.fullmatch(time)
     unit = options.time_unit or (name["unit"] if name else None)
     if unit not in (None, "iso"):
@@ -270,21 +258,20 @@ def _unit(table: Table, time: str, options: argparse.Namespace) -> tuple[str, st
         return OTHER_UNITS.get(unit, unit), "as said"
     if unit == "iso" or is_date(table, time):
         return "iso", "ISO dates"
-    values = numbers_of(table, time).dropna().to_numpy()
-    if not len(values):
+    values = numbers_of(table, time).dropna()
+    if values.empty:
         raise InputError(f"{table.path}: column {time} holds no times")
     for unit, least in EPOCHS.items():
-        if abs(values[0]) >= least:
+        if abs(values.iloc[0]) >= least:
             return unit, "since 1970"
-    steps = np.diff(values)
-    forward = steps[steps > 0.0]
-    step = float(np.median(forward)) if len(forward) else 0.0
+    steps = values.diff()
+    step = steps[steps > 0.0].median()
     if SECONDS_AT_MOST < step < DOUBTFUL_BELOW:
         raise InputError(
             f"{table.path}: {quoted(time)} has steps of {step:g}, which may be seconds "
             "or milliseconds; give --time-unit s or ms"
         )
-    units = [unit for unit, longest in LONGEST_STEPS.items() if step <= longest]
+    units = [unit for unit, longest in LONGEST_STEPS.items() if not step > longest]
     return units[0], "from its steps"
 
 

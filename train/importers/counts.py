@@ -4,7 +4,7 @@ import argparse
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -90,16 +90,15 @@ class Trial:
     Attributes:
         where: names the trial or its file in errors.
         t: (n,) seconds.
-        values: (n, taxels) of the normal axis; NaN where one is missing.
-        shear: (n, taxels, 2) of the other two axes, or None; a taxel without one of
-            them is missing.
+        values: (n, taxels, 1) of the normal axis, or (n, taxels, 3) of the normal axis
+            and of those along the rows and around the columns; not finite where one is
+            missing.
         joints: (n, dof) radians, or None.
     """
 
     where: str
     t: NDArray[np.float64]
     values: NDArray[np.float64]
-    shear: NDArray[np.float64] | None = None
     joints: NDArray[np.float64] | None = None
 
     @classmethod
@@ -109,7 +108,6 @@ class Trial:
         t: NDArray[np.float64],
         values: NDArray[np.float64],
         axes: Axes | None,
-        joints: NDArray[np.float64] | None = None,
     ) -> Self:
         """The trial of values (n, ...), whose last axis is x, y and z if there are
         `axes`.
@@ -118,17 +116,13 @@ class Trial:
             InputError: the last axis has another length.
         """
         if axes is None:
-            return cls(where, t, values.reshape(len(t), -1), None, joints)
-        normal, shear = axes.split(values, where)
-        return cls(where, t, normal, shear, joints)
+            return cls(where, t, values.reshape(len(t), -1, 1))
+        return cls(where, t, axes.split(values, where))
 
     @property
     def missing(self) -> NDArray[np.bool_]:
-        """(n, taxels) which values are missing."""
-        missing = ~np.isfinite(self.values)
-        if self.shear is not None:
-            missing |= ~np.isfinite(self.shear).all(axis=2)
-        return missing
+        """(n, taxels) which taxels lack a value of an axis."""
+        return np.asarray(~np.isfinite(self.values).all(axis=2))
 
     def in_order(self, frame: str) -> Self:
         """The frames in the order of their times; says what that leaves out.
@@ -140,11 +134,8 @@ class Trial:
         if order.text:
             say(f"{self.where}: {order.text}")
         kept = order.kept
-        shear = None if self.shear is None else self.shear[kept]
         joints = None if self.joints is None else self.joints[kept]
-        return replace(
-            self, t=self.t[kept], values=self.values[kept], shear=shear, joints=joints
-        )
+        return replace(self, t=self.t[kept], values=self.values[kept], joints=joints)
 
 
 def skin_shape(
@@ -171,24 +162,14 @@ class Rest:
     """How values become counts.
 
     Attributes:
-        values: (taxels,) at rest; None where they are counts as they stand.
+        values: (taxels, axes) at rest; None where they are counts as they stand.
         falls: whether values fall under pressure; otherwise both directions count.
         scale: counts a unit of value.
-        shear: (taxels, 2) or (2,) shear at rest.
     """
 
     values: NDArray[np.float64] | None = None
     falls: bool = False
     scale: float = 1.0
-    shear: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
-
-    def counts(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values as counts, not rounded."""
-        if self.values is None:
-            return values * self.scale
-        if self.falls:
-            return np.maximum(self.values - values, 0.0) * self.scale
-        return np.abs(values - self.values) * self.scale
 
     def recording(
         self, trial: Trial, shape: tuple[int, int], meta: Mapping[str, Any]
@@ -203,50 +184,44 @@ class Rest:
         Raises:
             InputError: the values are no counts, or too large.
         """
-        valid = ~trial.missing & np.isfinite(self.shear).all(axis=-1)
+        valid = ~trial.missing
         values = {}
         if self.values is not None:
-            valid &= np.isfinite(self.values)
-            at_rest = [None if np.isnan(v) else float(v) for v in self.values]
+            valid &= np.isfinite(self.values).all(axis=1)
+            normal = self.values[:, 0].tolist()
+            at_rest = [None if math.isnan(value) else value for value in normal]
             values = {"values": {"counts_per_unit": self.scale, "rest": at_rest}}
         skin = {**meta.get("skin", {}), "rows": shape[0], "cols": shape[1]}
-        shear = None
-        if trial.shear is not None:
-            skin["axes"] = 3
-            moved = np.where(valid[:, :, None], trial.shear - self.shear, 0.0)
-            shear = self._shear(trial.where, moved).reshape(-1, *shape, 2)
+        axes = trial.values.shape[2]
+        if axes == 3:
+            skin["axes"] = axes
+        # A part at a time, as a long recording would else fill the memory several
+        # times.
+        starts = range(0, len(valid), PART)
+        parts = [self._counts(trial, valid, slice(at, at + PART)) for at in starts]
+        counts = np.concatenate(parts).reshape(-1, *shape, axes)
         return Recording(
             t=trial.t - trial.t[0],
-            frames=self._frames(trial, valid).reshape(-1, *shape),
+            frames=counts[..., 0].astype(np.uint16),
             joints=trial.joints,
             valid=None if valid.all() else valid.reshape(-1, *shape),
             meta={**meta, "skin": skin, **values},
-            shear=shear,
+            shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
         )
 
-    def _frames(self, trial: Trial, valid: NDArray[np.bool_]) -> NDArray[np.uint16]:
-        """(n, taxels) whole counts; 0 of those that are not valid."""
+    def _counts(
+        self, trial: Trial, valid: NDArray[np.bool_], rows: slice
+    ) -> NDArray[np.int32]:
+        """Whole counts (rows, taxels, axes) of some frames; 0 where not valid."""
+        at_rest = 0.0 if self.values is None else self.values
+        moved = np.where(valid[rows, :, None], trial.values[rows] - at_rest, 0.0)
+        counts = moved * self.scale
+        if self.values is not None:
+            normal = counts[..., 0]
+            counts[..., 0] = np.maximum(-normal, 0.0) if self.falls else abs(normal)
         exact = self.scale == 1.0 and self.values is None
-        frames = np.empty(valid.shape, dtype=np.uint16)
-        # A part at a time, as a long recording would else fill the memory several
-        # times.
-        for begin in range(0, len(frames), PART):
-            rows = slice(begin, begin + PART)
-            counts = np.where(valid[rows], self.counts(trial.values[rows]), 0.0)
-            _check_counts(trial.where, counts, exact)
-            frames[rows] = np.rint(counts)
-        return frames
-
-    def _shear(self, where: str, moved: NDArray[np.float64]) -> NDArray[np.int16]:
-        """Whole counts of shear."""
-        counts = np.rint(moved * self.scale)
-        largest = _largest(counts)
-        if largest > MOST_SHEAR:
-            raise InputError(
-                f"{where}: shear reaches {largest:.0f} counts, and at most {MOST_SHEAR} "
-                "are kept; give a smaller --scale"
-            )
-        return counts.astype(np.int16)
+        _check_counts(trial.where, counts, exact)
+        return np.rint(counts).astype(np.int32)
 
 
 def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
@@ -260,19 +235,15 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
-    if options.falls:
-        unrest = -starts
-    else:
-        unrest = np.abs(starts - pd.DataFrame(starts).median().to_numpy())
-    quietest = int(np.nansum(unrest, axis=1).argmin())
-    values = starts[quietest]
+    unrest = -starts[..., 0]
+    if options.signed:
+        usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
+        unrest = np.abs(unrest + usual)
+    values = starts[np.nansum(unrest, axis=1).argmin()]
     scale = options.scale
     if options.signed and scale == 1.0:
-        scale = _finest([trial.values - values for trial in trials])
-    shear = trials[quietest].shear
-    if shear is None:
-        return Rest(values, options.falls, scale)
-    return Rest(values, options.falls, scale, np.median(shear[:START], axis=0))
+        scale = _finest([(trial.values - values)[..., 0] for trial in trials])
+    return Rest(values, options.falls, scale)
 
 
 def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
@@ -295,9 +266,16 @@ def _largest(values: NDArray[np.float64]) -> float:
 
 def _check_counts(where: str, counts: NDArray[np.float64], exact: bool) -> None:
     """Refuse values that are no counts."""
-    low = float(counts.min())
-    high = float(counts.max())
-    whole = not exact or bool((counts == np.rint(counts)).all())
+    shear = _largest(np.rint(counts[..., 1:]))
+    if shear > MOST_SHEAR:
+        raise InputError(
+            f"{where}: shear reaches {shear:.0f} counts, and at most {MOST_SHEAR} are "
+            "kept; give a smaller --scale"
+        )
+    normal = counts[..., 0]
+    low = normal.min()
+    high = normal.max()
+    whole = not exact or np.array_equal(normal, np.rint(normal))
     if low < 0.0 or high > MOST_COUNTS + 0.5 or not whole:
         hint = "--signed, " if low < 0.0 else ""
         raise InputError(

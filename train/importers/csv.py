@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from edge.commands.options import within
 from edge.config import ConfigTable, shown
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -42,7 +42,7 @@ from train.importers.reading import (
     Table,
     inner,
     is_text,
-    numbers_of,
+    numbered,
     read_frame,
     read_labels,
     read_parquet,
@@ -50,7 +50,7 @@ from train.importers.reading import (
     require_filled,
     suffix_of,
 )
-from train.json_files import read_json
+from train.json_files import json_table
 from train.progress import say
 
 LABELS = "labels.csv"
@@ -154,12 +154,10 @@ def trials(
         raise _nothing(path, options)
     if (folder / LABELS).is_file():
         measured = _labelled(measured, folder / LABELS, options)
-    file = folder / "skin.json"
-    skin = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
+    skin = json_table(folder / "skin.json")
     shape = _announced(measured[0], skin, axes, options)
     rest = rest_of([trial.numbers for trial in measured], options)
-    missing = 0
-    imported = 0
+    missing = []
     for trial in measured:
         meta: dict[str, Any] = {
             "skin": skin.raw,
@@ -168,16 +166,18 @@ def trials(
             "trial": trial.name,
         }
         if trial.numbers.joints is not None:
-            meta["arm"] = None if arm is None else arm.to_dict()
+            meta["arm"] = arm and arm.to_dict()
         with _skipping(options):
             recording = rest.recording(trial.numbers, shape, meta)
-            imported += 1
-            missing += int(trial.numbers.missing.sum())
+            missing.append(trial.numbers.missing.sum())
             yield trial.name, recording
-    if not imported:
+    if not missing:
         raise _nothing(path, options)
-    if missing:
-        say(f"{missing} values are missing; these taxels are not valid in their frames")
+    if sum(missing):
+        say(
+            f"{sum(missing)} values are missing; these taxels are not valid in their "
+            "frames"
+        )
 
 
 @contextmanager
@@ -249,13 +249,11 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
     require_filled(path, data, "trial")
-    labels: dict[str, dict[str, str]] = {}
-    for row in data.fillna("").to_dict("records"):
-        trial = row.pop("trial")
-        if trial in labels:
-            raise InputError(f"{path}: {trial} has two rows; remove one of them")
-        labels[trial] = {task: label for task, label in row.items() if label}
-    return labels
+    again = data["trial"][data["trial"].duplicated()]
+    if len(again):
+        raise InputError(f"{path}: {again.iloc[0]} has two rows; remove one of them")
+    rows = data.set_index("trial").iterrows()
+    return {str(trial): row.dropna().to_dict() for trial, row in rows}
 
 
 def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
@@ -291,15 +289,12 @@ def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[
     place = inner(file.relative_to(folder)).with_suffix("")
     suffix = suffix_of(file)
     if suffix in arrays.SUFFIXES and options.trials:
-        stored = arrays.read_arrays(file)
-        for name, labels, of_trial in arrays.trials_of(file, stored, options.task):
-            table = arrays.table_of(file, of_trial, options)
-            source = _source(place, table, options.task)
-            labels = {**source.labels, **labels}
-            yield Source(name, labels, "the arrays", table)
+        yield from _of_arrays(file, place, options)
         return
     if suffix in arrays.SUFFIXES:
-        table = arrays.table_of(file, arrays.read_arrays(file), options)
+        stored = arrays.read_arrays(file)
+        with about(str(file)):
+            table = arrays.table_of(file, stored, options)
     else:
         table = read_parquet(file) if suffix == ".parquet" else read_text(file)
     if "trial" in table.names:
@@ -307,6 +302,19 @@ def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[
             yield from _trials_in(table)
     else:
         yield _source(place, table, options.task)
+
+
+def _of_arrays(
+    file: Path, place: Path, options: argparse.Namespace
+) -> Iterator[Source]:
+    """The trials in a file of arrays."""
+    stored = arrays.read_arrays(file)
+    with about(str(file)):
+        trials = arrays.trials_of(stored, options.task)
+        for number, (labels, of_trial) in enumerate(trials):
+            table = arrays.table_of(file, of_trial, options)
+            labels = {**_source(place, table, options.task).labels, **labels}
+            yield Source(f"{file.stem}_{number:03}", labels, "the arrays", table)
 
 
 def _of_frames(
@@ -323,7 +331,7 @@ def _of_frames(
             sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
             raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
     values = np.reshape(frames, (len(files), -1))
-    data = pd.DataFrame(values).rename(columns=lambda place: str(place + 1))
+    data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
     if options.rate is None:
         kind = "a folder of files that are named by their times"
         with parsing(str(inside), kind, "; give --rate"):
@@ -359,20 +367,19 @@ def _trials_in(table: Table) -> Iterator[Source]:
     ]
     label = f"columns {', '.join(labels)}" if labels else "none"
     for trial, rows in by_trial:
-        of_trial = {}
+        texts = rows[labels].astype(object).fillna("").astype(str)
         for name in labels:
-            texts = rows[name].astype(object).fillna("").astype(str).unique()
-            if len(texts) > 1:
+            first, *others = texts[name].unique()
+            if others:
                 raise InputError(
                     f"{table.path}: {name} changes within trial {trial}, from "
-                    f"{shown(texts[0])} to {shown(texts[1])}"
+                    f"{shown(first)} to {shown(others[0])}"
                 )
-            if texts[0]:
-                of_trial[name] = texts[0]
         data = rows.drop(columns=["trial", *labels]).reset_index(drop=True)
         part = replace(table, data=data, file_names=tuple(table.names))
         if "taxel" in data:
             part = _pivoted(part, str(trial))
+        of_trial = {task: text for task, text in texts.iloc[0].items() if text}
         yield Source(str(trial), of_trial, label, part)
 
 
@@ -436,8 +443,8 @@ def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
     path = trial.numbers.where
     first_path = first.numbers.where
-    taxels = list(trial.meaning.taxels)
-    first_taxels = list(first.meaning.taxels)
+    taxels = trial.meaning.taxels
+    first_taxels = first.meaning.taxels
     if len(taxels) != len(first_taxels):
         raise InputError(
             f"{path}: has {len(taxels)} taxels, and {first_path} {len(first_taxels)}; "
@@ -459,23 +466,16 @@ def _understood(
     source: Source, axes: Axes | None, options: argparse.Namespace
 ) -> Measured:
     """The numbers of a trial."""
-    table = source.table
-    if axes is None:
-        sense = meaning(table, options)
-        values = _columns(table, sense.taxels)
-    else:
-        part = parted(source.table, axes.normal)
-        table = part.table
-        sense = meaning(table, options)
-        values = part.values(sense.taxels)
-    values[~np.isfinite(values)] = np.nan
+    table = source.table if axes is None else parted(source.table, axes.normal)
+    sense = meaning(table, options)
+    values = table.values(sense.taxels)
     joints = None
     if sense.joints:
         unit = np.pi / 180.0 if options.degrees else 1.0
-        joints = unit * _columns(table, sense.joints)
+        joints = unit * table.numbers(sense.joints)
     t = times_of(table, sense, options)
-    numbers = Trial.of(str(table.path), t, values, axes, joints)
-    if np.isnan(numbers.values).all():
+    numbers = replace(Trial.of(str(table.path), t, values, axes), joints=joints)
+    if np.isnan(numbers.values[..., 0]).all():
         raise InputError(f"{table.path}: none of its values is a finite number")
     return Measured(
         name=source.name,
@@ -485,8 +485,3 @@ def _understood(
         meaning=sense,
         numbers=numbers.in_order("row"),
     )
-
-
-def _columns(table: Table, names: Iterable[str]) -> NDArray[np.float64]:
-    """(rows, names) the numbers of some columns."""
-    return np.column_stack([numbers_of(table, name) for name in names])

@@ -9,7 +9,7 @@ in radians.
 import argparse
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from train.importers import counts
 from train.importers.axes import Axes
 from train.importers.counts import Trial, rest_of, skin_shape
 from train.importers.reading import Table, numbers_of, read_parquet
-from train.json_files import read_json
+from train.json_files import json_table
 from train.progress import say
 
 LARGEST_INDEX = 1 << 53
@@ -76,28 +76,27 @@ def trials(
         raise InputError(
             f"{path}: holds no meta/info.json; give the folder of a LeRobot data set"
         )
-    table = ConfigTable(read_json(info), str(info))
-    names = joint_names(table, options.joints)
+    names = joint_names(json_table(info), options.joints)
     episodes = list(_episodes(path, options))
     check_alike(path, episodes)
     rest = rest_of([episode.trial for episode in episodes], options)
     first = episodes[0]
     taxels = first.trial.values.shape[1]
     told = first.shape if len(first.shape) == 2 else (1, taxels)
-    rows, cols = skin_shape(first.trial, told, options)
+    shape = skin_shape(first.trial, told, options)
     say(
         f'time: "timestamp" in s, taxels: "{options.taxels}" ({taxels}, as '
-        f"{rows} x {cols}), label: the episode's task"
+        f"{shape[0]} x {shape[1]}), label: the episode's task"
     )
     for episode in episodes:
         meta: dict[str, Any] = {"source": path.name, "trial": episode.number}
         if episode.label:
             meta["labels"] = {options.task: episode.label}
         if episode.trial.joints is not None:
-            meta["arm"] = None if arm is None else arm.to_dict()
+            meta["arm"] = arm and arm.to_dict()
             if names is not None:
                 meta["joint_names"] = names
-        recording = rest.recording(episode.trial, (rows, cols), meta)
+        recording = rest.recording(episode.trial, shape, meta)
         yield f"episode_{episode.number:06}", recording
 
 
@@ -142,17 +141,17 @@ def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
         raise InputError(f"{path}: holds no data/**/*.parquet; fetch it again")
     tasks = task_names(path)
     for file in files:
-        table = read_parquet(file)
+        table = read_parquet(file, dtype_backend="pyarrow")
         data = table.data
         for column in ("episode_index", "timestamp", options.taxels, options.joints):
             if column is not None and column not in data.columns:
                 raise InputError(
-                    f"{file}: has no column {column}; it has {shown(list(data.columns))}"
+                    f"{file}: has no column {column}; it has {shown(table.names)}"
                 )
-        for column in {"episode_index", "task_index"} & set(data.columns):
+        for column in {"episode_index", "task_index"} & set(table.names):
             data[column] = indices(table, column)
         data["timestamp"] = numbers_of(table, "timestamp")
-        for number, rows in data.groupby("episode_index", sort=True):
+        for number, rows in data.groupby("episode_index"):
             where = f"{file}: episode {number}"
             yield _episode(where, rows, tasks, options)
 
@@ -166,10 +165,9 @@ def indices(table: Table, name: str) -> pd.Series:
     numbers = numbers_of(table, name)
     is_index = (numbers % 1.0 == 0.0) & numbers.between(0, LARGEST_INDEX)
     if not is_index.all():
-        row = np.flatnonzero(~is_index)[0] + 1
         raise InputError(
-            f"{table.path}: row {row} has no {name}, which is a whole number from 0; "
-            "fetch the data set again"
+            f"{table.path}: row {is_index.argmin() + 1} has no {name}, which is a whole "
+            "number from 0; fetch the data set again"
         )
     return numbers.astype(np.int64)
 
@@ -182,15 +180,15 @@ def _episode(
 ) -> Episode:
     """One episode of a file."""
     axes = Axes.of(options)
-    t = rows["timestamp"].to_numpy(np.float64)
+    t = rows["timestamp"].to_numpy()
     values = stacked(where, rows[options.taxels])
     joints = None
     if options.joints is not None:
         joints = stacked(where, rows[options.joints]).reshape(len(t), -1)
-    trial = Trial.of(where, t, values, axes, joints).in_order("frame")
+    trial = replace(Trial.of(where, t, values, axes), joints=joints).in_order("frame")
     first = rows.iloc[0]
     shape = values.shape[1:] if axes is None else values.shape[1:-1]
-    label = tasks.get(int(first.get("task_index", -1)), "")
+    label = tasks.get(first.get("task_index", -1), "")
     return Episode(int(first["episode_index"]), label, shape, trial)
 
 
@@ -201,19 +199,12 @@ def stacked(where: str, column: pd.Series) -> NDArray[np.float64]:
         InputError: its lists are of several lengths, or hold no numbers.
     """
     try:
-        values = np.stack([np.array(_plain(v), dtype=np.float64) for v in column])
+        values = np.array(column.tolist(), dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(
             f"{where}: {column.name} does not hold numbers of one shape in each frame"
         ) from None
     return values if values.ndim > 1 else values[:, None]
-
-
-def _plain(value: Any) -> Any:
-    """A cell as nested lists; Parquet's are arrays of arrays."""
-    if isinstance(value, np.ndarray):
-        return [_plain(entry) for entry in value]
-    return value
 
 
 def task_names(path: Path) -> dict[int, str]:
@@ -224,16 +215,14 @@ def task_names(path: Path) -> dict[int, str]:
     """
     lines = path / "meta" / "tasks.jsonl"
     table = path / "meta" / "tasks.parquet"
-    tasks: dict[int, str] = {}
-    if lines.is_file():
-        with parsing(str(lines), "a list of tasks", "; fetch it again"):
-            for line in read_text(lines).splitlines():
-                entry = json.loads(line)
-                tasks[int(entry["task_index"])] = str(entry["task"])
-    elif table.is_file():
-        data = read_parquet(table).data
-        with parsing(str(table), "a table of tasks", "; fetch it again"):
-            texts = data["task"] if "task" in data.columns else data.index
-            for index, text in zip(data["task_index"], texts, strict=True):
-                tasks[int(index)] = str(text)
-    return tasks
+    file = lines if lines.is_file() else table
+    if not file.is_file():
+        return {}
+    with parsing(str(file), "a list of tasks", "; fetch it again"):
+        if file == lines:
+            entries = list(map(json.loads, read_text(lines).splitlines()))
+        else:
+            data = read_parquet(table).data
+            tasks = data.get("task", data.index)
+            entries = data.assign(task=tasks).to_dict("records")
+        return {int(entry["task_index"]): str(entry["task"]) for entry in entries}

@@ -9,9 +9,10 @@ import lzma
 import re
 import zipfile
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ PACKED = (*UNPACKERS, ".zip")
 MARKS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
 HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
+ABOVE = re.compile(r"\A((?:(?:#.*|\s*)\n)*)", re.A)
+"""Comments and blank lines before the first row."""
 LONGEST_LINE = 4 << 20
 FEWEST_NAMES = 3
 """Whole numbers in a row from 0 or 1 are a header if they are so many."""
@@ -75,6 +78,14 @@ class Table:
             arrays[name.rpartition(".")[0]].append(name)
         return arrays
 
+    def numbers(self, names: Iterable[str]) -> NDArray[np.float64]:
+        """(rows, names) the numbers of some columns, as `numbers_of`."""
+        return np.column_stack([numbers_of(self, name) for name in names])
+
+    def values(self, taxels: Sequence[str]) -> NDArray[np.float64]:
+        """(rows, taxels) the values of some taxels."""
+        return self.numbers(taxels)
+
 
 @contextmanager
 def needs(package: str, action: str) -> Iterator[None]:
@@ -89,6 +100,12 @@ def needs(package: str, action: str) -> Iterator[None]:
         raise InputError(
             f"{action} needs {package}; install it with `pip install {package}`"
         ) from None
+
+
+def numbered(stem: str, count: int) -> list[str]:
+    """The names of columns without a header, or of those of an array: STEM.1, STEM.2
+    and so on."""
+    return [f"{stem}.{number}".strip(".") for number in range(1, count + 1)]
 
 
 def inner(path: Path) -> Path:
@@ -106,16 +123,14 @@ class _Text:
     """A text, taken apart.
 
     Attributes:
-        path: of the file.
-        body: UTF-8 from the first row on, without comments and blank lines.
+        body: from the first row on, without comments and blank lines.
         mark: the separator; empty for blanks.
         rows: the cells of the first row, and of the second if there is one.
         comment: the last comment before the first row; empty without one.
         form: how it was encoded, if not as UTF-8.
     """
 
-    path: Path
-    body: bytes
+    body: str
     mark: str
     rows: list[list[str]]
     comment: str
@@ -150,9 +165,8 @@ def read_text(path: Path) -> Table:
                 decimal = ","
                 form.append("decimal commas")
             form.append(f"separated by {MARKS[text.mark]}")
-        header = _header(text)
-        _check_names(path, header.names)
-        data = _parsed(text, header, decimal)
+        header = _header(path, text)
+        data = _parsed(text, header, decimal=decimal)
         return Table(path, data, header.named, form=(*form, *header.form))
 
 
@@ -160,8 +174,7 @@ def read_labels(path: Path) -> pd.DataFrame:
     """The columns of a text file with a header; each cell is text as it stands."""
     with parsing(str(path), "a table", "; save it as text"):
         text = _text(path)
-        header = _header(text)
-        _check_names(path, header.names)
+        header = _header(path, text)
         return _named(_texts(text, header, range(len(header.names))), header)
 
 
@@ -169,40 +182,50 @@ def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
     with parsing(str(path), "a table", "; save it as text"):
         text = _text(path)
-        table = Table(path, _parsed(text, _without_names(text.rows[0]), "."))
-        return np.column_stack([numbers_of(table, name) for name in table.names])
+        _check_widths(path, text)
+        table = Table(path, _parsed(text, _without_names(text)))
+        return table.numbers(table.names)
 
 
 def _text(path: Path) -> _Text:
     """The text of a file, without what stands before its first row."""
     data, form = _decoded(_unpacked(path))
-    if b"\0" in data:
+    if "\0" in data:
         raise ValueError("it is not text")
-    data = re.sub(rb"\r\n?", b"\n", data)
-    above = re.match(rb"(?:(?:#.*|\s*)\n)*", data)
-    body = data[above.end() :] if above else data
-    line = io.BytesIO(body).readline()
+    data = re.sub("\r\n?", "\n", data)
+    _, above, body = re.split(ABOVE, data, maxsplit=1)
+    line = body.partition("\n")[0]
     if len(line) > LONGEST_LINE:
         raise InputError(
             f"{path}: has a line of {len(line) >> 20} MB, too long for a frame"
         )
-    mark = next((mark for mark in MARKS if mark.encode() in line), "")
-    blank = rf"^(?:#.*|[^\S\n{mark}]*)(?:\n|\Z)"
-    body = re.sub(blank.encode(), b"", body, flags=re.M)
+    mark = next(filter(line.__contains__, MARKS), "")
+    body = re.sub(rf"(?am)^(?:#.*|[^\S\n{mark}]*)(?:\n|\Z)", "", body)
     if not body:
         raise InputError(f"{path}: {EMPTY}")
-    rows = [row for row, _ in zip(_rows(body, mark), range(2), strict=False)]
-    comments = re.findall(rb"^#.*", above[0] if above else b"", re.M)
-    comment = comments[-1].decode() if comments else ""
-    return _Text(path, body, mark, rows, comment, form)
+    rows = list(islice(_rows(body, mark), 2))
+    comments = re.findall("^#.*", above, re.M)
+    return _Text(body, mark, rows, "".join(comments[-1:]), form)
 
 
-def _rows(body: bytes, mark: str) -> Iterator[list[str]]:
+def _rows(text: str, mark: str) -> Iterator[list[str]]:
     """The cells of each line."""
-    lines = io.TextIOWrapper(io.BytesIO(body), "utf-8")
+    lines = io.StringIO(text)
     if not mark:
         return map(str.split, lines)
     return csv.reader(lines, delimiter=mark, skipinitialspace=True)
+
+
+def _check_widths(path: Path, text: _Text) -> None:
+    """Refuse rows of another width than the first, but for a separator at the end."""
+    width = len(text.rows[0])
+    for number, row in enumerate(_rows(text.body, text.mark), 1):
+        ends_in_mark = len(row) == width + 1 and not row[-1].strip()
+        if len(row) != width and not ends_in_mark:
+            values = f"{len(row)} value{'s' * (len(row) != 1)}"
+            raise InputError(
+                f"{path}: row {number} has {values}, and the first row {width}"
+            )
 
 
 def _names(cells: list[str]) -> list[str]:
@@ -210,26 +233,45 @@ def _names(cells: list[str]) -> list[str]:
     return [cell.strip().strip('"') for cell in cells]
 
 
-def _without_names(cells: list[str]) -> _Header:
+def _without_names(text: _Text) -> _Header:
     """The numbers that name the columns of a text without a header."""
-    return _Header([str(n) for n in range(1, len(cells) + 1)], False, 0)
+    return _Header(numbered("", len(text.rows[0])), False, 0)
 
 
-def _header(text: _Text) -> _Header:
-    """The names in a text's first row, or in the comment above it."""
+def _header(path: Path, text: _Text) -> _Header:
+    """The names of a text's columns: in its first row, or in the comment above it.
+
+    Raises:
+        InputError: two columns are named alike, or a name is a damaged number.
+    """
+    header = _stated(text)
+    for name, count in Counter(header.names).items():
+        if HEX.fullmatch(name):
+            raise InputError(f"{path}: {name} is no decimal number; save it as one")
+        if name and count > 1:
+            raise InputError(
+                f"{path}: two columns are named {name}; rename one of them"
+            )
+    _check_widths(path, text)
+    if header.rows == len(text.rows):
+        raise InputError(f"{path}: {EMPTY}")
+    return header
+
+
+def _stated(text: _Text) -> _Header:
+    """The names as they stand."""
     cells = _names(text.rows[0])
     if not all(map(_is_number, cells)):
         return _Header(cells, True, 1)
-    comment = text.comment.lstrip("# ").encode()
-    heading = _names(next(_rows(comment, text.mark), []))
+    heading = _names(next(_rows(text.comment.lstrip("# "), text.mark), []))
     if len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
-    counted = [str(number) for number in range(len(cells) + 1)]
-    is_count = cells in (counted[:-1], counted[1:])
+    counted = numbered("", len(cells))
+    is_count = cells in (counted, ["0", *counted[:-1]])
     if is_count and len(cells) >= FEWEST_NAMES and len(text.rows) > 1:
         form = "the first row, which counts the columns, is a header"
         return _Header(cells, True, 1, (form,))
-    return _without_names(cells)
+    return _without_names(text)
 
 
 def _is_number(text: str) -> bool:
@@ -239,29 +281,16 @@ def _is_number(text: str) -> bool:
     return False
 
 
-def _check_names(path: Path, names: list[str]) -> None:
-    """Refuse a header that names two columns alike, or is a row of damaged numbers."""
-    for name, count in Counter(names).items():
-        if HEX.fullmatch(name):
-            raise InputError(f"{path}: {name} is no decimal number; save it as one")
-        if name and count > 1:
-            raise InputError(
-                f"{path}: two columns are named {name}; rename one of them"
-            )
-
-
-def _parsed(text: _Text, header: _Header, decimal: str) -> pd.DataFrame:
+def _parsed(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
     """The columns of a text, without those that have neither a name nor a value.
 
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
     trial 007 is not trial 7. In a column of numbers such words are empty cells.
     """
-    columns = range(len(header.names))
-    table = _cells(text, header, columns, decimal=decimal)
+    names = header.names
+    table = _cells(text, header, low_memory=False, **options)
     is_number = pd.api.types.is_numeric_dtype
-    texts = [
-        i for i in columns if header.names[i] == "trial" or not is_number(table[i])
-    ]
+    texts = [i for i in table if names[i] == "trial" or not is_number(table[i])]
     if texts:
         table[texts] = _texts(text, header, texts)
     return _named(table, header)
@@ -270,30 +299,21 @@ def _parsed(text: _Text, header: _Header, decimal: str) -> pd.DataFrame:
 def _texts(text: _Text, header: _Header, columns: Sequence[int]) -> pd.DataFrame:
     """Columns of a text whose cells are texts, and NaN where they are empty."""
     empty = {"keep_default_na": False, "na_values": [""]}
-    return _cells(text, header, columns, dtype=str, **empty)
+    return _cells(text, header, usecols=columns, dtype=str, **empty)
 
 
-def _cells(
-    text: _Text, header: _Header, columns: Sequence[int], **options: Any
-) -> pd.DataFrame:
-    """Columns of a text, which are named by their places."""
-    width = len(header.names)
-    _check_widths(text, width)
-    table = pd.read_csv(
-        io.BytesIO(text.body),
+def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
+    """The columns of a text, which are named by their places."""
+    return pd.read_csv(
+        io.StringIO(text.body),
         sep=text.mark or r"\s+",
         header=None,
         skiprows=header.rows,
-        names=range(width),
-        usecols=columns,
+        names=range(len(header.names)),
         index_col=False,
         skipinitialspace=True,
-        low_memory=False,
         **options,
     )
-    if table.empty:
-        raise InputError(f"{text.path}: {EMPTY}")
-    return table
 
 
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
@@ -306,17 +326,6 @@ def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     if "" in names:
         unique[names.index("")] = ""
     return table[used].set_axis([unique[i] for i in used], axis=1)
-
-
-def _check_widths(text: _Text, width: int) -> None:
-    """Refuse rows of another width than the first, but for a separator at the end."""
-    for number, row in enumerate(_rows(text.body, text.mark), 1):
-        ends_in_mark = len(row) == width + 1 and not row[-1].strip()
-        if len(row) != width and not ends_in_mark:
-            values = f"{len(row)} value{'s' * (len(row) != 1)}"
-            raise InputError(
-                f"{text.path}: row {number} has {values}, and the first row {width}"
-            )
 
 
 def _unpacked(path: Path) -> bytes:
@@ -342,30 +351,32 @@ def _unpacked(path: Path) -> bytes:
     return data
 
 
-def _decoded(data: bytes) -> tuple[bytes, list[str]]:
-    """A text in UTF-8, and how it was encoded otherwise."""
+def _decoded(data: bytes) -> tuple[str, list[str]]:
+    """A text, and how it was encoded if not in UTF-8."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16").encode(), ["UTF-16"]
+        return data.decode("utf-16"), ["UTF-16"]
     data = data.removeprefix(codecs.BOM_UTF8)
     try:
-        data.decode()
+        return data.decode(), []
     except UnicodeDecodeError:
-        return data.decode("cp1252").encode(), ["Windows-1252"]
-    return data, []
+        return data.decode("cp1252"), ["Windows-1252"]
 
 
-def read_parquet(path: Path) -> Table:
-    """The table in a Parquet file.
+def read_parquet(path: Path, **options: Any) -> Table:
+    """The table in a Parquet file, with further options of pandas.
 
     Raises:
         InputError: it cannot be read, or its reader is not installed.
     """
-    with parsing(str(path), "a Parquet table"):
-        with needs("pyarrow", f"{path}: reading Parquet"):
-            data = pd.read_parquet(io.BytesIO(read_bytes(path, LARGEST_BYTES)))
-        if data.empty:
-            raise InputError(f"{path}: {EMPTY}")
-        return Table(path, data.rename(columns=str))
+    file = io.BytesIO(read_bytes(path, LARGEST_BYTES))
+    with (
+        parsing(str(path), "a Parquet table"),
+        needs("pyarrow", f"{path}: reading Parquet"),
+    ):
+        data = pd.read_parquet(file, **options)
+    if data.empty:
+        raise InputError(f"{path}: {EMPTY}")
+    return Table(path, data.rename(columns=str))
 
 
 def numbers_of(table: Table, name: str) -> pd.Series:
@@ -393,10 +404,11 @@ def require_filled(path: Path, data: pd.DataFrame, name: str) -> None:
     Raises:
         InputError: a cell is empty; the sentence names its row.
     """
-    empty = np.flatnonzero(data[name].isna())
-    if len(empty):
+    empty = data[name].isna()
+    if empty.any():
         raise InputError(
-            f"{path}: row {empty[0] + 1} has no {name}; enter it, or leave the row out"
+            f"{path}: row {empty.argmax() + 1} has no {name}; enter it, or leave the "
+            "row out"
         )
 
 

@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
@@ -42,7 +43,7 @@ from edge.touch.layout import RELEASE_S
 from train.importers import clock, counts
 from train.importers.axes import Axes
 from train.importers.counts import Trial, rest_of, skin_shape
-from train.json_files import read_json
+from train.json_files import json_table
 from train.progress import say
 
 LOG = logging.getLogger(__name__)
@@ -54,6 +55,8 @@ ARRAYS = tuple(
 )
 JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
+CLOCKS = ["stamp", "logged"]
+"""Seconds by a message's own clock, or by logging where it has none; and by logging."""
 ENCODINGS = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
 """Bytes of a pixel."""
 
@@ -73,31 +76,6 @@ class Unusable(ValueError):
 
 
 @dataclass
-class Stream:
-    """The messages of one topic, or of one joint.
-
-    Attributes:
-        stamps: seconds of their own clock, or of logging where they have none.
-        logged: seconds at which they were logged.
-        values: one a message.
-    """
-
-    stamps: list[float] = field(default_factory=list)
-    logged: list[float] = field(default_factory=list)
-    values: list[Any] = field(default_factory=list)
-
-    def add(self, stamp: float, logged: float, value: Any) -> None:
-        """Append a message."""
-        self.stamps.append(stamp)
-        self.logged.append(logged)
-        self.values.append(value)
-
-    def times(self, by_logging: bool) -> NDArray[np.float64]:
-        """(n,) seconds of their own clock, or of logging."""
-        return np.array(self.logged if by_logging else self.stamps)
-
-
-@dataclass
 class Log:
     """The messages of one log, collected by topic.
 
@@ -114,11 +92,11 @@ class Log:
     arm: Chain | None
     options: argparse.Namespace
     axes: Axes | None
-    _frames: dict[str, Stream] = field(default_factory=lambda: defaultdict(Stream))
-    _joints: dict[str, dict[str | int, Stream]] = field(
-        default_factory=lambda: defaultdict(lambda: defaultdict(Stream))
-    )
-    """{topic: {name of a joint, or its place if it has none: its angles}}"""
+    _frames: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
+    """{topic: (stamp, time of logging, values) of each message}; the stamp is the time
+    of logging where a message has none."""
+    _joints: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
+    """{topic: (stamp, time of logging, name of a joint or else its place, its angle)}"""
     _left_out: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     """{topic: why no frame can be read from each of some messages}."""
     _seen: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
@@ -132,7 +110,7 @@ class Log:
             InputError: the file is not a JSON object.
         """
         file = path.with_name(path.stem + ".json")
-        beside = ConfigTable(read_json(file) if file.is_file() else {}, str(file))
+        beside = json_table(file)
         if arm is None and beside.has("arm"):
             arm = Chain.from_dict(beside.get("arm"), where=f"{file}: arm")
         return cls(path, beside, arm, options, Axes.of(options))
@@ -163,7 +141,7 @@ class Log:
         except Unusable as reason:
             self._left_out[topic].append(str(reason))
             return
-        self._frames[topic].add(t, logged_s, values)
+        self._frames[topic].append((t, logged_s, values))
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
@@ -182,7 +160,7 @@ class Log:
                         f"{where}: counts must be numbers in rows and columns, not "
                         f"{values.dtype} {values.shape}"
                     )
-                self._frames[topic].add(t, logged_s, values.astype(np.float64))
+                self._frames[topic].append((t, logged_s, values.astype(np.float64)))
 
     def _pose(
         self,
@@ -207,7 +185,7 @@ class Log:
         keys: Sequence[str | int] = names or range(len(angles))
         for name, angle in zip(keys, angles.tolist(), strict=True):
             if np.isfinite(angle):
-                self._joints[topic][name].add(*times, angle)
+                self._joints[topic].append((*times, name, angle))
 
     def _values(self, kind: str, message: Any) -> NDArray[np.float64]:
         """The values of a message, in the shape that it tells.
@@ -237,17 +215,20 @@ class Log:
             InputError: the log has no topic of frames or several, or the frames' shapes
                 or times cannot be used.
         """
-        name, frames = self._topic("frames", self._frames)
-        if frames is None:
+        name = self._topic("frames", self._frames)
+        if name is None:
             raise InputError(f"{self.path}: {self._why_empty()}")
-        self._say_left_out(name, len(frames.values))
-        shapes = {np.shape(values) for values in frames.values}
+        frames = pd.DataFrame(self._frames[name], columns=[*CLOCKS, "values"])
+        self._say_left_out(name, len(frames))
+        shapes = {values.shape for values in frames["values"]}
         if len(shapes) > 1:
             raise InputError(
                 f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
             )
-        topic, joints = self._topic("joints", self._joints)
-        by_logging = joints is not None and self._never_meet(frames, joints)
+        topic = self._topic("joints", self._joints)
+        angles = self._joints.get(topic or "", [])
+        joints = pd.DataFrame(angles, columns=[*CLOCKS, "joint", "angle"])
+        t = self._clock(frames, joints)
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
             "source": f"{self.path.name} {name}",
@@ -255,21 +236,20 @@ class Log:
         }
         if self.arm is not None:
             meta["arm"] = self.arm.to_dict()
+        values = np.stack(frames["values"])
         where = f"{self.path}: {name}"
-        t = frames.times(by_logging)
-        trial = Trial.of(where, t, np.stack(frames.values), self.axes)
+        trial = Trial.of(where, frames[t].to_numpy(), values, self.axes)
         trial = trial.in_order("message")
-        if joints is not None:
-            names = self._joint_names(topic, tuple(joints))
-            streams = [joints[name] for name in names]
-            angles = self._angles(topic, trial.t, streams, by_logging)
-            trial = replace(trial, joints=angles)
+        if topic is not None:
+            names = self._joint_names(topic, joints["joint"].unique().tolist())
+            streams = [joints[joints["joint"] == name] for name in names]
+            angles = [stream[[t, "angle"]].to_numpy() for stream in streams]
+            trial = replace(trial, joints=self._angles(topic, trial.t, angles))
             if isinstance(names[0], str):
-                meta["joint_names"] = list(names)
+                meta["joint_names"] = names
         if self.axes is not None:
             say(self.axes.text)
-        (told,) = shapes
-        shape = skin_shape(trial, self._told(told), self.options)
+        shape = skin_shape(trial, self._told(values.shape[1:]), self.options)
         return rest_of([trial], self.options).recording(trial, shape, meta)
 
     def _why_empty(self) -> str:
@@ -310,35 +290,31 @@ class Log:
             f"{self.path.stem}.json beside it"
         )
 
-    def _never_meet(self, frames: Stream, joints: Mapping[Any, Stream]) -> bool:
-        """Whether the stamps of frames and angles are of clocks that never meet; it is
-        said."""
-        of_joints = [t for stream in joints.values() for t in stream.stamps]
-        of_frames = frames.stamps
-        meet = min(of_joints) <= max(of_frames) and min(of_frames) <= max(of_joints)
-        if not meet:
-            say(
-                f"{self.path}: the clocks of frames (from {of_frames[0]:.3f} s) and joint "
-                f"angles (from {of_joints[0]:.3f} s) never meet; both are taken by the "
-                "time at which they were logged"
-            )
-        return not meet
+    def _clock(self, frames: pd.DataFrame, joints: pd.DataFrame) -> str:
+        """The clock of the times: that of the stamps; but that of logging, which is
+        said, where the stamps of frames and angles are of clocks that never meet."""
+        first, last = frames["stamp"].agg(["min", "max"])
+        stamps = joints["stamp"]
+        if not (stamps.min() > last or stamps.max() < first):
+            return "stamp"
+        say(
+            f"{self.path}: the clocks of frames (from {frames['stamp'][0]:.3f} s) and joint "
+            f"angles (from {stamps[0]:.3f} s) never meet; both are taken by the "
+            "time at which they were logged"
+        )
+        return "logged"
 
     def _angles(
-        self,
-        topic: str,
-        t: NDArray[np.float64],
-        joints: Sequence[Stream],
-        by_logging: bool,
+        self, topic: str, t: NDArray[np.float64], joints: Sequence[NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """(n, dof) angles at the frames' times."""
+        """(n, dof) angles at the frames' times, of the times and angles (m, 2) of each
+        joint."""
         release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
         columns = []
         for stream in joints:
-            joints_t = stream.times(by_logging)
-            rows = clock.order(joints_t, f"{self.path}: {topic}", "message").kept
-            angles = np.array(stream.values)[rows, None]
-            columns.append(clock.angles_at(t, joints_t[rows], angles, release_s))
+            order = clock.order(stream[:, 0], f"{self.path}: {topic}", "message")
+            rows = stream[order.kept]
+            columns.append(clock.angles_at(t, rows[:, 0], rows[:, 1:], release_s))
         at_frames = np.hstack(columns)
         unknown = ~np.isfinite(at_frames).all(axis=1)
         at_frames[unknown] = np.nan
@@ -354,9 +330,7 @@ class Log:
             )
         return at_frames
 
-    def _joint_names(
-        self, topic: str, logged: tuple[str | int, ...]
-    ) -> Sequence[str | int]:
+    def _joint_names(self, topic: str, logged: list[str | int]) -> list[str | int]:
         """The joints whose angles are taken, in their order."""
         if self.arm is None:
             return logged
@@ -377,27 +351,27 @@ class Log:
             LOG.warning(
                 f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
             )
-        return self.arm.names
+        return list(self.arm.names)
 
-    def _topic(self, kind: str, topics: Mapping[str, Any]) -> tuple[str, Any]:
-        """The topic of a kind that the JSON file names, or else the only one, with its
-        messages; None where there is none."""
+    def _topic(self, kind: str, topics: Mapping[str, Any]) -> str | None:
+        """The topic of a kind that the JSON file names, or else the only one; None
+        where there is none."""
         name = self.beside.get(f"{kind}_topic", None)
-        if name is not None and not (isinstance(name, str) and name in topics):
-            reasons = self._left_out.get(str(name))
-            why = f"; it {reasons[0]}" if reasons else ""
-            raise InputError(
-                f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
-                f"{sorted(self._seen[kind])}, not {shown(name)}{why}"
-            )
         if name is None and len(topics) > 1:
             raise InputError(
                 f"{self.path}: {kind} are on {', '.join(sorted(topics))}; name one of "
                 f'them as "{kind}_topic" in {self.path.stem}.json beside it'
             )
         if name is None:
-            return next(iter(topics.items()), ("", None))
-        return name, topics[name]
+            return next(iter(topics), None)
+        if not (isinstance(name, str) and name in topics):
+            reasons = self._left_out.get(str(name))
+            why = f"; it {reasons[0]}" if reasons else ""
+            raise InputError(
+                f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
+                f"{sorted(self._seen[kind])}, not {shown(name)}{why}"
+            )
+        return name
 
 
 def image_values(message: Any) -> NDArray[np.float64]:

@@ -82,36 +82,31 @@ def stacked(path):
 
 @pytest.mark.parametrize("write", [of_structures, of_cells, stacked])
 def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
-    path = tmp_path / "a.mat"
-    write(path)
-    (first, second) = trials_of(path, read_arrays(path), "object")
-    assert first[0] == "a_000"
-    assert second[0] == "a_001"
-    assert first[1] == {"object": "cup"}
-    assert second[1] == {"object": "pen"}
-    assert first[2]["frames"].tolist() == FRAMES.tolist()
-    assert second[2]["frames"].tolist() == (FRAMES + 1).tolist()
+    write(tmp_path / "a.mat")
+    trials = list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
+    assert [labels for labels, _ in trials] == [{"object": "cup"}, {"object": "pen"}]
+    frames = [arrays["frames"].tolist() for _, arrays in trials]
+    assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
 
 
 def test_a_structure_within_a_trial_is_left_out(tmp_path):
     trial = {"frames": FRAMES, "camera": {"maker": "x", "lens": np.arange(3)}}
     savemat(tmp_path / "a.mat", {"trials": np.array([trial, trial], dtype=object)})
-    stored = read_arrays(tmp_path / "a.mat")
-    for _, labels, of_trial in trials_of(PATH, stored, "object"):
-        assert labels == {}
-        assert list(of_trial) == ["frames"]
+    trials = list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
+    assert [labels for labels, _ in trials] == [{}, {}]
+    assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
 
 
 @pytest.mark.parametrize("stored", [{}, {"a": np.zeros((0, 3))}])
 def test_a_file_without_trials_holds_no_values(stored):
     with pytest.raises(InputError, match="holds no values"):
-        list(trials_of(PATH, stored, "object"))
+        list(trials_of(stored, "object"))
 
 
 def test_arrays_with_other_numbers_of_trials_are_named():
     stored = {"a": np.ones((2, 3)), "b": np.array(1.0)}
     with pytest.raises(InputError, match="{'a': 2, 'b': 1} trials; leave out"):
-        list(trials_of(PATH, stored, "object"))
+        list(trials_of(stored, "object"))
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])

@@ -30,7 +30,7 @@ def taken(given, **words):
 
 def test_taxels_are_those_of_a_stem_with_running_numbers():
     found = taken(table("s2", "s1", "s10", *(f"s{i}" for i in range(3, 10))), rate=10)
-    assert found.taxels == tuple(f"s{i}" for i in range(1, 11))
+    assert found.taxels == [f"s{i}" for i in range(1, 11)]
 
 
 @pytest.mark.parametrize(
@@ -40,12 +40,12 @@ def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
     names = [form.format(row, col) for col in range(3) for row in range(2)]
     found = taken(table(*names), rate=10)
     assert found.shape == (2, 3)
-    assert found.taxels[:3] == tuple(form.format(0, col) for col in range(3))
+    assert found.taxels[:3] == [form.format(0, col) for col in range(3)]
 
 
 def test_numbers_of_taxels_may_stand_in_brackets():
     names = [f"tactile[{i}]" for i in (10, *range(10))]
-    assert taken(table(*names), rate=10).taxels == (*names[1:], names[0])
+    assert taken(table(*names), rate=10).taxels == [*names[1:], names[0]]
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,8 @@ def test_numbers_of_taxels_may_stand_in_brackets():
 )
 def test_any_further_column_is_left_out_and_named(name):
     found = taken(table("p1", "p2", name), rate=10)
-    assert found.taxels == ("p1", "p2")
-    assert found.left_out == (name,)
+    assert found.taxels == ["p1", "p2"]
+    assert found.left_out == [name]
 
 
 @pytest.mark.parametrize(
@@ -73,11 +73,11 @@ def test_what_would_be_guessed_is_asked(names, sentence):
 @pytest.mark.parametrize(
     ("wanted", "names"),
     [
-        ("b,a", ("b", "a")),
-        ("a-c", ("a", "b", "c")),
-        ("2-3", ("b", "c")),
-        ("d", ("d",)),
-        ("q", ("q.1", "q.2")),
+        ("b,a", ["b", "a"]),
+        ("a-c", ["a", "b", "c"]),
+        ("2-3", ["b", "c"]),
+        ("d", ["d"]),
+        ("q", ["q.1", "q.2"]),
     ],
 )
 def test_columns_are_named_by_names_ranges_and_places(wanted, names):

@@ -17,7 +17,10 @@ def options(**given):
 def trial(*rows, shear=None) -> Trial:
     """A frame of some taxels each 10 ms."""
     t = 5.0 + 0.01 * np.arange(len(rows))
-    return Trial("a.csv", t, np.array(rows, dtype=float), shear)
+    values = np.array(rows, dtype=float)[..., None]
+    if shear is not None:
+        values = np.concatenate([values, shear], axis=2)
+    return Trial("a.csv", t, values)
 
 
 def recorded(rest, trial):
@@ -38,7 +41,7 @@ def test_values_that_fall_are_subtracted_from_the_quietest_start():
     first = trial([100, 90], [100, 90], [100, 90], [60, 90])
     touched = trial([50, 90], [50, 90], [50, 90], [40, 90])
     rest = rest_of([touched, first], options(falls=True))
-    assert rest.values.tolist() == [100, 90]
+    assert rest.values.tolist() == [[100], [90]]
     assert recorded(rest, first).frames[3].tolist() == [[40, 0]]
 
 
@@ -80,7 +83,7 @@ def test_a_taxel_without_one_of_its_axes_is_not_valid(unknown):
 
 
 def test_a_taxel_without_a_value_at_rest_is_never_valid():
-    rest = Rest(np.array([1.0, np.nan]))
+    rest = Rest(np.array([[1.0], [np.nan]]))
     counted = recorded(rest, trial([3, 4], [5, 6]))
     assert counted.valid.tolist() == [[[True, False]], [[True, False]]]
     assert counted.frames.tolist() == [[[2, 0]], [[4, 0]]]
