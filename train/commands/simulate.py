@@ -6,6 +6,12 @@ for. The same scene gives the same files, whatever the batch or the machine.
 
 import argparse
 import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from train.simulate.run import Written
+    from train.simulate.scene_model import Scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -41,27 +47,34 @@ def run(arguments: argparse.Namespace) -> int:
         print(explain(scene))
     if arguments.out:
         lines = [*summary(scene), *filter(None, [duration(scene)])]
-        print("\n".join(lines), file=sys.stderr)
+        print(*lines, sep="\n", file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 
-        options = {name: getattr(arguments, name) for name in ("jobs", "address")}
         with bar(total=total_trials(scene), unit="trial", desc=scene.name) as progress:
-            written = write(scene, arguments.out, **options, progress=progress.update)
-        lines = [f"recordings written to {arguments.out}: {len(written.paths)}"]
-        if written.redrawn:
-            lines.append(
-                f"drawn again until they fitted their labels: {written.redrawn}"
+            written = write(
+                scene,
+                arguments.out,
+                jobs=arguments.jobs,
+                address=arguments.address,
+                progress=progress.update,
             )
-        if written.unfelt:
-            lines.append(
-                f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
-                f"({scene.skin.onset}), so no touch is felt"
-            )
-        for key, error in written.rough.items():
-            lines.append(
-                f"{key} and its kind: no step is within trials.tolerance; the step "
-                f"taken errs by {100.0 * error:.2g} % of the peak force (see --explain)"
-            )
-        print("\n".join(lines), file=sys.stderr)
+        headline = f"recordings written to {arguments.out}: {len(written.paths)}"
+        print(headline, *remarks(scene, written), sep="\n", file=sys.stderr)
     return 0
+
+
+def remarks(scene: "Scene", written: "Written") -> Iterator[str]:
+    """What a user should know of recordings that were written."""
+    if written.redrawn:
+        yield f"drawn again until they fitted their labels: {written.redrawn}"
+    if written.unfelt:
+        yield (
+            f"in {written.unfelt} of them no taxel rises above skin.onset_counts "
+            f"({scene.skin.onset}), so no touch is felt"
+        )
+    for key, error in written.rough.items():
+        yield (
+            f"{key} and its kind: no step is within trials.tolerance; the step taken "
+            f"errs by {100.0 * error:.2g} % of the peak force (see --explain)"
+        )

@@ -112,11 +112,6 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
         place = _time_axis(title, array, frames, axis)
         if array.ndim > 1:
             form.append(f"time is axis {place + 1} of {title}")
-        if array.ndim > 3:
-            raise InputError(
-                f"{title} has {array.ndim} dimensions; give --trials where the first is "
-                "the trial, or save frames x rows x columns"
-            )
         time_first = np.moveaxis(array, place, 0)
         if array.ndim == 3:
             shape = time_first.shape[1:]
@@ -173,7 +168,7 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
     """The axis of an array that has so many entries."""
     places = [place for place, size in enumerate(array.shape) if size == frames]
     if axis in places:
-        return axis
+        places = [axis]
     if not places:
         raise InputError(
             f"{title} of {array.shape} has no axis of {frames} frames; name those to be "
@@ -182,6 +177,11 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
     if len(places) > 1:
         raise InputError(
             f"which axis of {title} {array.shape} is the time? Give --axis"
+        )
+    if array.ndim > 3:
+        raise InputError(
+            f"{title} has {array.ndim} dimensions; give --trials where the first is the "
+            "trial, or save frames x rows x columns"
         )
     return places[0]
 

@@ -253,11 +253,16 @@ def _unit(
         return "s", "by --rate"
     name = TIME.fullmatch(time)
     unit = options.time_unit or (name["unit"] if name else None)
-    if unit not in (None, "iso"):
-        unit = unit.lower()
-        return OTHER_UNITS.get(unit, unit), "as said"
-    if unit == "iso" or is_date(table, time):
+    if unit == "iso" or (unit is None and is_date(table, time)):
         return "iso", "ISO dates"
+    if unit is None:
+        return _likely_unit(table, time)
+    unit = unit.lower()
+    return OTHER_UNITS.get(unit, unit), "as said"
+
+
+def _likely_unit(table: Table, time: str) -> tuple[str, str]:
+    """The unit of times that only their numbers tell, and how they do."""
     values = numbers_of(table, time).dropna()
     if values.empty:
         raise InputError(f"{table.path}: column {time} holds no times")

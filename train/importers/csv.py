@@ -357,30 +357,35 @@ def _trials_in(table: Table) -> Iterator[Source]:
     """The trials of a long table."""
     for name in {"trial", "taxel"} & set(table.names):
         require_filled(table.path, table.data, name)
-    by_trial = table.data.groupby("trial", sort=False)
-    labels = [
-        name
-        for name in table.names
-        if name not in ("trial", "taxel")
-        and is_text(table, name)
-        and not (is_date(table, name) and by_trial[name].nunique().max() > 1)
-    ]
-    label = f"columns {', '.join(labels)}" if labels else "none"
-    for trial, rows in by_trial:
-        texts = rows[labels].astype(object).fillna("").astype(str)
-        for name in labels:
-            first, *others = texts[name].unique()
+    tasks = _tasks_in(table)
+    label = f"columns {', '.join(tasks)}" if tasks else "none"
+    for trial, rows in table.data.groupby("trial", sort=False):
+        texts = rows[tasks].astype(object).fillna("").astype(str)
+        for task in tasks:
+            first, *others = texts[task].unique()
             if others:
                 raise InputError(
-                    f"{table.path}: {name} changes within trial {trial}, from "
+                    f"{table.path}: {task} changes within trial {trial}, from "
                     f"{shown(first)} to {shown(others[0])}"
                 )
-        data = rows.drop(columns=["trial", *labels]).reset_index(drop=True)
+        data = rows.drop(columns=["trial", *tasks]).reset_index(drop=True)
         part = replace(table, data=data, file_names=tuple(table.names))
         if "taxel" in data:
             part = _pivoted(part, str(trial))
-        of_trial = {task: text for task, text in texts.iloc[0].items() if text}
-        yield Source(str(trial), of_trial, label, part)
+        labels = {task: text for task, text in texts.iloc[0].items() if text}
+        yield Source(str(trial), labels, label, part)
+
+
+def _tasks_in(table: Table) -> list[str]:
+    """The columns of text of a long table, apart from times that run within a trial."""
+    by_trial = table.data.groupby("trial")
+    names = [name for name in table.names if name not in ("trial", "taxel")]
+    texts = [name for name in names if is_text(table, name)]
+    return [
+        name
+        for name in texts
+        if not is_date(table, name) or by_trial[name].nunique().max() == 1
+    ]
 
 
 def _pivoted(table: Table, trial: str) -> Table:

@@ -218,17 +218,15 @@ class Log:
         name = self._topic("frames", self._frames)
         if name is None:
             raise InputError(f"{self.path}: {self._why_empty()}")
-        frames = pd.DataFrame(self._frames[name], columns=[*CLOCKS, "values"])
-        self._say_left_out(name, len(frames))
-        shapes = {values.shape for values in frames["values"]}
-        if len(shapes) > 1:
-            raise InputError(
-                f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
-            )
+        frames = self._frames_of(name)
         topic = self._topic("joints", self._joints)
-        angles = self._joints.get(topic or "", [])
-        joints = pd.DataFrame(angles, columns=[*CLOCKS, "joint", "angle"])
-        t = self._clock(frames, joints)
+        poses = self._joints.get(topic or "", [])
+        angles = pd.DataFrame(poses, columns=[*CLOCKS, "joint", "angle"])
+        t = self._clock(frames, angles)
+        values = np.stack(frames["values"])
+        where = f"{self.path}: {name}"
+        trial = Trial.of(where, frames[t].to_numpy(), values, self.axes)
+        trial = trial.in_order("message")
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
             "source": f"{self.path.name} {name}",
@@ -236,21 +234,34 @@ class Log:
         }
         if self.arm is not None:
             meta["arm"] = self.arm.to_dict()
-        values = np.stack(frames["values"])
-        where = f"{self.path}: {name}"
-        trial = Trial.of(where, frames[t].to_numpy(), values, self.axes)
-        trial = trial.in_order("message")
         if topic is not None:
-            names = self._joint_names(topic, joints["joint"].unique().tolist())
-            streams = [joints[joints["joint"] == name] for name in names]
-            angles = [stream[[t, "angle"]].to_numpy() for stream in streams]
-            trial = replace(trial, joints=self._angles(topic, trial.t, angles))
+            names = self._joint_names(topic, angles["joint"].unique().tolist())
+            angles = angles.rename(columns={t: "t"})
+            joints = self._joints_at(trial.t, topic, angles, names)
+            trial = replace(trial, joints=joints)
             if isinstance(names[0], str):
                 meta["joint_names"] = names
         if self.axes is not None:
             say(self.axes.text)
         shape = skin_shape(trial, self._told(values.shape[1:]), self.options)
         return rest_of([trial], self.options).recording(trial, shape, meta)
+
+    def _frames_of(self, name: str) -> pd.DataFrame:
+        """The frames of a topic, with their times; says what is left out."""
+        frames = pd.DataFrame(self._frames[name], columns=[*CLOCKS, "values"])
+        for topic, reasons in self._left_out.items():
+            part = f"{topic},"
+            if topic == name:
+                count = len(reasons)
+                messages = f"{count + len(frames)} messages of {topic}"
+                part = f"{count} of {messages}, the first of"
+            say(f"{self.path}: left out {part} which {reasons[0]}")
+        shapes = {values.shape for values in frames["values"]}
+        if len(shapes) > 1:
+            raise InputError(
+                f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
+            )
+        return frames
 
     def _why_empty(self) -> str:
         """The sentence for a log without frames."""
@@ -261,15 +272,6 @@ class Log:
             f'holds no frames; they must be {kinds}, JSON {{"counts": [[...]]}}, or a '
             "message of a sensor's own with --field"
         )
-
-    def _say_left_out(self, name: str, frames: int) -> None:
-        """Say which topics are no frames, and how many messages of the frames' topic."""
-        for topic, reasons in self._left_out.items():
-            part = f"{topic},"
-            if topic == name:
-                count = len(reasons)
-                part = f"{count} of {count + frames} messages of {topic}, the first of"
-            say(f"{self.path}: left out {part} which {reasons[0]}")
 
     def _told(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """The rows and columns that frames of a shape tell, or the file beside the log.
@@ -304,16 +306,20 @@ class Log:
         )
         return "logged"
 
-    def _angles(
-        self, topic: str, t: NDArray[np.float64], joints: Sequence[NDArray[np.float64]]
+    def _joints_at(
+        self,
+        t: NDArray[np.float64],
+        topic: str,
+        angles: pd.DataFrame,
+        names: Sequence[str | int],
     ) -> NDArray[np.float64]:
-        """(n, dof) angles at the frames' times, of the times and angles (m, 2) of each
-        joint."""
+        """(n, dof) angles of some joints at the frames' times."""
         release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
         columns = []
-        for stream in joints:
-            order = clock.order(stream[:, 0], f"{self.path}: {topic}", "message")
-            rows = stream[order.kept]
+        for name in names:
+            rows = angles.loc[angles["joint"] == name, ["t", "angle"]].to_numpy()
+            order = clock.order(rows[:, 0], f"{self.path}: {topic}", "message")
+            rows = rows[order.kept]
             columns.append(clock.angles_at(t, rows[:, 0], rows[:, 1:], release_s))
         at_frames = np.hstack(columns)
         unknown = ~np.isfinite(at_frames).all(axis=1)
