@@ -29,8 +29,10 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
 
 def _determines(a: Strings, b: Strings) -> bool:
     """Whether the labels b follow from the labels a."""
-    pairs = {(x, z) for x, z in zip(a.tolist(), b.tolist(), strict=True) if x and z}
-    return len(pairs) == len({x for x, _ in pairs})
+    both = (a != "") & (b != "")
+    names = a[both].tolist()
+    pairs = set(zip(names, b[both].tolist(), strict=True))
+    return len(pairs) == len(set(names))
 
 
 def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.statistics import wilson
 from train.crossval import votes_right
-from train.pipeline import Choice, columns_of, types_of
+from train.pipeline import Choice, columns_of, how_often, types_of
 from train.scaling import centred_and_scaled, finite
 from train.search import Decomposition, SearchGrid
 from train.threads import single_thread
@@ -151,12 +151,11 @@ class _Fit:
         """A grid's tasks, by how often each of the `train` trials counts for them."""
         by_counts: dict[bytes, tuple[list[str], Integers]] = {}
         for task, labels in self.classes.items():
-            if not grid.tasks or task in grid.tasks:
-                names = np.where(labels < 0, "", "labelled")
-                counts = grid.choices(1)[0].counts(names, self.vectors.is_own)[
-                    self.train
-                ]
-                by_counts.setdefault(counts.tobytes(), ([], counts))[0].append(task)
+            if grid.is_for(task):
+                of_all = how_often(labels >= 0, self.vectors.is_own, grid.weights)
+                counts = of_all[self.train]
+                tasks, _ = by_counts.setdefault(counts.tobytes(), ([], counts))
+                tasks.append(task)
         return list(by_counts.values())
 
     def decomposition(self, grid: SearchGrid, counts: Integers) -> Decomposition:
@@ -210,10 +209,6 @@ def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, Booleans]:
                         near = decomposition.neighbours(grid, task)
                     answers[task].append(fit.right(task, grid, near, members))
     return {task: np.concatenate(right) for task, right in answers.items()}
-
-
-def _directions(targets: Sequence[str], classes: Mapping[str, Integers]) -> int:
-    return max(sum(int(classes[target].max()) for target in targets), 1)
 
 
 @dataclass(frozen=True)
@@ -440,6 +435,8 @@ def _choices(
     """The candidates of a task."""
     choices: list[Choice] = []
     for grid in grids:
-        if not grid.tasks or task in grid.tasks:
-            choices += grid.choices(_directions(grid.targets or (task,), classes))
+        if grid.is_for(task):
+            targets = grid.targets or (task,)
+            directions = sum(int(classes[target].max()) for target in targets)
+            choices += grid.choices(max(directions, 1))
     return choices

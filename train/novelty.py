@@ -101,9 +101,7 @@ class NoveltySpace:
             widths: columns of each feature type.
         """
         scales = [_scale(x, widths) for x in X]
-        steps = [
-            _steps(x, mean, gain) for x, (mean, gain) in zip(X, scales, strict=True)
-        ]
+        steps = [_steps(x, *scale) for x, scale in zip(X, scales, strict=True)]
         trials, columns = X.shape[1:]
         # Half of the columns, so that something can lie outside the components.
         most = min(MOST_COMPONENTS, trials // TRIALS_A_COMPONENT, columns // 2)
@@ -111,29 +109,25 @@ class NoveltySpace:
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
         points = []
-        for (mean, gain), whole in zip(scales, steps, strict=True):
-            z = np.rint(np.ldexp(whole @ weights, -shift))
-            points.append(_point(mean, gain, z, labels))
+        for scale, whole in zip(scales, steps, strict=True):
+            z = _product(whole, weights, shift)
+            points.append(_point(*scale, z, labels))
         return cls(weights, shift, tuple(points))
 
     def scores(self, X: Floats) -> Floats:
         """(decision points, m) how unlike all training trials vectors (decision points,
         m, p) are."""
-        return np.stack(
-            [self._scores(point, x) for point, x in zip(self.points, X, strict=True)]
-        )
+        return np.stack(list(map(self._scores, self.points, X)))
 
     def coordinates(self, point: int, x: Floats) -> Floats:
         """(m, components) whole coordinates of vectors (m, p) at a decision point."""
         constants = self.points[point]
-        return _coordinates(self._components(_steps_at(x, constants)), constants)
-
-    def _components(self, steps: Floats) -> Floats:
-        return np.asarray(np.rint(np.ldexp(steps @ self.weights, -self.shift)))
+        steps = _steps(x, constants.mean, constants.gain)
+        return _coordinates(_product(steps, self.weights, self.shift), constants)
 
     def _scores(self, point: NoveltyPoint, x: Floats) -> Floats:
-        steps = _steps_at(x, point)
-        z = self._components(steps)
+        steps = _steps(x, point.mean, point.gain)
+        z = _product(steps, self.weights, self.shift)
         outside = np.maximum((steps**2).sum(axis=1) - (z**2).sum(axis=1), 1.0)
         squares = cdist(_coordinates(z, point), point.rows, "sqeuclidean")
         nearest = np.sqrt(squares.min(axis=1))
@@ -170,8 +164,9 @@ def _steps(x: Floats, mean: Floats, gain: Floats) -> Floats:
     return np.asarray(np.clip(np.rint((x - mean) * gain), -most, most))
 
 
-def _steps_at(x: Floats, point: NoveltyPoint) -> Floats:
-    return _steps(x, point.mean, point.gain)
+def _product(x: Floats, weights: Floats, shift: int) -> Floats:
+    """The product of whole numbers, divided by 2^shift and rounded."""
+    return np.asarray(np.rint(np.ldexp(x @ weights, -shift)))
 
 
 def _axes(steps: Floats, count: int) -> Floats:
@@ -195,7 +190,7 @@ def _shift(values: Floats, bits: int) -> int:
 
 def _coordinates(z: Floats, point: NoveltyPoint) -> Floats:
     """Whole coordinates (m, components) of components."""
-    whole = np.rint(np.ldexp(z @ point.whitening, -point.shift))
+    whole = _product(z, point.whitening, point.shift)
     return np.asarray(np.clip(whole, -FARTHEST, FARTHEST))
 
 

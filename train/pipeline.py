@@ -144,10 +144,17 @@ class Choice:
             labels: (n,) of the task; empty where a trial has none.
             is_own: (n,) whether a trial is the owner's; None where no weights are needed.
         """
-        counts = np.ones(len(labels), dtype=np.int64)
-        if is_own is not None:
-            counts = np.where(is_own, self.weights[1], self.weights[0])
-        return np.where(labels == "", 0, counts)
+        return how_often(labels != "", is_own, self.weights)
+
+
+def how_often(
+    labelled: Booleans, is_own: Booleans | None, weights: tuple[int, int]
+) -> Integers:
+    """(n,) how often each trial counts; see `Choice.counts`."""
+    if is_own is None:
+        return labelled.astype(np.int64)
+    simulated, own = weights
+    return np.where(labelled, np.where(is_own, own, simulated), 0)
 
 
 def fittable(

@@ -47,6 +47,10 @@ class SearchGrid:
     tasks: tuple[str, ...] = ()
     weights: tuple[int, int] = (1, 1)
 
+    def is_for(self, task: str) -> bool:
+        """Whether these are candidates for a task."""
+        return not self.tasks or task in self.tasks
+
     def choices(self, directions: int) -> list[Choice]:
         """Every candidate, in the order of `_answers`.
 
@@ -107,8 +111,10 @@ def _rounded(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """
     columns = max(a.shape[1], 1)
     bits = (51 - (columns - 1).bit_length()) // 2
-    exponent = np.frexp(max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)))[1]
-    return np.rint(np.ldexp(a, bits - exponent)), np.rint(np.ldexp(b, bits - exponent))
+    largest = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
+    _, exponent = np.frexp(largest)
+    power = bits - exponent
+    return np.rint(np.ldexp(a, power)), np.rint(np.ldexp(b, power))
 
 
 class Decomposition:

@@ -1,6 +1,8 @@
 """Nested accuracy against doing it the long way with the exported estimators."""
 
 from dataclasses import replace
+from itertools import product
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -37,90 +39,91 @@ def trials(n=36, seed=0):
     X = rng.normal(size=(n, 12))
     X[:, :6] += np.where(y == "a", 1.0, 0.0)[:, None]
     X[:, 6:] = X[:, 6:] * 50 + np.where(y == "b", 60.0, 0.0)[:, None]
-    return X, y
+    return Vectors(X, {"t": y}, TWO)
 
 
-def told_right(choice, X, y, train, test, is_own=None):
-    """Whether the classifier that is exported tells the tests."""
-    is_own = None if is_own is None else is_own[train]
-    model = ContactClassifier({"t": choice}, TWO).fit(X[train], {"t": y[train]}, is_own)
-    return model.classes_["t"][model.decide(X[test])["t"].labels] == y[test]
+def told_right(choice, vectors, train, test):
+    """Whether the classifier that is exported tells the tests; both are masks."""
+    model = ContactClassifier.of({"t": choice}, vectors.part(train))
+    labels = model.decide(vectors.X[test])["t"].labels
+    return model.classes_["t"][labels] == vectors.y["t"][test]
+
+
+def assert_exported(table, fold, vectors, train, test):
+    """The candidates' answers by a fit without a fold are those of the classifier that
+    is exported."""
+    answers = table.right["t"][fold][:, test]
+    for choice, right in zip(table.choices["t"], answers, strict=True):
+        assert (right == told_right(choice, vectors, train, test)).all()
 
 
 def test_every_answer_is_that_of_the_exported_estimators():
-    X, y = trials()
-    folds = stratified_folds(y, 4)
-    table = evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS)
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 4)
+    table = evaluate(vectors, folds, GRIDS)
     assert len(table.choices["t"]) == 4 + 6 + 1
-    for i in range(4):
-        for j in range(4):
-            train = np.flatnonzero((folds != i) & (folds != j))
-            test = np.flatnonzero(folds == j)
-            for choice, right in zip(
-                table.choices["t"], table.right["t"][i], strict=True
-            ):
-                assert (right[test] == told_right(choice, X, y, train, test)).all()
+    for i, j in product(range(4), repeat=2):
+        train = (folds != i) & (folds != j)
+        assert_exported(table, i, vectors, train, folds == j)
 
 
-def test_trials_that_are_equal_tie_as_in_the_exported_estimators():
+@pytest.mark.parametrize("seed", range(8))
+def test_trials_that_are_equal_tie_as_in_the_exported_estimators(seed):
     """Each trial has a twin of another label: the earlier of equally near ones
     decides."""
     folds = np.repeat(np.arange(6) % 3, 2)
     y = np.array(["a", "b", "b", "c", "c", "a"] * 2)
     grids = [replace(grid, neighbours=(1, 2)) for grid in GRIDS]
-    for seed in range(8):
-        X = np.repeat(trials(6, seed)[0], 2, axis=0) * 10.0 ** (seed - 4)
-        table = evaluate(Vectors(X, {"t": y}, TWO), folds, grids)
-        for fold in range(3):
-            train = np.flatnonzero(folds != fold)
-            test = np.flatnonzero(folds == fold)
-            for choice, right in zip(
-                table.choices["t"], table.right["t"][fold], strict=True
-            ):
-                assert (right[test] == told_right(choice, X, y, train, test)).all()
-
-
-def test_trials_without_a_label_or_a_fold_are_not_tested_and_weights_are_those_of_the_estimators():
-    X, y = trials()
-    y[::5] = ""
-    is_own = np.arange(len(y)) % 2 == 0
-    folds = np.where(is_own, np.arange(len(y)) // 2 % 3, -1)
-    grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
-    table = evaluate(Vectors(X, {"t": y}, TWO, is_own=is_own), folds, grids)
-    tested = is_own & (y != "")
-    assert (table.tested["t"] == tested).all()
+    X = np.repeat(trials(6, seed).X, 2, axis=0) * 10.0 ** (seed - 4)
+    vectors = Vectors(X, {"t": y}, TWO)
+    table = evaluate(vectors, folds, grids)
     for fold in range(3):
-        train = folds != fold
-        test = (folds == fold) & tested
-        for choice, right in zip(
-            table.choices["t"], table.right["t"][fold], strict=True
-        ):
-            assert (right[test] == told_right(choice, X, y, train, test, is_own)).all()
+        assert_exported(table, fold, vectors, folds != fold, folds == fold)
+
+
+@pytest.fixture
+def partly_labelled():
+    """Trials of which some have no label and others no fold, and their folds."""
+    vectors = trials()
+    y = vectors.y["t"]
+    y[::5] = ""
+    numbers = np.arange(len(y))
+    is_own = numbers % 2 == 0
+    folds = np.where(is_own, numbers // 2 % 3, -1)
+    return replace(vectors, is_own=is_own), folds
+
+
+def test_trials_without_a_label_or_a_fold_are_not_tested(partly_labelled):
+    vectors, folds = partly_labelled
+    table = evaluate(vectors, folds, GRIDS)
+    tested = vectors.is_own & (vectors.y["t"] != "")
+    assert (table.tested["t"] == tested).all()
     assert table.nested("t").total == tested.sum()
 
 
+def test_weights_are_those_of_the_exported_estimators(partly_labelled):
+    vectors, folds = partly_labelled
+    grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
+    table = evaluate(vectors, folds, grids)
+    for fold in range(3):
+        test = (folds == fold) & (vectors.y["t"] != "")
+        assert_exported(table, fold, vectors, folds != fold, test)
+
+
 def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
-    X, y = trials()
-    folds = stratified_folds(y, 4)
-    table = evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS)
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 4)
+    table = evaluate(vectors, folds, GRIDS)
+    choices = table.choices["t"]
     right = 0
-    for i in range(4):
-        inner = [
-            np.concatenate(
-                [
-                    told_right(
-                        c, X, y, np.flatnonzero((folds != i) & (folds != j)), folds == j
-                    )
-                    for j in range(4)
-                    if j != i
-                ]
-            ).mean()
-            for c in table.choices["t"]
-        ]
-        best = table.choices["t"][int(np.argmax(inner))]
-        right += told_right(
-            best, X, y, np.flatnonzero(folds != i), np.flatnonzero(folds == i)
-        ).sum()
+    for fold in range(4):
+        inner = np.zeros(len(choices))
+        for other in {*range(4)} - {fold}:
+            train = (folds != fold) & (folds != other)
+            for i, choice in enumerate(choices):
+                inner[i] += told_right(choice, vectors, train, folds == other).sum()
+        best = choices[inner.argmax()]
+        right += told_right(best, vectors, folds != fold, folds == fold).sum()
     assert table.nested("t").right == right
 
 
@@ -162,9 +165,9 @@ def test_twins_of_a_group_do_not_tell_each_other():
 @pytest.mark.parametrize("most", [None, 2])
 def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
     """All of them, or the first of them."""
-    X, y = trials()
-    two = np.where(y == "a", "yes", "no")
-    labels = {"t": y, "u": two}
+    y = trials().y["t"]
+    labels = {"t": y, "u": np.where(y == "a", "yes", "no")}
+    vectors = replace(trials(), y=labels)
     grid = SearchGrid(
         "IV",
         "lda",
@@ -173,17 +176,10 @@ def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
         targets=("t", "u"),
         most_directions=most,
     )
-    table = evaluate(Vectors(X, labels, TWO), stratified_folds(y, 4), [grid])
-    train = np.flatnonzero(table.folds)
-    test = np.flatnonzero(table.folds == 0)
+    table = evaluate(vectors, stratified_folds(y, 4), [grid])
     (choice,) = table.choices["t"]
-    assert choice.components == (
-        most or sum(len(set(labels[task])) - 1 for task in labels)
-    )
-    model = ContactClassifier({"t": choice}, TWO)
-    model.fit(X[train], {task: is_own[train] for task, is_own in labels.items()})
-    said = model.classes_["t"][model.decide(X[test])["t"].labels]
-    assert (table.right["t"][0][0, test] == (said == y[test])).all()
+    assert choice.components == (most or 2 + 1)
+    assert_exported(table, 0, vectors, table.folds != 0, table.folds == 0)
 
 
 def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
@@ -248,24 +244,20 @@ def test_folds_spread_each_class_evenly():
 
 
 def test_what_cannot_be_parted_or_measured_is_one_sentence():
-    X, y = trials()
+    vectors = trials()
+    y = vectors.y["t"]
     with pytest.raises(InputError, match="at least 3 folds, not 2"):
-        evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 2), GRIDS)
-    X[5, 3] = np.nan
+        evaluate(vectors, stratified_folds(y, 2), GRIDS)
+    vectors.X[5, 3] = np.nan
     with pytest.raises(InputError, match="trial 5 are not finite"):
-        evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 3), GRIDS)
+        evaluate(vectors, stratified_folds(y, 3), GRIDS)
 
 
-def test_progress_is_told_after_each_of_the_fits_that_are_announced():
-    X = np.random.default_rng(0).normal(size=(20, 4))
-    y = np.array(list("ab") * 10)
-    folds = stratified_folds(y, 5)
-    seen = []
-    for nested, count in ((True, 15), (False, 5)):
-        seen.clear()
-        options = {
-            "progress": lambda: seen.append(1),
-            "nested": nested,
-        }
-        evaluate(Vectors(X, {"t": y}, TWO), folds, GRIDS[:1], **options)
-        assert len(seen) == fits(folds, nested) == count
+@pytest.mark.parametrize(("nested", "count"), [(True, 15), (False, 5)])
+def test_progress_is_told_after_each_of_the_fits_that_are_announced(nested, count):
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 5)
+    progress = Mock()
+    evaluate(vectors, folds, GRIDS[:1], progress=progress, nested=nested)
+    assert fits(folds, nested) == count
+    assert progress.call_count == count
