@@ -526,9 +526,14 @@ def _leaks(dataset: DataSet, y: Mapping[str, Strings]) -> list[str]:
     np.fill_diagonal(squares, np.inf)
     notes = []
     for task, every in y.items():
-        labels = every[untouched]
-        share = float((labels[squares.argmin(axis=1)] == labels).mean())
-        usual = float(np.unique(labels, return_counts=True)[1].max() / len(labels))
+        labelled = np.flatnonzero(every[untouched])
+        if len(labelled) < 2:
+            continue
+        labels = every[untouched][labelled]
+        nearest = squares[np.ix_(labelled, labelled)].argmin(axis=1)
+        share = float((labels[nearest] == labels).mean())
+        _, counts = np.unique(labels, return_counts=True)
+        usual = float(counts.max() / len(labels))
         if share > usual + LEAK * (1.0 - usual):
             notes.append(
                 f"warning: the first frame alone tells {task} in {share:.0%} of the "

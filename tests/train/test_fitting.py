@@ -133,26 +133,48 @@ def test_names_of_train_are_loaded_when_they_are_asked_for():
         _ = train.nothing
 
 
-def test_labels_told_by_the_first_frame_and_recordings_that_begin_in_contact_are_two_warnings():
-    """Ten taxels' rest values tell the label; the touch comes later, or is there from
-    the start."""
-    labels = np.array(["a", "b"] * 10)
-    frames = np.where(labels == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5))
+LABELS = np.array(["a", "b"] * 10)
+REST = np.where(LABELS == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5))
+"""Frames of ten taxels whose rest values tell the label."""
 
-    def warning(onset_s):
-        recordings = [
-            Recording(np.arange(6) / 10.0, f) for f in frames.astype(np.uint16)
-        ]
-        trials = [SimpleNamespace(recording=r, onset_s=onset_s) for r in recordings]
-        (note,) = _leaks(SimpleNamespace(trials=trials), {"kind": labels})
-        return note
 
-    assert "the first frame alone tells kind in 100% of the trials" in warning(0.1)
-    assert "begin with their recording, so their onset is not known; record" in warning(
-        0.0
-    )
-    frames[:, 1:] = 50  # and grows
-    assert "or take --threshold 18 --onset 27, by which it begins later" in warning(0.0)
+def leaks(frames, labels, onset_s=0.1):
+    """The warnings of recordings whose touch begins at some time."""
+    trials = []
+    for of_trial in frames.astype(np.uint16):
+        recording = Recording(np.arange(6) / 10.0, of_trial)
+        trials.append(SimpleNamespace(recording=recording, onset_s=onset_s))
+    return _leaks(SimpleNamespace(trials=trials), {"kind": labels})
+
+
+def test_labels_told_by_the_first_frame_are_a_warning():
+    (note,) = leaks(REST, LABELS)
+    assert "the first frame alone tells kind in 100% of the trials" in note
+
+
+def test_a_first_frame_that_tells_only_which_trials_are_labelled_is_none():
+    labels = np.repeat(["a", "b", ""], [16, 6, 18])
+    frames = np.zeros((40, 6, 2, 5))
+    frames[labels == ""] = 100
+    assert leaks(frames, labels) == []
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_single_label_is_told_by_no_other_trial(count):
+    labels = np.where(np.arange(20) < count, "a", "")
+    assert leaks(REST, labels) == []
+
+
+def test_recordings_that_begin_in_contact_are_a_warning():
+    (note,) = leaks(REST, LABELS, onset_s=0.0)
+    assert "begin with their recording, so their onset is not known; record" in note
+
+
+def test_thresholds_by_which_contact_begins_later_are_named():
+    growing = REST.copy()
+    growing[:, 1:] = 50
+    (note,) = leaks(growing, LABELS, onset_s=0.0)
+    assert "or take --threshold 18 --onset 27, by which it begins later" in note
 
 
 @pytest.mark.parametrize(
