@@ -22,6 +22,7 @@ from joblib import Parallel, delayed
 
 from edge.chips import block
 from edge.chips.chip import ChipSpec
+from edge.commands.options import within
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
 from edge.skin import file as skinfile
@@ -386,20 +387,23 @@ def campaign(overhead_us, every, seed):
     return [f"{outcome.name} ({overhead_us:g} us)" for outcome in broken]
 
 
-def main():
+def main(argv=None):
     """Run the campaign; 1 if a promise is broken."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--every", type=int, default=1, help="every so many positions")
+    positive = within(int, 1, 1e6)
+    parser.add_argument(
+        "--every", type=positive, default=1, help="every so many positions"
+    )
     parser.add_argument(
         "--overhead",
-        type=float,
+        type=within(float, 0.0, 1e6),
         nargs="+",
         default=OVERHEADS_US,
         metavar="US",
         help="microseconds of software for each transaction (default: 0 50 100)",
     )
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(argv)
     broken = []
     for overhead_us in arguments.overhead:
         broken += campaign(overhead_us, arguments.every, arguments.seed)

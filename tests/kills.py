@@ -22,6 +22,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from edge import demo
+from edge.commands.options import within
 from edge.recording import load
 from edge.saving import find
 from edge.writing import PREFIX
@@ -35,6 +36,7 @@ PATIENCE_S = 120.0
 MOST_CHANGES = 4
 CLOSE_S = 0.003
 """Every other kill comes at most so long after one of the first changes of a file."""
+POSITIVE = within(int, 1, 1e6)
 OTHER_MODEL = "is of another model"
 
 
@@ -305,19 +307,23 @@ def row(name, deaths, damages):
 def main(argv=None):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
     parser = argparse.ArgumentParser(prog="kills", description=__doc__)
-    parser.add_argument("--count", type=int, default=60, help="kills of each command")
+    parser.add_argument(
+        "--count", type=POSITIVE, default=60, help="kills of each command"
+    )
     parser.add_argument(
         "--only", default="", help="commands whose name holds this text"
     )
     arguments = parser.parse_args(argv)
+    names = [name for name in VICTIMS if arguments.only in name]
+    if not names:
+        parser.error(f"no command's name holds {arguments.only!r}: {[*VICTIMS]}")
     rows = []
     complaints = []
-    for name, victim in VICTIMS.items():
-        if arguments.only in name:
-            deaths = list(deaths_of(name, victim, arguments.count))
-            wrong = [death.complaint for death in deaths if death.complaint]
-            complaints += [f"{name}: {text}" for text in wrong]
-            rows.append(row(name, deaths, len(wrong)))
+    for name in names:
+        deaths = list(deaths_of(name, VICTIMS[name], arguments.count))
+        wrong = [death.complaint for death in deaths if death.complaint]
+        complaints += [f"{name}: {text}" for text in wrong]
+        rows.append(row(name, deaths, len(wrong)))
     for text in complaints:
         print(text, file=sys.stderr)
     if arguments.only:

@@ -16,6 +16,8 @@ import sys
 from collections import Counter
 from random import Random
 
+from edge.commands.options import within
+
 MUTMUT = (sys.executable, "-m", "mutmut")
 UNNOTICED = ("survived", "no tests")
 
@@ -59,14 +61,17 @@ def run(names, minutes):
         process.wait()
 
 
-def main():
+def main(argv=None):
     """Try a sample of mutants; print those that no test notices, and a count of each
     status."""
     parser = argparse.ArgumentParser(
         prog="mutants", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument(
-        "--count", type=int, default=200, help="mutants to draw (%(default)s)"
+        "--count",
+        type=within(int, 1, 1e6),
+        default=200,
+        help="mutants to draw (%(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=2012, help="of the draw (%(default)s)"
@@ -77,9 +82,11 @@ def main():
     parser.add_argument(
         "--only", default="", help="draw from mutants whose name contains this"
     )
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(argv)
     generate()
     names = [name for name in statuses() if arguments.only in name]
+    if not names:  # mutmut would try all
+        parser.error(f"no mutant's name contains {arguments.only!r}")
     names = Random(arguments.seed).sample(names, min(arguments.count, len(names)))
     run(names, arguments.minutes)
     results = statuses()

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from edge.cli import dispatch
-from edge.commands.options import within
+from edge.commands.options import seconds, within
 
 
 def kind_of(default):
@@ -17,6 +17,8 @@ def kind_of(default):
         return {"action": "store_true"}
     if isinstance(default, int):
         return {"type": within(int, min(default, 1), 1e6), "default": default}
+    if isinstance(default, float):
+        return {"type": seconds, "default": default}
     return {"type": type(default), "default": default}
 
 

@@ -9,8 +9,6 @@ a tick left out. A virtual minute at 100 Hz takes about nine seconds of one core
 at 15 Hz takes about an hour.
 """
 
-from __future__ import annotations
-
 import errno
 import gc
 import os
@@ -24,6 +22,7 @@ import psutil
 
 from edge import demo
 from edge.classifier import Classifier
+from edge.errors import InputError
 from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.output.touch_map import map_writer
@@ -73,7 +72,7 @@ def soak(minutes, every, rate_hz):
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
     file = skinfile.load(skinfile.shipped("cody"))
     file = replace(file, reading=replace(file.reading, rate_hz=rate_hz))
-    frames_a_row = round(60.0 * rate_hz * every)
+    frames_a_row = max(round(60.0 * rate_hz * every), 1)
     rows = []
     written = 0
     with (
@@ -85,9 +84,9 @@ def soak(minutes, every, rate_hz):
         listener.bind(("127.0.0.1", 0))  # nobody reads what arrives there
         host, port = listener.getsockname()
         place = Path(folder) / "map.jsonl"
-        waiting = {"patient": lambda: True}
-        more = [map_writer(place, model.info, **waiting)]
-        lines = Lines(out, f"{host}:{port}", more=more, **waiting)
+        patient = {"patient": lambda: True}
+        placing = map_writer(place, model.info, **patient)
+        lines = Lines(out, f"{host}:{port}", more=[placing], **patient)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * minutes)
         pose = np.zeros(model.info.chain.dof)
@@ -99,13 +98,17 @@ def soak(minutes, every, rate_hz):
             lines.write(events)
             if number % frames_a_row == 0:
                 gc.collect()
-                row = {"minute": round(number / (60.0 * rate_hz), 2), "frames": number}
-                row["events"] = written
-                row["ticks left out"] = loop.schedule.missed_ticks
-                row["lines lost"] = sum(lines.lost.values())
-                row["descriptors"] = process.num_fds()
-                row["kB"] = process.memory_info().rss // 1024
-                rows.append(row)
+                rows.append(
+                    {
+                        "minute": round(number / (60.0 * rate_hz), 2),
+                        "frames": number,
+                        "events": written,
+                        "ticks left out": loop.schedule.missed_ticks,
+                        "lines lost": sum(lines.lost.values()),
+                        "descriptors": process.num_fds(),
+                        "kB": process.memory_info().rss // 1024,
+                    }
+                )
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
@@ -114,6 +117,8 @@ def soak(minutes, every, rate_hz):
 
 def measure(minutes, every, rate):
     """Run and print; 1 where something was not flat."""
+    if every > minutes:
+        raise InputError(f"--every {every:g} is longer than --minutes {minutes:g}")
     soaked = soak(minutes, every, rate)
     tables.write("soak", [soaked.rows])
     print(f"{soaked.placed} contacts on the map")

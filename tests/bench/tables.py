@@ -9,6 +9,7 @@ import csv
 import os
 import platform
 import re
+import shlex
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -49,14 +50,14 @@ def write(name, tables, command=""):
 
     Args:
         name: of the file.
-        tables: one below the other.
+        tables: one below the other; those without a row are left out.
         command: that was run; the command line of this process if it is empty.
     """
-    text = "\n\n".join(markdown(rows) for rows in tables)
+    text = "\n\n".join(map(markdown, filter(None, tables)))
     print(text)
     if not command:
         module = Path(sys.argv[0]).relative_to(ROOT).with_suffix("")
-        command = " ".join(["python -m", ".".join(module.parts), *sys.argv[1:]])
+        command = shlex.join(["python", "-m", ".".join(module.parts), *sys.argv[1:]])
     today = f"{datetime.now(UTC):%Y-%m-%d}"
     head = f"*`{command}`, commit {commit()}, {processor()}, {today}*"
     FOLDER.mkdir(exist_ok=True)

@@ -71,11 +71,12 @@ def main(argv=None):
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
     parser.add_argument("--only", default="", help="cases whose name holds this text")
     arguments = parser.parse_args(argv)
+    cases = [case for case in CASES if arguments.only in case.key]
+    if not cases:
+        parser.error(f"no case's name holds {arguments.only!r}")
     entries = []
     beyond = 0
-    for case in CASES:
-        if arguments.only not in case.key:
-            continue
+    for case in cases:
         began = time.perf_counter()
         worst = case.worst()
         within = worst.error <= case.bound
@@ -88,7 +89,7 @@ def main(argv=None):
             if text != case.key:
                 print(textwrap.fill(f"{name}: {text}", 96, **INDENT))
     print(f"{len(entries)} cases, {beyond} beyond their bound")
-    if len(entries) == len(CASES):
+    if cases == CASES:
         answers = [entry.answer for entry in entries]
         judges = [entry.judge for entry in entries]
         tables.write("hard_cases", [answers, judges], "make hard-cases")

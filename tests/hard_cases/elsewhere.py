@@ -71,6 +71,8 @@ def main(argv=None):
         "python", nargs="+", help="the command that runs the other Python"
     )
     arguments = parser.parse_args(argv)
+    if not sets(arguments.golden):
+        parser.error(f"no golden files are in {arguments.golden}; make them first")
     machine, shares = ask(arguments.golden, arguments.python, str(ROOT))
     farthest = max(shares, key=lambda key: shares[key])
     print(
