@@ -4,8 +4,6 @@ An unmodified smbus2 runs over the tests' C stand-in for /dev/i2c-N, whose calls
 at once, so that only the software takes time.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -37,10 +37,14 @@ def scipy_numpy(frame):
     return areas.max(), frame[mask].max(), (rows.mean(), cols.mean())
 
 
+def components(frame):
+    """OpenCV's regions; the first is what no region takes."""
+    pressed = (frame > THRESHOLD).view(np.uint8)
+    return cv2.connectedComponentsWithStats(pressed, connectivity=4)
+
+
 def opencv(frame):
-    _, labels, stats, centres = cv2.connectedComponentsWithStats(
-        (frame > THRESHOLD).view(np.uint8), connectivity=4
-    )
+    _, labels, stats, centres = components(frame)
     if len(stats) < 2:
         return None
     i = stats[1:, cv2.CC_STAT_AREA].argmax() + 1
@@ -70,9 +74,7 @@ def loudest(frame):
 
 
 def opencv_areas(frame):
-    _, _, stats, _ = cv2.connectedComponentsWithStats(
-        (frame > THRESHOLD).view(np.uint8), connectivity=4
-    )
+    _, _, stats, _ = components(frame)
     return stats[1:, cv2.CC_STAT_AREA].max()
 
 

@@ -5,8 +5,6 @@ processor time keep the ratio fair on a machine whose speed drifts and that othe
 programs share; the ratio is the median over the rounds, printed beside its target.
 """
 
-from __future__ import annotations
-
 import time
 import timeit
 from itertools import zip_longest

@@ -21,8 +21,6 @@ its calibration error, and how many of them are flagged `unknown` where 2 % are 
 for; in brackets, what four fifths of the sets give.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -201,49 +199,39 @@ def measure(sets, trials, seed, jobs):
     batches = workers.map("batches of trials", simulated, [(s,) for s in seeds])
     pool = np.array([t for batch, _ in batches for t in batch.trials], dtype=object)
     X = np.concatenate([vectors for _, vectors in batches], axis=1)
-    first = batches[0][0]
+    first, _ = batches[0]
     y = np.array([[trial.labels[task] for trial in pool] for task in first.tasks])
-    rng = np.random.default_rng(seed)
     ends = np.cumsum(first.widths())
-    parts = np.split(np.arange(ends[-1]), ends[:-1])
-    columns = dict(zip(first.names, parts, strict=True))
+    columns = np.split(np.arange(ends[-1]), ends[:-1])
+    shared = {"pool": X, "columns": dict(zip(first.names, columns, strict=True))}
+    rng = np.random.default_rng(seed)
     cases = []
     for _ in range(sets):
         rows = np.sort(rng.permutation(len(pool))[:trials])
         fields = {**vars(first), "trials": tuple(pool[rows])}
-        cases.append((DrawnSet(**fields, rows=rows, pool=X, columns=columns), y))
+        cases.append((DrawnSet(**fields, rows=rows, **shared), y))
     results = workers.map("data sets", judged, cases)
-    return int(report(*map(chain.from_iterable, zip(*results, strict=True))) > 0)
+    parts = map(chain.from_iterable, zip(*results, strict=True))
+    return int(report(sets, *parts) > 0)
 
 
-def report(certified, fronts, trusted):
+def report(sets, certified, fronts, trusted):
     """Print and write the rows of `judged`, of all data sets; the number of promises
     broken too often."""
-    written = {"certified": [], "fronts": [], "trusted": []}
-    failed = 0
-    for (task, asked), rows in grouped(certified, ["task", "asked"]):
-        row = certificate(rows)
-        failed += row["above"] > binom.ppf(0.99, len(rows), RISK)
-        written["certified"].append({"task": task, "asked": asked, **row})
-    for (task, name), rows in grouped(fronts, ["task", "front"]):
-        row = interval(rows)
-        outside = row["below the interval"] + row["above it"]
-        failed += outside > binom.ppf(0.99, len(rows), OUTSIDE)
-        written["fronts"].append({"task": task, "front": name, **row})
-    for (task,), rows in grouped(trusted, ["task"]):
-        means = rows.drop(columns="task").mean()
-        row = {"task": task, **{name: f"{mean:.3f}" for name, mean in means.items()}}
-        flagged = rows["flagged unknown"]
-        low, high = flagged.quantile((0.1, 0.9))
-        row[flagged.name] = f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})"
-        written["trusted"].append(row)
-    tables.write("risk", list(written.values()))
-    return failed
+    certified = summed_up(certified, ["task", "asked"], certificate)
+    fronts = summed_up(fronts, ["task", "front"], interval)
+    trusted = summed_up(trusted, ["task"], confidence)
+    tables.write("risk", [certified, fronts, trusted])
+    above = np.array([row["above"] for row in certified])
+    outside = np.array([row["below the interval"] + row["above it"] for row in fronts])
+    most_above, most_outside = binom.ppf(0.99, sets, (RISK, OUTSIDE))
+    return (above > most_above).sum() + (outside > most_outside).sum()
 
 
-def grouped(rows, keys):
-    """The rows of each group, in the order in which the groups first come."""
-    return pd.DataFrame(rows).groupby(keys, sort=False)
+def summed_up(rows, keys, summary):
+    """A row for each group of rows, in the order in which the groups first come."""
+    groups = pd.DataFrame(rows).groupby(keys, sort=False)
+    return [dict(zip(keys, key, strict=True)) | summary(of) for key, of in groups]
 
 
 def certificate(rows):
@@ -268,6 +256,16 @@ def interval(rows):
         "below the interval": int((rows["realised"] < rows["low"]).sum()),
         "above it": int((rows["realised"] > rows["high"]).sum()),
     }
+
+
+def confidence(rows):
+    """Means of what the confidence was worth."""
+    means = rows.drop(columns="task").mean()
+    row = {name: f"{mean:.3f}" for name, mean in means.items()}
+    flagged = rows["flagged unknown"]
+    low, high = flagged.quantile((0.1, 0.9))
+    row[flagged.name] = f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})"
+    return row
 
 
 if __name__ == "__main__":

@@ -6,8 +6,6 @@ features of shear among the candidates, and without them, on the same trials. Ga
 means over the seeds, with the 95 % interval of the mean (Student's t).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

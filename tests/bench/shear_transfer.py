@@ -5,8 +5,6 @@ and with those of shear besides. Both are scored on the same touches of MuJoCo, 
 tangential forces are those of its own contacts.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from edge.model.model import Model
@@ -43,16 +41,13 @@ def measure(seeds, trials, jobs, out):
     both = models(out, jobs)
     rows = []
     for seed in range(1, seeds + 1):
-        recordings = [
-            recording for _, pair in touches(seed, trials) for recording in pair
-        ]
+        recordings = [recording for _, _, recording in touches(seed, trials)]
         for name, model in both.items():
             summary = Summary(judged_tasks(model))
             for number, recording in enumerate(recordings):
                 events = decide(model, recording, f"touch {number}")
                 summary.add(recording.labels, events)
-            row = {"MuJoCo seed": seed, "features": name}
-            row["trials"] = summary.recordings
+            row = {"MuJoCo seed": seed, "features": name, "trials": len(recordings)}
             for task in judged_tasks(model):
                 right, count = summary.right(task)
                 row[f"{task} right, %"] = f"{100.0 * right / count:.1f}"

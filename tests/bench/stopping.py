@@ -22,9 +22,8 @@ about the paper's three features at each frame until then, every 0.2 s. aeon tea
 TEASER which answers to trust by answers to whole series.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -174,16 +173,17 @@ def of_aeon(make, series, labels, folds):
 
 
 def peers(by_set, series, labels, folds):
-    """[extra trees, their ratio test, CALIMERA][set of features] curves on a task, and
-    the points of aeon's rules."""
-    curves = [
-        [*extra_trees(X, labels, folds), calimera(X, labels, folds)] for X in by_set
-    ]
-    points = {}
-    if series is not None:
-        for name, make in AEON.items():
-            points[name] = of_aeon(make, series, labels, folds)
-    return list(zip(*curves, strict=True)), points
+    """{peer: its curves on a task, one for each set of features}, and {rule of aeon:
+    its point}."""
+    curves = {name: [] for name in PEERS}
+    for X in by_set:
+        sure, ratio = extra_trees(X, labels, folds)
+        curves["extra trees"].append(sure)
+        curves["their SPRT"].append(ratio)
+        curves["CALIMERA"].append(calimera(X, labels, folds))
+    rules = AEON if series is not None else {}
+    points = {name: of_aeon(rules[name], series, labels, folds) for name in rules}
+    return curves, points
 
 
 def at(curves, seconds):
@@ -201,33 +201,39 @@ def cell(percentage):
     return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
-def when_sure(course):
-    """The curve of our stopping, at each threshold."""
-    curve = []
-    for threshold in (NEVER, *THRESHOLDS.tolist()):
-        stops, wrong = course.under(StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1))
-        curve.append((SECONDS[stops].mean(), wrong.mean()))
-    return curve
-
-
 @dataclass(frozen=True)
 class Judged:
     """What a task's early decisions about one data set cost.
 
     Attributes:
-        fixed, sure: our curves of fixed windows and of stopping when sure.
+        ours: our comparison (see `train.tradeoff.early`).
         rivals: {peer: its curves, one for each set of features}.
         aeon: {rule of aeon: (mean seconds, share wrong)}.
-        certified: our certified rules.
-        trials: number of trials.
     """
 
-    fixed: Any
-    sure: Any
+    ours: Any
     rivals: Any
     aeon: Any
-    certified: Any
-    trials: int
+
+    @property
+    def trials(self):
+        """Number of trials."""
+        return self.ours.right.shape[1]
+
+    @property
+    def fixed(self):
+        """Our curve of fixed windows."""
+        return list(zip(SECONDS, 1.0 - self.ours.right.mean(axis=1), strict=True))
+
+    @cached_property
+    def sure(self):
+        """Our curve of stopping when sure, at each threshold."""
+        curve = []
+        for threshold in (NEVER, *THRESHOLDS.tolist()):
+            rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
+            stops, wrong = self.ours.course.under(rule)
+            curve.append((SECONDS[stops].mean(), wrong.mean()))
+        return curve
 
 
 def judge(data, quick, jobs, is_first):
@@ -245,16 +251,13 @@ def judge(data, quick, jobs, is_first):
     n = len(folds)
     series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
     compared = compare_stopping(dataset, DECISION_POINTS_S, quick=quick, jobs=jobs)
-    cases = [
-        (by_set, series if is_first else None, y[task], folds) for task in compared
-    ]
+    if not is_first:
+        series = None
+    cases = [(by_set, series, y[task], folds) for task in compared]
     rivals = Workers(jobs).map("peers", peers, cases)
     judged = {}
     for (task, ours), (curves, points) in zip(compared.items(), rivals, strict=True):
-        fixed = list(zip(SECONDS, 1.0 - ours.right.mean(axis=1), strict=True))
-        of_peers = dict(zip(PEERS, curves, strict=True))
-        sure = when_sure(ours.course)
-        judged[task] = Judged(fixed, sure, of_peers, points, ours.certified, n)
+        judged[task] = Judged(ours, curves, points)
     return judged
 
 
@@ -262,25 +265,24 @@ def measure(data, quick, jobs):
     """Measure; print and write the tables."""
     sets = [judge(folder, quick, jobs, folder == data[0]) for folder in data]
     rows = {"at each time": [], "at its own time": [], "certified": []}
-    for task in sets[0]:
+    for task, first in sets[0].items():
         judged = [of_set[task] for of_set in sets]
         for seconds in DECISION_POINTS_S:
             row = {"task": task, "mean time, s": f"{seconds:.1f}"}
             rows["at each time"].append(row | compare(judged, seconds))
-        first = judged[0]
         for name, (seconds, wrong) in first.aeon.items():
             row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
             row["wrong, %"] = cell(100 * wrong)
             row["when sure, at that time"] = cell(at([first.sure], seconds))
             rows["at its own time"].append(row)
-        for rule in first.certified:
+        for rule in first.ours.certified:
             row = {"task": task, "at most wrong": f"{rule.asked:g}"}
             row["certified in folds"] = f"{rule.folds} of {FOLDS}"
             row["wrong"] = f"{rule.wrong:.1%}"
             row["unknown"] = f"{rule.unknown:.1%}"
             row["mean time, s"] = f"{rule.mean_s:.2f}"
             rows["certified"].append(row)
-    tables.write("stopping", [table for table in rows.values() if table])
+    tables.write("stopping", rows.values())
 
 
 def compare(judged, seconds):
@@ -288,19 +290,17 @@ def compare(judged, seconds):
     sure, and the peers; and differences with their standard errors."""
     fixed = np.array([at([of_set.fixed], seconds) for of_set in judged])
     sure = np.array([at([of_set.sure], seconds) for of_set in judged])
-    rivals = {
-        name: np.array([at(of_set.rivals[name], seconds) for of_set in judged])
-        for name in PEERS
-    }
-    means = {name: values.mean() for name, values in rivals.items()}
-    known = {name: mean for name, mean in means.items() if not np.isnan(mean)}
-    best = rivals[min(known, key=known.get)] if known else np.full(len(judged), np.nan)
+    rivals = np.array(
+        [[at(of_set.rivals[name], seconds) for of_set in judged] for name in PEERS]
+    )
+    means = rivals.mean(axis=1)
+    best = rivals[np.nan_to_num(means, nan=np.inf).argmin()]
     trials = judged[0].trials
     return {
         "fixed window, % wrong": cell(fixed.mean()),
         "when sure": cell(sure.mean()),
         "gain": difference(fixed, sure, trials),
-        **{name: cell(mean) for name, mean in means.items()},
+        **dict(zip(PEERS, map(cell, means), strict=True)),
         "best of these less when sure": difference(best, sure, trials),
     }
 

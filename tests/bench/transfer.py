@@ -7,8 +7,6 @@ things, and the model is scored on them. They are a test set: nothing in train/ 
 them, and nothing may be tuned to one set of them; `--seed` makes another.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial
@@ -148,13 +146,16 @@ def touch_object(index, seed, habit):
 
 
 def touches(seed, trials):
-    """The habit and the recordings of each of half as many objects."""
-    habits = list(islice(cycle(HABITS), trials // 2))
+    """The number, the habit and a recording of each touch, two of each object; of half
+    as many objects as trials, but at least one."""
+    habits = list(islice(cycle(HABITS), max(trials // 2, 1)))
     pairs = Parallel(n_jobs=cpu_count(), return_as="generator")(
         delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
     )
     shown = bar(pairs, total=len(habits), unit=" objects", desc="MuJoCo")
-    return zip(habits, shown, strict=True)
+    for number, (habit, pair) in enumerate(zip(habits, shown, strict=True)):
+        for recording in pair:
+            yield number, habit, recording
 
 
 def judged_tasks(model):
@@ -173,17 +174,16 @@ def measure(model, out, trials, seed):
     tasks = judged_tasks(loaded)
     summaries = {habit: Summary(tasks) for habit in (*HABITS, "all")}
     unknown = 0
-    for i, (habit, recordings) in enumerate(touches(seed, trials)):
+    for number, habit, recording in touches(seed, trials):
+        labels = recording.labels
         folder = out / f"seed{seed}" / habit.replace(" ", "-")
         folder.mkdir(parents=True, exist_ok=True)
-        for recording in recordings:
-            labels = recording.labels
-            path = folder / f"{labels['object']}-{i:02d}-{labels['mobility']}.npz"
-            save(path, recording)
-            events = decide(loaded, recording, str(path))
-            unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
-            for name in (habit, "all"):
-                summaries[name].add(labels, events)
+        path = folder / f"{labels['object']}-{number:02d}-{labels['mobility']}.npz"
+        save(path, recording)
+        events = decide(loaded, recording, str(path))
+        unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
+        for name in (habit, "all"):
+            summaries[name].add(labels, events)
     rows = []
     for name, summary in summaries.items():
         row = {"trials": name, "number": summary.recordings}

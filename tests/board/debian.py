@@ -1,8 +1,6 @@
 """Debian packages in a folder: fetched with the machine's own apt, without installing
 anything."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

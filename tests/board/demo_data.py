@@ -7,8 +7,6 @@ reads `model.onnx`, `known/` and `unseen/` from that folder (see `make demo-data
 replaces `edge/demo/` and `tests/golden/demo.npz`.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

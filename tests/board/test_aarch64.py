@@ -8,14 +8,14 @@ wheels load and numbers agree; it says nothing about time. Without apt or a netw
 tests are skipped with the reason, except in CI.
 """
 
-import csv
 import json
 import shutil
-import statistics
 import subprocess
 import sys
 import zipfile
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from edge.demo import FOLDER, MODEL
@@ -56,10 +56,12 @@ def emulated_python(wheel, counts):
 
     def install(site):
         options = "-m pip install --quiet --disable-pip-version-check"
-        kind = f"--only-binary=:all: --implementation=cp --python-version={version}"
+        options += (
+            f" --only-binary=:all: --implementation=cp --python-version={version}"
+        )
         platforms = [f"--platform={platform}_aarch64" for platform in PLATFORMS]
         where = ["-c", str(constraints), "--target", str(site)]
-        pip = [sys.executable, *options.split(), *kind.split(), *platforms, *where]
+        pip = [sys.executable, *options.split(), *platforms, *where]
         run([*pip, *PACKAGES], "pip cannot fetch the aarch64 wheels")
 
     recipe = f"{version}\n{constraints.read_text()}"
@@ -95,19 +97,18 @@ def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_b
     """In one process, as its start takes long: shipped model, the tests' model, the
     hard cases."""
     assert hard_golden.main(["--out", str(tmp_path)]) == 0
-    golden = CHECKOUT / "tests" / "golden" / "demo.npz"
     shutil.copytree(exported, tmp_path / "tests")
     (tmp_path / "demo").mkdir()
     shutil.copy(MODEL, tmp_path / "demo" / "model.onnx")
+    golden = CHECKOUT / "tests" / "golden" / "demo.npz"
     shutil.copy(golden, tmp_path / "demo" / "golden.npz")
     machine, shares = elsewhere.ask(tmp_path, python)
     assert machine["machine"] == "aarch64"
-    names = {folder.name for folder in elsewhere.sets(tmp_path)}
-    assert {name for name, _ in shares} == names
-    assert {("demo", "series counts"), ("demo", "object_label")} <= set(shares)
-    print(
-        f"{len(shares)} quantities, at most {max(shares.values()):.2g} of their bounds"
-    )
+    sets = {folder.name for folder in elsewhere.sets(tmp_path)}
+    assert {name for name, _ in shares} == sets
+    assert {("demo", "series counts"), ("demo", "object_label")} <= shares.keys()
+    worst = max(shares.values())
+    print(f"{len(shares)} quantities, at most {worst:.2g} of their bounds")
     assert {key: share for key, share in shares.items() if share > 1.0} == {}
 
 
@@ -130,17 +131,12 @@ def test_the_instructions_of_each_kind_of_frame_are_counted(python, counts, tmp_
     guest = CHECKOUT / "tests" / "board" / "count_guest.py"
     words = [*python, guest, MODEL, FOLDER / "cardboard-box-movable.npz"]
     kinds = subprocess.check_output(words, cwd=tmp_path, text=True).splitlines()
-    *marks, _ = map(int, counts.read_text().split())  # the last marks the end
-    instructions = {}
-    for kind, before, after in zip(kinds, marks[::2], marks[1::2], strict=True):
-        instructions.setdefault(kind, []).append(after - before)
-    medians = {kind: statistics.median(each) for kind, each in instructions.items()}
-    rows = [("frame", "n", "lowest", "median", "highest")]
-    for kind, numbers in instructions.items():
-        ends = min(numbers), medians[kind], max(numbers)
-        rows.append((kind, len(numbers), *ends))
-    with TABLE.open("w", newline="") as file:
-        csv.writer(file).writerows(rows)
+    marks = np.loadtxt(counts, dtype=np.int64)[:-1]  # the last marks the end
+    frames = pd.DataFrame({"frame": kinds, "count": marks[1::2] - marks[::2]})
+    of_kinds = frames.groupby("frame", sort=False)["count"]
+    table = of_kinds.agg(n="size", lowest="min", median="median", highest="max")
+    table.to_csv(TABLE)
     print(f"aarch64 instructions ({TABLE.relative_to(CHECKOUT)})\n{TABLE.read_text()}")
-    assert 0 < medians["frame without contact"] < medians["frame in contact"]
-    assert medians["frame in contact"] < medians["frame that decides"]
+    median = table["median"]
+    assert 0 < median["frame without contact"] < median["frame in contact"]
+    assert median["frame in contact"] < median["frame that decides"]

@@ -93,9 +93,8 @@ def _initrd(system, command):
         (root / name).mkdir(parents=True)
     busybox = shutil.copy(system / "bin" / "busybox", root / "bin")
     for name in names:
-        shutil.copy(
-            next((system / "lib" / "modules").rglob(f"{name}.ko")), root / "modules"
-        )
+        module = next((system / "lib" / "modules").rglob(f"{name}.ko"))
+        shutil.copy(module, root / "modules")
     text = (CHECKOUT / "tests" / "board" / "kernel_init.sh").read_text()
     words = {"MODULES": " ".join(names), "COMMAND": shlex.join(command), "ENDED": ENDED}
     init = root / "init"

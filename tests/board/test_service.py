@@ -23,7 +23,7 @@ HERE = Path(__file__).resolve().parent
 SYSTEMD = Path("/lib/systemd/systemd")
 UNIT = "edge-classify.service"
 FAKE = "--fake /etc/edge-classify/touch.npz --loop --real-time"
-SHOWN = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitRTTIME".split()
+PROPERTIES = "ActiveState SubState MainPID NRestarts StatusText ExecMainStatus LimitRTTIME".split()
 
 
 class Machine:
@@ -55,23 +55,25 @@ class Machine:
         options = {"capture_output": True, "text": True, "check": False}
         return subprocess.run([*enter, *command], **options).stdout
 
-    def once(self, look, wanted, seconds=60.0):
-        """The first observation that is as wanted, or else the last one."""
+    def once(self, look, fits, seconds=60.0):
+        """The first observation that fits, or else the last one."""
         ends = time.monotonic() + seconds
-        while not wanted(seen := look()) and time.monotonic() < ends:
+        while not fits(state := look()) and time.monotonic() < ends:
             assert self.process.poll() is None, "systemd did not start"
             time.sleep(0.2)
-        return seen
+        return state
 
-    def shown(self):
+    def properties(self):
         """The unit's properties."""
-        properties = (f"--property={name}" for name in SHOWN)
-        lines = self.run("systemctl", "show", UNIT, *properties).splitlines()
+        options = (f"--property={name}" for name in PROPERTIES)
+        lines = self.run("systemctl", "show", UNIT, *options).splitlines()
         return dict(line.split("=", 1) for line in lines)
 
-    def wait_for(self, **wanted):
-        """The unit's properties once they are as wanted, or the last ones."""
-        return self.once(self.shown, lambda seen: wanted.items() <= seen.items())
+    def wait_for(self, **expected):
+        """The unit's properties once they are as expected, or the last ones."""
+        return self.once(
+            self.properties, lambda state: expected.items() <= state.items()
+        )
 
     def restart(self, arguments):
         """Start the service anew with these arguments."""
@@ -145,7 +147,7 @@ def test_a_mistake_in_the_arguments_is_not(machine):
     machine.restart(f"{FAKE} --error 2")
     machine.wait_for(ActiveState="failed")
     time.sleep(3.0)
-    mistaken = machine.shown()
+    mistaken = machine.properties()
     assert mistaken["ActiveState"] == "failed"
     assert mistaken["ExecMainStatus"] == "2"
     log = (machine.root / "run" / "log").read_text()
