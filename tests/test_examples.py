@@ -57,6 +57,19 @@ def test_a_model_is_fitted_and_exported(run, make_touch, tmp_path):
     assert category == "rigid-fixed"
 
 
+def test_tables_are_written_into_their_folder_whatever_the_objects_name(
+    make_touch, tmp_path
+):
+    for number, name in enumerate(("foam block", "../up", "/etc/x")):
+        touch = make_touch(seed=number, seconds=0.0, labels={"object": name})
+        edge.save(tmp_path / "touches" / f"{number}.npz", touch)
+    tables = tmp_path / "tables"
+    done = python(EXAMPLES / "to_csv.py", tmp_path / "touches", tables)
+    assert done.stderr == ""
+    paths = [path.relative_to(tables).as_posix() for path in tables.rglob("*.csv")]
+    assert sorted(paths) == ["-etc-x/2.csv", "-up/1.csv", "foam-block/0.csv"]
+
+
 def test_the_fitting_program_finds_its_packages_as_its_first_line_says():
     """Without arguments it fails at the first one, after every import."""
     line = (EXAMPLES / "fit_and_export.py").read_text().splitlines()[0]
@@ -224,6 +237,12 @@ def test_the_ros_node_without_a_model_says_so(monkeypatch, capsys):
 def test_the_ros_node_takes_a_whole_number_as_error(monkeypatch):
     ros = Ros(error=0)
     assert ros.run(monkeypatch) == 0
+
+
+def test_the_ros_node_names_an_error_that_is_no_number(monkeypatch, capsys):
+    assert Ros(error="few").run(monkeypatch) == 2
+    sentence = "edge_classify: error must be a number, not 'few'\n"
+    assert capsys.readouterr().err == sentence
 
 
 def test_the_ros_node_tells_whether_its_chips_are_read(monkeypatch):

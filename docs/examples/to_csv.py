@@ -3,6 +3,7 @@
 python to_csv.py RECORDINGS TABLES
 """
 
+import re
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ def main(recordings: str, tables: str) -> None:
     """Write every recording of a folder as a table of milliseconds and taxels."""
     for path in sorted(Path(recordings).glob("*.npz")):
         recording = edge.load(path)
-        folder = Path(tables) / recording.labels["object"].replace(" ", "-")
+        folder = Path(tables) / re.sub(r"[^\w-]+", "-", recording.labels["object"])
         folder.mkdir(parents=True, exist_ok=True)
         counts = recording.frames.reshape(len(recording.t), -1)
         names = [f"s{taxel + 1}" for taxel in range(counts.shape[1])]

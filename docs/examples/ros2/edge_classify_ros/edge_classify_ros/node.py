@@ -33,6 +33,18 @@ def topic(task: str) -> str:
     return f"task_{name}" if name[0].isdigit() else name
 
 
+def number(name: str, text: str) -> float | None:
+    """The value of a parameter that is a number; None of 0, which asks for nothing.
+
+    Raises:
+        EdgeError: it is none.
+    """
+    try:
+        return float(text) or None
+    except ValueError:
+        raise edge.EdgeError(f"{name} must be a number, not {text!r}") from None
+
+
 class ClassifyNode(Node):
     """Publishes `~/TASK` (vision_msgs/Classification), `~/events` (JSON in
     std_msgs/String), and `/diagnostics` once a second.
@@ -46,8 +58,8 @@ class ClassifyNode(Node):
         self.failure: Exception | None = None
         # `error:=0` is a whole number to ROS, and so is a model called 7.
         any_type = ParameterDescriptor(dynamic_typing=True)
-        given = {
-            name: type(default)(self.declare_parameter(name, default, any_type).value)
+        parameters = {
+            name: str(self.declare_parameter(name, default, any_type).value)
             for name, default in (
                 ("model", ""),
                 ("skin", ""),
@@ -56,13 +68,13 @@ class ClassifyNode(Node):
                 ("frame_id", "forearm_skin"),
             )
         }
-        self._frame_id = given["frame_id"]
-        self._model = edge.Model(given["model"])
+        self._frame_id = parameters["frame_id"]
+        self._model = edge.Model(parameters["model"])
         self._skin, self._joints, self._lasts_s = self._open(
-            given["skin"], given["fake"]
+            parameters["skin"], parameters["fake"]
         )
         self._classifier = edge.Classifier(
-            self._model, self._skin.layout, error=given["error"] or None
+            self._model, self._skin.layout, error=number("error", parameters["error"])
         )
         self._events = self.create_publisher(String, "~/events", 10)
         self._tasks = {

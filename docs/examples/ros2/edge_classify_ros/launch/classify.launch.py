@@ -21,13 +21,13 @@ def generate_launch_description():
         DeclareLaunchArgument(name, default_value=default, description=what)
         for name, (default, what) in ARGUMENTS.items()
     ]
-    given = {name: LaunchConfiguration(name) for name in ARGUMENTS}
-    topics = [("joint_states", given.pop("joint_states"))]
+    values = {name: LaunchConfiguration(name) for name in ARGUMENTS}
+    topics = [("joint_states", values.pop("joint_states"))]
     # Without a type, ROS would read `error:=0` as a whole number.
-    kinds = {name: float if name == "error" else str for name in given}
+    kinds = {name: float if name == "error" else str for name in values}
     parameters = {
         name: ParameterValue(value, value_type=kinds[name])
-        for name, value in given.items()
+        for name, value in values.items()
     }
     node = Node(
         package="edge_classify_ros",
