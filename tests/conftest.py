@@ -108,8 +108,8 @@ def recordings(tmp_path_factory):
 def in_a_row(*touches, rest=50):
     """Touches one after another at 100 Hz, each with so many frames of rest after
     it."""
-    frames = [np.pad(each.frames, ((0, rest), (0, 0), (0, 0))) for each in touches]
-    joints = [np.pad(each.joints, ((0, rest), (0, 0)), "edge") for each in touches]
+    frames = [np.pad(one.frames, ((0, rest), (0, 0), (0, 0))) for one in touches]
+    joints = [np.pad(one.joints, ((0, rest), (0, 0)), "edge") for one in touches]
     t = np.arange(sum(map(len, frames))) / 100.0
     whole = {"frames": np.concatenate(frames), "joints": np.concatenate(joints)}
     return replace(touches[0], t=t, **whole)
@@ -155,11 +155,17 @@ def edge(capsys):
     return run
 
 
-def python(*arguments, **options):
-    """A process of its own that ran Python in the project's folder, with its output as
+def ended(*words, **options):
+    """A command that ran in the project's folder, or in `cwd`, with its output as
     text."""
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
-    return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, **options)
+    pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    options = {"cwd": ROOT, **pipes, **options}
+    return subprocess.run(list(map(str, words)), text=True, **options)
+
+
+def python(*arguments, **options):
+    """The same of Python."""
+    return ended(sys.executable, *arguments, **options)
 
 
 def started(*arguments, **options) -> subprocess.Popen:

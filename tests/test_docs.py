@@ -5,7 +5,6 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from edge.chips import block
 from edge.chips.chip import MOST_TAXELS
 from edge.model.info import FORMAT
 from export.__main__ import main as export
-from tests.conftest import ROOT
+from tests.conftest import ROOT, ended
 
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
@@ -60,9 +59,7 @@ def test_the_two_evenings_mend_a_mistake(tmp_path):
     script = "".join(re.findall(r"```sh\n(.*?)```", text, re.S))
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PROJECT": str(ROOT)}
-    options = {"capture_output": True, "text": True, "check": False}
-    bash = ["bash", "-e", "-c", script]
-    ran = subprocess.run(bash, cwd=tmp_path, env=environment, **options)
+    ran = ended("bash", "-e", "-c", script, cwd=tmp_path, env=environment)
     assert ran.returncode == 0, ran.stderr
     before, *_, after = objects(ran.stdout)
     assert before != "pillow"

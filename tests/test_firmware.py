@@ -18,7 +18,7 @@ from edge.chips.three_axes import ZERO, ThreeAxisBlock, axes
 from edge.fake.bus import FakeBus
 from edge.skin import file as skinfile
 from edge.skin.skin import Skin
-from tests.conftest import ROOT
+from tests.conftest import ROOT, ended
 
 MATRIX = ROOT / "docs" / "examples" / "firmware" / "matrix"
 TAXELS = 100
@@ -177,6 +177,5 @@ def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
     """Checked against the declarations of Arduino's core, without a board's compiler."""
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
     command = [*GPP, "-fsyntax-only", board, f"-I{tmp_path}", "-xc++"]
-    options = {"capture_output": True, "text": True, "check": False}
-    compiled = subprocess.run([*command, MATRIX / "matrix.ino"], **options)
+    compiled = ended(*command, MATRIX / "matrix.ino")
     assert compiled.returncode == 0, compiled.stderr

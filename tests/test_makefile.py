@@ -1,16 +1,13 @@
 """The Makefile refuses data that is not there."""
 
-import subprocess
-
 import pytest
 
-from tests.conftest import ROOT
+from tests.conftest import ROOT, ended
 
 
-def make(*words):
-    """An ended `make` in the checkout, with its output as text."""
-    options = {"capture_output": True, "text": True, "check": False}
-    return subprocess.run(["make", *words], cwd=ROOT, **options)
+def make(*words, **options):
+    """An ended `make`."""
+    return ended("make", "-f", ROOT / "Makefile", *words, **options)
 
 
 @pytest.mark.parametrize(
@@ -33,10 +30,10 @@ def test_a_dry_run_says_what_it_would_do_with_data_that_are_not_there_yet():
 
 
 def test_a_front_that_was_never_measured_is_named(tmp_path):
-    done = make("export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
-    if not (ROOT / "build" / "tradeoff" / "front.json").exists():
-        assert done.returncode == 2
-        assert "FRONT needs the points of `make tradeoff`" in done.stderr
+    words = ("export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
+    done = make(*words, cwd=tmp_path)  # where no earlier run has left a front
+    assert done.returncode == 2
+    assert "FRONT needs the points of `make tradeoff`" in done.stderr
 
 
 def test_a_front_of_its_own_folder_comes_first(tmp_path):

@@ -5,7 +5,6 @@ import errno
 import re
 import shlex
 import shutil
-import subprocess
 
 import pytest
 
@@ -16,7 +15,7 @@ from edge.saving import save
 from edge.skin import file as skinfile
 from edge.tools import workstation
 from export.cli import parser as export_parser
-from tests.conftest import ROOT
+from tests.conftest import ROOT, ended
 from train.__main__ import main as train
 from train.__main__ import parser as train_parser
 from train.importers import sdh2
@@ -124,10 +123,9 @@ def test_a_command_of_the_workstation_does_as_it_is_written(
 @pytest.mark.parametrize("command", MAKE)
 def test_a_make_command_says_what_it_would_do(command):
     written = re.sub("[][…]", "", command)
-    options = {"cwd": ROOT, "capture_output": True, "text": True}
-    made = subprocess.run([*shlex.split(written), "--dry-run"], **options)
-    assert made.returncode == 0, made.stderr
-    assert "python" in made.stdout
+    done = ended(*shlex.split(written), "--dry-run")
+    assert done.returncode == 0, done.stderr
+    assert "python" in done.stdout
 
 
 @pytest.mark.parametrize("target", TARGETS)

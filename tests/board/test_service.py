@@ -18,6 +18,7 @@ from edge import demo
 from edge.fake.player import calibrated
 from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
+from tests.conftest import ended
 
 HERE = Path(__file__).resolve().parent
 SYSTEMD = Path("/lib/systemd/systemd")
@@ -52,8 +53,7 @@ class Machine:
     def run(self, *command):
         """What a command prints there."""
         enter = f"nsenter --target {self.first} --pid --mount --uts".split()
-        options = {"capture_output": True, "text": True, "check": False}
-        return subprocess.run([*enter, *command], **options).stdout
+        return ended(*enter, *command).stdout
 
     def once(self, look, fits, seconds=60.0):
         """The first observation that fits, or else the last one."""

@@ -14,6 +14,7 @@ import pytest
 
 import edge
 from tests.board.debian import CHECKOUT
+from tests.conftest import ended
 
 LARGEST = 320_000
 
@@ -36,9 +37,7 @@ def environment_of(folder, *packages):
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
 
     def run(*arguments, program="edge-classify"):
-        command = [programs / program, *map(str, arguments)]
-        caught = {"capture_output": True, "text": True, "check": False}
-        return subprocess.run(command, cwd=folder, env=environment, **caught)
+        return ended(programs / program, *arguments, cwd=folder, env=environment)
 
     return run
 
