@@ -179,13 +179,13 @@ VICTIMS = {
 
 def listing(folder):
     """When each file of a folder changed."""
-    seen = {}
+    times = {}
     for path in folder.glob("**/*"):
         try:
-            seen[str(path)] = path.stat().st_mtime_ns
+            times[str(path)] = path.stat().st_mtime_ns
         except FileNotFoundError:  # it was a temporary file
             continue
-    return seen
+    return times
 
 
 @dataclass(frozen=True)
@@ -215,12 +215,12 @@ def killed(command, folder, moment):
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    seen = listing(folder)
+    before = listing(folder)
     changes = 0
     while changes < moment.changes and process.poll() is None:
         latest = listing(folder)
-        changes += latest != seen
-        seen = latest
+        changes += latest != before
+        before = latest
     try:
         process.wait(moment.delay_s)
     except subprocess.TimeoutExpired:

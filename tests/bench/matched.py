@@ -84,8 +84,8 @@ def ours(thing, fixed):
     )
     batch = run_physics(scene, tuple(next(iter(kinds(scene).values()))))
     slide = batch.traces.get("slide_m", np.zeros_like(batch.force))
-    seen = next(readings(batch))
-    return measured(seen.frames(), seen.shear(), batch.force[0], slide[0])
+    reading = next(readings(batch))
+    return measured(reading.frames(), reading.shear(), batch.force[0], slide[0])
 
 
 def measured(frames, shear, force, moved_m):

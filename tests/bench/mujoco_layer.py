@@ -23,30 +23,6 @@ def beneath_n_m(modulus_pa):
     return 2.0 * modulus_pa * NET_M
 
 
-class Net:
-    """The knots of a layer, in rows and columns.
-
-    Attributes:
-        rows, cols: of the cells between the knots.
-        dz_m, dy_m: size of a cell.
-        numbers: (rows + 1, cols + 1) of the knots.
-        row_parts, col_parts: parts of a cell that a knot stands for: half of one on the
-            rim, and at a corner a quarter.
-    """
-
-    def __init__(self, thing):
-        high_m = min(thing.height_m, 0.20)
-        wide_m = min(thing.breadth_m, 0.15)
-        self.rows = round(high_m / NET_M)
-        self.cols = round(wide_m / NET_M)
-        self.dz_m = high_m / self.rows
-        self.dy_m = wide_m / self.cols
-        self.row_parts = [0.5, *[1.0] * (self.rows - 1), 0.5]
-        self.col_parts = [0.5, *[1.0] * (self.cols - 1), 0.5]
-        knots = np.arange(len(self.row_parts) * len(self.col_parts))
-        self.numbers = knots.reshape(len(self.row_parts), -1)
-
-
 def layer_xml(thing):
     """An elastic layer: a net of sprung knots, and both the springs between neighbours
     (together a Pasternak foundation) and the face stretched over the net.
@@ -56,45 +32,47 @@ def layer_xml(thing):
     elements of an elastic block (8 kPa, 0.1 m thick, the arm upright or askew by 17
     degrees), the net's depth, area and highest load are within 15 %.
     """
-    net = Net(thing)
-    tendons = tendons_xml(net, SHEAR * thing.modulus_pa * thing.thick_m)
-    return knots_xml(net, thing), tendons + face_xml(net)
+    high = min(thing.height_m, 0.20)
+    wide = min(thing.breadth_m, 0.15)
+    rows = round(high / NET_M)
+    cols = round(wide / NET_M)
+    dz = high / rows
+    dy = wide / cols
+    k = thing.modulus_pa * dz * dy / thing.thick_m
+    shear = SHEAR * thing.modulus_pa * thing.thick_m
+    mass = LAYER_KG_M2 * dz * dy
+    numbers = np.arange((rows + 1) * (cols + 1)).reshape(rows + 1, cols + 1)
+    knots = ""
+    springs = ""
+    for (r, c), n in np.ndenumerate(numbers):
+        # A knot on the rim stands for half of a cell, or at a corner for a quarter.
+        of_row = 0.5 if r in (0, rows) else 1.0
+        of_col = 0.5 if c in (0, cols) else 1.0
+        part = of_row * of_col
+        y = (c - cols / 2) * dy
+        z = ABOVE_FLOOR_M + (r - rows / 2) * dz
+        knots += knot_xml(n, (y, z), k * part, mass * part, thing.thick_m)
+        for below in numbers[r + 1 : r + 2, c]:
+            springs += spring_xml(n, below, shear * (dy / dz * of_col))
+        for beside in numbers[r, c + 1 : c + 2]:
+            springs += spring_xml(n, beside, shear * (dz / dy * of_row))
+    return knots, f"<tendon>{springs}</tendon>{face_xml(numbers)}"
 
 
-def knots_xml(net, thing):
-    """The knots, each on a spring of its own along the push.
+def knot_xml(number, place, stiffness, mass, thick_m):
+    """A knot on a spring of its own along the push.
 
     A body with a face may have no damped joint, so the face hangs on a second body.
     """
-    k = thing.modulus_pa * net.dz_m * net.dy_m / thing.thick_m
-    mass = LAYER_KG_M2 * net.dz_m * net.dy_m
-    xml = ""
-    for (r, c), n in np.ndenumerate(net.numbers):
-        y = (c - net.cols / 2) * net.dy_m
-        z = ABOVE_FLOOR_M + (r - net.rows / 2) * net.dz_m
-        part = net.row_parts[r] * net.col_parts[c]
-        xml += (
-            f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" '
-            f'stiffness="{k * part}" damping="{0.06 * k * part + 0.02}" '
-            f'range="0 {thing.thick_m * 0.9}"/><inertial pos="0 0 0" '
-            f'mass="{mass * part}" diaginertia="1e-6 1e-6 1e-6"/><body '
-            f'name="n{n}"><inertial pos="0 0 0" mass="1e-5" '
-            'diaginertia="1e-9 1e-9 1e-9"/></body></body>'
-        )
-    return xml
-
-
-def tendons_xml(net, shear):
-    """The springs between a knot and the next ones, below it and beside it."""
-    xml = ""
-    for (r, c), n in np.ndenumerate(net.numbers):
-        below = shear * (net.dy_m / net.dz_m * net.col_parts[c])
-        beside = shear * (net.dz_m / net.dy_m * net.row_parts[r])
-        for m in net.numbers[r + 1 : r + 2, c]:
-            xml += spring_xml(n, m, below)
-        for m in net.numbers[r, c + 1 : c + 2]:
-            xml += spring_xml(n, m, beside)
-    return f"<tendon>{xml}</tendon>"
+    y, z = place
+    return (
+        f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{number}" '
+        f'stiffness="{stiffness}" damping="{0.06 * stiffness + 0.02}" '
+        f'range="0 {thick_m * 0.9}"/><inertial pos="0 0 0" '
+        f'mass="{mass}" diaginertia="1e-6 1e-6 1e-6"/><body '
+        f'name="n{number}"><inertial pos="0 0 0" mass="1e-5" '
+        'diaginertia="1e-9 1e-9 1e-9"/></body></body>'
+    )
 
 
 def spring_xml(first, second, stiffness):
@@ -105,16 +83,17 @@ def spring_xml(first, second, stiffness):
     )
 
 
-def face_xml(net):
+def face_xml(numbers):
     """The face over the knots, of two triangles a cell, whose diagonals alternate."""
+    rows, cols = numbers.shape
     triangles = []
-    for r, c in np.ndindex(net.rows, net.cols):
-        (a, b), (d, e) = net.numbers[r : r + 2, c : c + 2]
+    for r, c in np.ndindex(rows - 1, cols - 1):
+        (a, b), (d, e) = numbers[r : r + 2, c : c + 2]
         triangles += [a, b, e, a, e, d] if (r + c) % 2 else [a, b, d, b, e, d]
-    bodies = " ".join(f"n{n}" for n in net.numbers.flat)
+    bodies = " ".join(f"n{n}" for n in numbers.flat)
     return (
         f'<deformable><flex name="face" dim="2" radius="{FACE_M}" body="{bodies}" '
-        f'vertex="{"0 0 0 " * net.numbers.size}" '
+        f'vertex="{"0 0 0 " * numbers.size}" '
         f'element="{" ".join(map(str, triangles))}"><contact '
         f'contype="2" conaffinity="1" selfcollide="none" condim="1" solref="{CONTACT}" '
         'solimp="0.95 0.95 0.001"/></flex></deformable>'

@@ -93,8 +93,8 @@ class DrawnSet(DataSet):
 
 def simulated(seed):
     """A batch's trials without their frames, and their vectors (windows, n, p)."""
-    tried = candidates({}, joints=True, quick=True)
-    names = [name for candidate in tried for name in candidate.sets]
+    choices = candidates({}, joints=True, quick=True)
+    names = [name for candidate in choices for name in candidate.sets]
     with tempfile.TemporaryDirectory() as folder:
         write(replace(scenes.load(SCENE, count=COUNT), seed=seed), folder)
         dataset = load_trials(
@@ -151,9 +151,9 @@ def certificates(task, stopping, course):
     """A row for each request: the certified error, the share wrong, and the promised
     and the realised mean seconds, which are missing where the request is refused. The
     first request is the smallest error that is certified."""
-    asked = {"the smallest": stopping.smallest_error}
-    asked |= {f"{error:g}": error for error in ERRORS}
-    for name, error in asked.items():
+    requests = {"the smallest": stopping.smallest_error}
+    requests |= {f"{error:g}": error for error in ERRORS}
+    for name, error in requests.items():
         row = {"task": task, "asked": name, "error": error}
         row |= dict.fromkeys(("wrong", "promised", "realised"), np.nan)
         rule = stopping.rule(error)
@@ -239,8 +239,8 @@ def certificate(rows):
     able = rows.dropna()
     row = {"sets": len(rows), "certified": len(able)}
     row["above"] = int((able["wrong"] > able["error"]).sum())
-    shown = {"wrong": ".1%", "promised": ".2f", "realised": ".2f"}
-    for name, form in shown.items():
+    forms = {"wrong": ".1%", "promised": ".2f", "realised": ".2f"}
+    for name, form in forms.items():
         column = name if name == "wrong" else f"{name}, s"
         row[column] = format(able[name].mean(), form) if len(able) else ""
     row["late"] = int((able["realised"] > able["promised"] + LATE_S).sum())

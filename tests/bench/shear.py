@@ -60,8 +60,8 @@ class Mean:
         of_seeds = [answers.shares(task, kind) for answers in self.seeds]
         means = {}
         for window in WINDOWS_S:
-            known = [s[window] for s in of_seeds if s[window] is not None]
-            means[window] = float(np.mean(known)) if known else None
+            shares = [s[window] for s in of_seeds if s[window] is not None]
+            means[window] = float(np.mean(shares)) if shares else None
         return means
 
     def early_s(self, task, kind, level):

@@ -38,11 +38,11 @@ def models(out, jobs):
 def measure(seeds, trials, jobs, out):
     """Fit, simulate the other engine's touches, and write the table."""
     out.mkdir(parents=True, exist_ok=True)
-    both = models(out, jobs)
+    fitted = models(out, jobs)
     rows = []
     for seed in range(1, seeds + 1):
         recordings = [recording for _, _, recording in touches(seed, trials)]
-        for name, model in both.items():
+        for name, model in fitted.items():
             summary = Summary(judged_tasks(model))
             for number, recording in enumerate(recordings):
                 events = decide(model, recording, f"touch {number}")

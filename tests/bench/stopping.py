@@ -166,9 +166,9 @@ def of_aeon(make, series, labels, folds):
         test = folds == fold
         model = make(trees, classification_points=points, random_state=0)
         model.fit(series[~test], labels[~test]).predict(series[test])
-        stop, _, said, _ = model.get_state_info().T
+        stop, _, answer, _ = model.get_state_info().T
         seconds[test] = looks[stop]
-        right[test] = model.classes_[said] == labels[test]
+        right[test] = model.classes_[answer] == labels[test]
     return seconds.mean(), 1.0 - right.mean()
 
 

@@ -32,7 +32,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Values of one parameter, each harder than the one before.
+    """Values of one parameter, steps harder than the one before.
 
     Attributes:
         words: what it is, with its unit.
@@ -50,9 +50,9 @@ class Ladder:
     beside: Mapping[str, Any] = field(default_factory=dict)
 
 
-def decades(first, last, each=2):
-    """Powers of ten from one exponent to another, `each` steps a decade."""
-    count = round(abs(last - first) * each) + 1
+def decades(first, last, steps=2):
+    """Powers of ten from one exponent to another, `steps` a decade."""
+    count = round(abs(last - first) * steps) + 1
     return [10.0**e for e in np.linspace(first, last, count)]
 
 
@@ -96,7 +96,7 @@ class Case:
     @threadpool_limits.wrap(limits=1)
     def worst(self):
         """The largest error at the hazard and in the search around it."""
-        seen = [(float(self.error(**at)), dict(at)) for at in self.hazard]
+        errors = [(float(self.error(**at)), dict(at)) for at in self.hazard]
         if self.around:
 
             @settings(
@@ -110,13 +110,13 @@ class Case:
             @given(**self.around)
             def search(**at):
                 error = float(self.error(**at))
-                seen.append((error, at))
+                errors.append((error, at))
                 if error < float("inf"):
                     target(error)
 
             search()
-        error, at = max(seen, key=lambda pair: pair[0])
-        return Worst(error, at, len(seen))
+        error, at = max(errors, key=lambda pair: pair[0])
+        return Worst(error, at, len(errors))
 
     @threadpool_limits.wrap(limits=1)
     def theirs(self):

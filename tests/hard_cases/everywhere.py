@@ -20,50 +20,49 @@ from tests.hard_cases.outputs import (
 OPTIMISED = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_ALL
 
 
-def engine(name, tried):
+def engine(name, subject):
     """What runs the graph of a model."""
     if name == "onnx.reference":
-        evaluator = ReferenceEvaluator(tried.data)
+        evaluator = ReferenceEvaluator(subject.data)
         return lambda names, inputs: list(evaluator.run(names, inputs))
     if name == "numpy":
-        return Graph(onnx_file.read(tried.data, "the model")).run
+        return Graph(onnx_file.read(subject.data, "the model")).run
     level = OPTIMISED if name == "optimised" else None
     threads = 2 if name == "two threads" else 1
-    run = session(tried.data, level, threads).run
-    return run
+    return session(subject.data, level, threads).run
 
 
 ENGINES = ("one by one", "two threads", "optimised", "numpy", "onnx.reference")
 
 
-def answers(name, tried, vectors, point):
+def answers(name, subject, vectors, point):
     """All outputs for vectors, which only the first of the engines gets one by one."""
-    run = engine(name, tried)
-    names = [output.name for output in session(tried.data).get_outputs()]
+    run = engine(name, subject)
+    names = [output.name for output in session(subject.data).get_outputs()]
     at = np.array([point])
     batches = vectors[:, None] if name == "one by one" else vectors[None]
-    seen = [run(names, {"features": x, "decision_point": at}) for x in batches]
-    columns = zip(*seen, strict=True)
+    outputs = [run(names, {"features": x, "decision_point": at}) for x in batches]
+    columns = zip(*outputs, strict=True)
     joined = [np.concatenate(column) for column in columns]
     return dict(zip(names, joined, strict=True))
 
 
 def engine_error(name, kind, point, factor, seed, count=20):
     """Values of all outputs that are not the oracle's."""
-    tried = whole(160, kind)
-    vectors = tried.queries(seed, factor, count)
-    seen = answers(name, tried, vectors, point)
-    return differing(seen, tried.outputs(vectors, point))
+    subject = whole(160, kind)
+    vectors = subject.queries(seed, factor, count)
+    outputs = answers(name, subject, vectors, point)
+    return differing(outputs, subject.outputs(vectors, point))
 
 
 def single_error(kind, point, seed):
     """Values that a vector of float32 gets, and its copy in float64 does not."""
-    tried = whole(160, kind)
-    vectors = tried.queries(seed, 1.0).astype(np.float32)
-    expected = tried.outputs(vectors.astype(np.float64), point)
+    subject = whole(160, kind)
+    vectors = subject.queries(seed, 1.0).astype(np.float32)
+    expected = subject.outputs(vectors.astype(np.float64), point)
     wrong = 0
     for row, vector in enumerate(vectors):
-        for task, decision in tried.model.decide(vector, point).items():
+        for task, decision in subject.model.decide(vector, point).items():
             for end in ("scores", "distances", "neighbours"):
                 truth = expected[f"{task}_{end}"][row]
                 wrong += int((getattr(decision, end) != truth).sum())

@@ -10,18 +10,21 @@ from numpy.typing import NDArray
 from train.projection import MOST_STEPS
 
 
+def by_element(function, values):
+    """Python's numbers that a function makes of each element of an array."""
+    return np.vectorize(function, otypes=[object])(values)
+
+
 def multiples(values, unit):
     """Values over a power of two, as Python integers.
 
     Raises:
         ValueError: a value is no multiple of it.
     """
-    exact = [Fraction(value) / Fraction(unit) for value in np.ravel(values).tolist()]
-    if any(value.denominator != 1 for value in exact):
+    quotients = by_element(lambda value: Fraction(value) / Fraction(unit), values)
+    if any(quotient.denominator != 1 for quotient in quotients.flat):
         raise ValueError(f"not all multiples of {unit}")
-    return np.array([int(value) for value in exact], dtype=object).reshape(
-        np.shape(values)
-    )
+    return by_element(int, quotients)
 
 
 def smallest_bit(values):
@@ -46,17 +49,9 @@ class Projected(NamedTuple):
     cut: NDArray[np.bool_]
 
 
-def clipped(values, limit):
-    """Whole numbers, cut off at plus and minus a limit."""
-    inside = [max(-limit, min(limit, value)) for value in values.ravel().tolist()]
-    return np.array(inside, dtype=object).reshape(values.shape)
-
-
 def rounded(values, scale=Fraction(1)):
     """Numbers times a scale, to the nearest whole number, halves to the even one."""
-    array = np.asarray(values)
-    wholes = [round(Fraction(value) * scale) for value in array.ravel().tolist()]
-    return np.array(wholes, dtype=object).reshape(array.shape)
+    return by_element(lambda value: round(Fraction(value) * scale), values)
 
 
 def projected(vectors, p):
@@ -66,15 +61,12 @@ def projected(vectors, p):
     IEEE 754 says; all that follows is in Python's whole numbers.
     """
     steps = rounded((vectors - p.mean_) * p.gain_ / p.grid_.step)
-    inside = clipped(steps, int(MOST_STEPS))
+    inside = np.clip(steps, -int(MOST_STEPS), int(MOST_STEPS))
     bit = smallest_bit(p.weights_)
     scale = Fraction(bit) * Fraction(p.grid_.step) / Fraction(p.grid_.unit)
-    if p.weights_.shape[1]:
-        sums = inside @ multiples(p.weights_, bit)
-    else:
-        sums = np.zeros((len(vectors), 0), dtype=object)
-    whole = rounded(sums, scale)
-    units = clipped(whole, int(p.grid_.limit))
+    whole = rounded(inside @ multiples(p.weights_, bit), scale)
+    limit = int(p.grid_.limit)
+    units = np.clip(whole, -limit, limit)
     cut = (inside != steps).any(axis=1) | (units != whole).any(axis=1)
     return Projected(units, cut)
 
@@ -95,18 +87,14 @@ def unrounded(vectors, mean, weights):
 def nearest(rows, query, k):
     """The k nearest rows, equal distances in the order of the rows, and the squares of
     all."""
-    squares = (
-        ((rows - query) ** 2).sum(axis=1).tolist() if rows.shape[1] else [0] * len(rows)
-    )
+    squares = ((rows - query) ** 2).sum(axis=1).tolist()
     return sorted(range(len(rows)), key=lambda i: (squares[i], i))[:k], squares
 
 
 def winner(labels):
     """The majority of the neighbours' labels, nearest first; ties to the nearest of the
     tied."""
-    votes = {label: labels.count(label) for label in labels}
-    most = max(votes.values())
-    return next(label for label in labels if votes[label] == most)
+    return max(labels, key=labels.count)
 
 
 def root(square):

@@ -32,12 +32,12 @@ class OpenVino(Graph):
 
     def run(self, names, inputs):
         """The named outputs, in the types that the graph declares."""
-        wanted = [port.any_name for port in self._compiled.inputs]
-        seen = self._compiled({name: inputs[name] for name in wanted})
+        ports = [port.any_name for port in self._compiled.inputs]
+        results = self._compiled({name: inputs[name] for name in ports})
         kinds = {name: kind for name, (kind, _) in self.outputs().items()}
         whole = {name: "int64" in kind for name, kind in kinds.items()}
         return [
-            np.asarray(seen[name], np.int64 if whole[name] else np.float64)
+            np.asarray(results[name], np.int64 if whole[name] else np.float64)
             for name in names
         ]
 

@@ -31,8 +31,8 @@ def region_error(density, peak, seed):
         return float(sum(by_us(*taxel) != by_scipy(*taxel) for taxel in alone))
     counts = rng.integers(51, peak + 1, (16, 24)) * (rng.random((16, 24)) < density)
     valid = rng.random((16, 24)) < 0.95
-    given = counts.astype(np.uint16), 50, valid, bool(seed % 2)
-    return float(by_us(*given) != by_scipy(*given))
+    arguments = counts.astype(np.uint16), 50, valid, bool(seed % 2)
+    return float(by_us(*arguments) != by_scipy(*arguments))
 
 
 def seam_usual():

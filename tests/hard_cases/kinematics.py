@@ -43,13 +43,13 @@ def turn_error(angle, seed):
     """Largest error of a rotation; off the diagonal relative to the angle where it is
     tiny."""
     x, y, z = np.random.default_rng(seed).normal(size=3).tolist()
-    seen = Chain([Joint("j", (x, y, z))]).pose([angle])[:3, :3]
+    rotation = Chain([Joint("j", (x, y, z))]).pose([angle])[:3, :3]
     truth = exact_turn((x, y, z), angle)
     scale = min(1.0, abs(angle)) or 1.0
     worst = 0.0
     for i in range(3):
         for j in range(3):
-            gap = abs(float(mpmath.mpf(float(seen[i, j])) - truth[i][j]))
+            gap = abs(float(mpmath.mpf(float(rotation[i, j])) - truth[i][j]))
             worst = max(worst, gap if i == j else gap / scale)
     return worst
 
@@ -66,11 +66,11 @@ def line_error(angle, step):
     )
     lines = iter([text.encode(), None])
     joints = Joints(lambda: next(lines), dof=1, now=lambda: 0.0)
-    seen = joints.at(-0.005)
-    if seen is None:
+    angles = joints.at(-0.005)
+    if angles is None:
         return math.inf
     turn = Chain([Joint("j", (0.0, 0.0, 1.0))])
-    return float(np.abs(turn.pose(seen) - turn.pose([angle + 0.5 * step])).max())
+    return float(np.abs(turn.pose(angles) - turn.pose([angle + 0.5 * step])).max())
 
 
 CASES = [

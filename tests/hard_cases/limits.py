@@ -66,8 +66,10 @@ def clock_error(start):
     series = contact_of(frames, horizon_s=1.2).series()
     vector = feature_vector(series, 1.2).reshape(3, -1)
     worst = Fraction(0)
-    for seen, course in zip(vector.tolist(), courses, strict=True):
-        for sample, time in zip(seen, np.linspace(0.0, 1.2, 40).tolist(), strict=True):
+    for samples, course in zip(vector.tolist(), courses, strict=True):
+        for sample, time in zip(
+            samples, np.linspace(0.0, 1.2, 40).tolist(), strict=True
+        ):
             place = Fraction(time) * 128
             whole = place.numerator // place.denominator
             before = course[whole]
@@ -151,7 +153,7 @@ def transform_error(counts, scale):
     frame[4:6, 5:8] = counts
     frames = (Frame(i / 100.0, frame) for i in range(130))
     contact = contact_of(frames, layout, horizon_s=1.2, features=COURSES)
-    seen = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
+    vector = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
     with mpmath.workdps(50):
         force = mpmath.mpf(int(counts)) / mpmath.mpf(scale)
         floor = mpmath.mpf(layout.threshold_counts + 1) / mpmath.mpf(scale)
@@ -163,7 +165,7 @@ def transform_error(counts, scale):
         ]
         errors = [
             abs(mpmath.mpf(value) - want) / max(1, abs(want))
-            for row, want in zip(seen.tolist(), true, strict=True)
+            for row, want in zip(vector.tolist(), true, strict=True)
             for value in row
         ]
         return float(max(errors))

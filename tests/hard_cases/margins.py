@@ -30,10 +30,10 @@ SEEDS = range(5)
 def failure(case, ladder, value):
     """How a case fails at a value; "" if it holds."""
     at = {**case.hazard[0], **ladder.beside, ladder.parameter: value}
-    tried = [at | {"seed": seed} for seed in SEEDS] if "seed" in at else [at]
+    points = [at | {"seed": seed} for seed in SEEDS] if "seed" in at else [at]
     try:
         # `not <=`, as an error may be NaN
-        if not all(case.error(**at) <= case.bound for at in tried):
+        if not all(case.error(**at) <= case.bound for at in points):
             return FAILED
     except EdgeError:
         return REFUSED

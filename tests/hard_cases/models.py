@@ -80,6 +80,13 @@ def labels_for(X, classes=5, seed=0):
     return np.array([f"c{i:04d}" for i in rng.integers(0, classes, len(X))])
 
 
+def one_by_one(model, vectors, *point):
+    """A model's answers to vectors one by one, as the board asks, at a decision
+    point."""
+    answers = [model.run(vector[None], *point) for vector in vectors]
+    return {key: np.concatenate([a[key] for a in answers]) for key in answers[0]}
+
+
 class Ours:
     """A fitted classifier of one task, its exported graph, and the oracle of the
     two."""
@@ -104,16 +111,13 @@ class Ours:
 
     def alone(self, queries):
         """The graph's answers to queries one by one, as the board asks."""
-        answers = [self.model.run(query[None]) for query in queries]
-        return {
-            name.removeprefix("t_"): np.concatenate([one[name] for one in answers])
-            for name in answers[0]
-        }
+        answers = one_by_one(self.model, queries)
+        return {name.removeprefix("t_"): answers[name] for name in answers}
 
     def wrong(self, queries):
         """Queries whose neighbours, order, label or a bit of a distance is not the
         oracle's."""
-        seen = self.alone(queries)
+        answers = self.alone(queries)
         wrong = 0
         for i, point in enumerate(self.whole(queries)):
             near, squares = exact.nearest(self.rows, point, self.k)
@@ -123,7 +127,7 @@ class Ours:
                 "label": exact.winner([self.labels[j] for j in near]),
                 "distances": [exact.distance(squares[j], unit) for j in near],
             }
-            wrong += any(seen[k][i].tolist() != v for k, v in expected.items())
+            wrong += any(answers[k][i].tolist() != v for k, v in expected.items())
         return wrong
 
 

@@ -160,8 +160,8 @@ class Outlier:
         both = np.concatenate([X, queries])
         points = exact.unrounded(both, p.mean_, p.weights_)
         truth = [exact.nearest(points[:160], point, 1)[0][0] for point in points[160:]]
-        seen = ours.alone(queries)["neighbours"][:, 0]
-        self.changed = float(np.mean(seen != truth))
+        nearest = ours.alone(queries)["neighbours"][:, 0]
+        self.changed = float(np.mean(nearest != truth))
 
 
 def outlier_error(factor, seed):
@@ -185,7 +185,7 @@ def grid_error(spread, seed):
     numbers."""
     X, queries = near_duplicates(80, spread, seed, 8)
     ours = Ours(X, choice=Choice("none", 6, 80))
-    seen = ours.alone(queries)
+    graph = ours.alone(queries)
     p = ours.projection
     true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
         float
@@ -196,7 +196,7 @@ def grid_error(spread, seed):
     )  # proportional numbers, to 1e-7
     distances = np.linalg.norm(true[80:, None] - true[:80], axis=2)
     errors = np.abs(
-        seen["distances"] - np.take_along_axis(distances, seen["neighbours"], axis=1)
+        graph["distances"] - np.take_along_axis(distances, graph["neighbours"], axis=1)
     )
     return float(errors.max() / np.linalg.norm(z, axis=1).max())
 
@@ -207,16 +207,16 @@ def ties_usual():
     X = features(160)
     queries = features(400, 1)
     ours = Ours(X, labels_for(X, 12), Choice("none", 6, 2))
-    seen = ours.alone(queries)
+    graph = ours.alone(queries)
     labels = np.array(ours.labels)
     pipe = usual_pipeline(X, 6, 2, labels)
-    tied = (np.sort(seen["scores"], axis=1)[:, -2:] == 0.5).all(axis=1).mean()
+    tied = (np.sort(graph["scores"], axis=1)[:, -2:] == 0.5).all(axis=1).mean()
     shares = ", ".join(
-        f"{name} {np.mean(answer != seen['label']):.0%} not the nearest's, "
+        f"{name} {np.mean(answer != graph['label']):.0%} not the nearest's, "
         f"last class {np.mean(answer == 11):.1%} of answers"
         for name, answer in answers_of_usual(pipe, X, queries).items()
     )
-    true = f"{np.mean(labels == 11):.1%} of rows, {np.mean(seen['label'] == 11):.1%} of ours"
+    true = f"{np.mean(labels == 11):.1%} of rows, {np.mean(graph['label'] == 11):.1%} of ours"
     return f"{tied:.0%} of votes tie; {shares} ({true})"
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
-from tests.hard_cases.models import exported, features
+from tests.hard_cases.models import exported, features, one_by_one
 from tests.hard_cases.neighbours import near_duplicates, offset_data
 from train.evaluate import stratified_folds
 from train.novelty import CLIP, FARTHEST, STEP_BITS
@@ -140,13 +140,13 @@ class Whole:
         space = self.fitted.space_
         at = space.points[point]
         steps = exact.rounded((vectors - at.mean) * at.gain)
-        steps = exact.clipped(steps, int(CLIP * 2**STEP_BITS))
+        steps = np.clip(steps, -int(CLIP * 2**STEP_BITS), int(CLIP * 2**STEP_BITS))
         whole = exact.multiples(space.weights, 1.0)
         inside = exact.rounded(steps @ whole, Fraction(2) ** -space.shift)
         squares = (steps**2).sum(axis=1) - (inside**2).sum(axis=1)
         whitening = exact.multiples(at.whitening, 1.0)
         places = exact.rounded(inside @ whitening, Fraction(2) ** -at.shift)
-        places = exact.clipped(places, int(FARTHEST))
+        places = np.clip(places, -int(FARTHEST), int(FARTHEST))
         rows = exact.multiples(at.rows, 1.0)
         scores = []
         for outside, place in zip(squares.tolist(), places, strict=True):
@@ -173,23 +173,22 @@ def whole(n, kind):
     return Whole(n, kind)
 
 
-def differing(seen, expected):
+def differing(answers, expected):
     """Values of the expected outputs that have another bit."""
-    assert seen.keys() == expected.keys()
+    assert answers.keys() == expected.keys()
     count = 0
     for name, value in expected.items():
-        fits = np.shape(seen[name]) == value.shape
-        count += int((np.asarray(seen[name]) != value).sum()) if fits else value.size
+        fits = np.shape(answers[name]) == value.shape
+        count += int((np.asarray(answers[name]) != value).sum()) if fits else value.size
     return float(count)
 
 
 def outputs_error(kind, point, factor, seed):
     """Values of all outputs that are not the oracle's."""
-    tried = whole(160, kind)
-    vectors = tried.queries(seed, factor)
-    single = [tried.model.run(vector[None], point) for vector in vectors]
-    seen = {name: np.concatenate([one[name] for one in single]) for name in single[0]}
-    return differing(seen, tried.outputs(vectors, point))
+    subject = whole(160, kind)
+    vectors = subject.queries(seed, factor)
+    answers = one_by_one(subject.model, vectors, point)
+    return differing(answers, subject.outputs(vectors, point))
 
 
 def agreed(task, factors, distances):
@@ -215,17 +214,17 @@ def agreed(task, factors, distances):
 
 def agreement_error(kind, point, factor, seed):
     """Decisions whose label, distances or tie is not the oracle's."""
-    tried = whole(160, kind)
-    vectors = tried.queries(seed, factor)
-    outputs = tried.outputs(vectors, point)
-    classes = {task: tried.model.info.tasks[task].labels for task in CHOICES}
+    subject = whole(160, kind)
+    vectors = subject.queries(seed, factor)
+    outputs = subject.outputs(vectors, point)
+    classes = {task: subject.model.info.tasks[task].labels for task in CHOICES}
     wrong = 0
     for row, vector in enumerate(vectors):
         distances = {t: outputs[f"{t}_label_distances"][row] for t in CHOICES}
         answers = {t: (int(outputs[f"{t}_label"][row]), distances[t]) for t in CHOICES}
-        for task, factors in tried.fitted.products_.items():
+        for task, factors in subject.fitted.products_.items():
             answers |= agreed(task, factors, distances)
-        for task, decision in tried.model.decide(vector, point).items():
+        for task, decision in subject.model.decide(vector, point).items():
             label, nearest = answers[task]
             scores = outputs[f"{task}_scores"][row].tolist()
             tie = sorted(scores)[-1] == sorted(scores)[-2]
@@ -240,24 +239,26 @@ def agreement_error(kind, point, factor, seed):
 
 def contradictions():
     """How often tasks that are decided one by one contradict each other."""
-    tried = whole(160, "contacts")
-    vectors = np.concatenate([tried.queries(seed, 1.0) for seed in range(20)])
-    seen = tried.model.run(vectors)
-    factors = tried.fitted.products_["category"]
+    subject = whole(160, "contacts")
+    vectors = np.concatenate([subject.queries(seed, 1.0) for seed in range(20)])
+    answers = subject.model.run(vectors)
+    factors = subject.fitted.products_["category"]
     pairs = list(zip(*factors.values(), strict=True))
-    named = zip(*(seen[f"{factor}_label"].tolist() for factor in factors), strict=True)
+    named = zip(
+        *(answers[f"{factor}_label"].tolist() for factor in factors), strict=True
+    )
     joined = np.array([pairs.index(pair) for pair in named])
-    share = float(np.mean(joined != seen["category_label"]))
+    share = float(np.mean(joined != answers["category_label"]))
     return f"decided one by one, category contradicts its factors in {share:.0%} of answers"
 
 
 def confidence_error(kind, point, factor, seed):
     """Largest error of a confidence, over what its log odds resolve."""
-    tried = whole(160, kind)
-    info = tried.model.info
+    subject = whole(160, kind)
+    info = subject.model.info
     worst = 0.0
-    for vector in tried.queries(seed, factor, 4):
-        for task, decision in tried.model.decide(vector, point).items():
+    for vector in subject.queries(seed, factor, 4):
+        for task, decision in subject.model.decide(vector, point).items():
             label = info.tasks[task].labels.index(decision.label)
             rule = info.stopping[task]
             with mpmath.workdps(50):

@@ -16,7 +16,9 @@ def push_error(h, mu, steps=120):
         np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None]
     )
     trace = rig.run(steps)
-    pushes = (Trace(*(seen[:, i : i + 1] for seen in trace)) for i in range(mass.size))
+    pushes = (
+        Trace(*(course[:, i : i + 1] for course in trace)) for i in range(mass.size)
+    )
     judged = zip(pushes, stiffness, mass, strict=True)
     return float(sum(bool(judge(push, k, m, mu, 0.8 * mu)) for push, k, m in judged))
 
