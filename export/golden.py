@@ -110,7 +110,7 @@ def _vectors(model: Model, series: Sequence[FeatureSeries], X: Floats) -> Floats
     weight = rng.uniform(-0.5, 1.5, (len(first), 1))
     mixed = X[first] + weight * (X[second] - X[first])
     wrong = np.repeat(of_trials[:1], 2, axis=0)
-    wrong[0, 5] = np.nan
+    wrong[0, min(5, X.shape[1] - 1)] = np.nan
     wrong[1, -1] = np.inf
     return np.concatenate([of_trials, rows, mixed, wrong])
 

@@ -7,6 +7,7 @@ import pytest
 
 from edge.model.model import Model
 from export.golden import trials_of, trimmed
+from tests.conftest import export
 from train.dataset import load_trials
 
 
@@ -32,6 +33,15 @@ def test_trimming_keeps_every_frame_that_the_window_uses(exported, data):
         assert trial.onset_s - 0.26 <= part.t[0] <= trial.onset_s
         assert part.t[-1] > end or len(part.t) == len(trial.recording.t)
         assert part.valid.shape == part.frames.shape
+
+
+@pytest.mark.parametrize("feature", ["max_force@5", "max_force_mean"])
+def test_a_model_of_a_few_values_has_a_golden_file(feature, recordings, tmp_path):
+    words = ["--features", feature, "--projection", "pca", "--decision-points", "none"]
+    export(tmp_path, "--data", recordings, *words)
+    vectors = np.load(tmp_path / "golden.npz")["vectors"]
+    assert np.isnan(vectors[-2]).any()
+    assert np.isinf(vectors[-1]).any()
 
 
 def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_finite(
