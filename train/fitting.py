@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -261,7 +262,29 @@ def load(
     if options.fixed_window_s is None and not (options.quick or recordings.mixed):
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)
-    return trials_of(recordings, windows, options)
+    loaded = trials_of(recordings, windows, options)
+    return replace(loaded, notes=[*_copies(recordings), *loaded.notes])
+
+
+def _copies(recordings: Recordings) -> list[str]:
+    """A warning where some recordings are others' copies, by which they are told."""
+    originals: dict[bytes, Path] = {}
+    copies = []
+    for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
+        sha = hashlib.sha256(recording.t.tobytes())
+        sha.update(recording.frames.tobytes())
+        original = originals.get(sha.digest())
+        if original is None:
+            originals[sha.digest()] = path
+        elif recording.frames.any():
+            copies.append(f"{path} of {original}")
+    if not copies:
+        return []
+    return [
+        f"warning: {len(copies)} of {len(recordings.paths)} recordings are copies, such "
+        f"as {copies[0]}; a copy is told by its original, so the accuracy is too high: "
+        "leave copies out"
+    ]
 
 
 def trials_of(

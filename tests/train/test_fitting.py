@@ -1,5 +1,6 @@
 """From recordings to a fitted model, from Python."""
 
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -125,6 +126,40 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     seen, before = (f.chosen["category"].accuracy for f in (both, alone))
     assert seen.right == before.right + 1
     assert seen.total == before.total + 2
+
+
+@pytest.fixture
+def few(recordings, tmp_path):
+    """A folder with copies of four recordings under the same names."""
+    for name in ("hard_0", "hard_1", "soft_0", "soft_1"):
+        shutil.copy(recordings / f"{name}.npz", tmp_path)
+    return tmp_path
+
+
+def copies_among(paths):
+    """The warnings of copies among recordings."""
+    fixed = {"features": ["max_force"], "projection": "pca", "k": 1, "window_s": 1.2}
+    fitted = train.fit(paths, **fixed, decision_points_s=(), jobs=1)
+    return [note for note in fitted.notes if "copies" in note]
+
+
+def test_recordings_that_are_there_twice_are_named(few):
+    (note,) = copies_among([few, few / "hard_1.npz"])
+    assert "1 of 5 recordings are copies" in note
+    assert f"such as {few / 'hard_1.npz'} of {few / 'hard_1.npz'};" in note
+
+
+def test_a_copy_of_another_name_is_named_with_its_original(few):
+    shutil.copy(few / "hard_0.npz", few / "hard_9.npz")
+    (note,) = copies_among(few)
+    assert f"{few / 'hard_9.npz'} of {few / 'hard_0.npz'}" in note
+
+
+def test_recordings_of_nothing_are_no_copies(few, make_touch):
+    nothing = make_touch(seconds=0.0, labels={"category": "none", "object": "hard 0"})
+    for name in ("none_0", "none_1"):
+        save(few / f"{name}.npz", nothing)
+    assert copies_among(few) == []
 
 
 def test_names_of_train_are_loaded_when_they_are_asked_for():
