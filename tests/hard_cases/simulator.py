@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tests.hard_cases.cases import Case, Ladder, decades, powers_of_ten
-from tests.train.simulate.scenes import Trace, slider
+from tests.train.simulate.scenes import Law, Trace, slider
 from tests.train.simulate.test_simulate_stability import SPEED, judge
 
 
@@ -13,7 +13,7 @@ def push_error(h, mu, steps=120):
     grid = np.meshgrid(10.0 ** np.arange(-3, 16, 2), 10.0 ** np.arange(-9, 10, 1.8))
     stiffness, mass = (values.ravel() for values in grid)
     rig = slider(
-        np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, slopes=stiffness[None]
+        np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, law=Law(stiffness[None])
     )
     trace = rig.run(steps)
     pushes = (

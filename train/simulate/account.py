@@ -95,7 +95,7 @@ def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
             stage: [watch.timed(call) for call in calls]
             for stage, calls in plan.stages.items()
         }
-        physics = run_physics(scene, batch, plan=replace(plan, stages=stages))
+        physics = run_physics(scene, batch, plan=plan.with_hooks(**stages))
         for reading in readings(physics):
             reading.frames()
     seconds = time.perf_counter() - begun
@@ -135,8 +135,7 @@ def duration(scene: Scene) -> str:
 def explain(scene: Scene) -> str:
     """The account that `simulate --explain` prints."""
     first_kinds = kinds(scene)
-    convergences = measure(scene, list(first_kinds.values()))
-    by_kind = dict(zip(first_kinds, convergences, strict=True))
+    by_kind = measure(scene, first_kinds)
     trials_by_kind = kinds(scene, None if scene.step_s else by_kind)
     spent = costs(scene, [spec for specs in trials_by_kind.values() for spec in specs])
     lines = [

@@ -6,13 +6,13 @@ The step is halved until another halving changes the force little.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from train.simulate.arm import Array
 from train.simulate.engine import begin, run_physics
-from train.simulate.plan import PACE, RESOLVE, make_plan, required_effects
+from train.simulate.plan import RESOLVE, make_plan, required_effects
 from train.simulate.scene_model import Scene, SceneObject, TrialSpec, Value
 
 Kind = tuple[str, ...]
@@ -93,9 +93,7 @@ def measured(scene: Scene) -> dict[Kind, Convergence]:
         return {}
     trials_by_kind = kinds(scene)
     begin(scene, tuple(spec for specs in trials_by_kind.values() for spec in specs))
-    return dict(
-        zip(trials_by_kind, measure(scene, list(trials_by_kind.values())), strict=True)
-    )
+    return measure(scene, trials_by_kind)
 
 
 def _middle(value: Value) -> Value:
@@ -112,14 +110,19 @@ class _Kind:
     steps_s: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
 
-    def errors(self, count: int | None = None) -> list[float]:
-        """The extrapolated error of each step but the last, from the first `count`
-        runs."""
-        changes = [_distance(a, b) for a, b in pairwise(self.forces[:count])]
+    def changes(self) -> list[float]:
+        """How far each step's force lies from that of the next."""
+        return list(map(_distance, self.forces, self.forces[1:]))
+
+    def errors(self) -> list[float]:
+        """The extrapolated error of each step but the last."""
+        changes = self.changes()
         return [change / (1.0 - 2.0 ** -_order(changes)) for change in changes]
 
 
-def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Convergence]:
+def measure(
+    scene: Scene, trials_by_kind: Mapping[Kind, Sequence[TrialSpec]]
+) -> dict[Kind, Convergence]:
     """The error of each step on middle trials of each kind, one for each of its
     objects.
 
@@ -139,11 +142,9 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
     )
     tolerance = scene.trials["tolerance"]
     frame_s = 1.0 / scene.rate_hz
-    kinds = [_Kind(_spread_out(specs)) for specs in groups]
-    first = [
-        (kind, frame_s / 2**k) for kind in kinds for k in range(FIRST_HALVINGS + 1)
-    ]
-    _run(scene, first)
+    kinds = [_Kind(_spread_out(specs)) for specs in trials_by_kind.values()]
+    first_steps = [frame_s / 2**k for k in range(FIRST_HALVINGS + 1)]
+    _run(scene, list(product(kinds, first_steps)))
     rough = [kind for kind in kinds if not kind.errors()[-2] <= tolerance]
     _run(scene, [(kind, frame_s / 2**HALVINGS) for kind in rough])
     shortest = (scene.lead.high + after_s) / MOST_STEPS
@@ -152,7 +153,8 @@ def measure(scene: Scene, groups: Sequence[Sequence[TrialSpec]]) -> list[Converg
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
-    return [_judged(kind, tolerance) for kind in kinds]
+    judged = [_judged(kind, tolerance) for kind in kinds]
+    return dict(zip(trials_by_kind, judged, strict=True))
 
 
 def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
@@ -178,7 +180,7 @@ def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -
     )
     plan = make_plan(scene, specs)
     if not paced:
-        plan = replace(plan, stages={**plan.stages, **{stage: [] for stage in PACE}})
+        plan = plan.with_hooks(pace=[])
     forces = run_physics(scene, specs, plan=plan, images=False).force
     for (kind, step_s), force in zip(
         work, _by_kind(forces, [k for k, _ in work]), strict=True
@@ -193,16 +195,15 @@ def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
 
 
 def _judged(kind: _Kind, tolerance: float) -> Convergence:
-    *forces, reference = kind.forces
-    distances = [_distance(force, reference) for force in forces]
-    extrapolated = kind.errors(len(forces))
-    errors = (*map(max, zip(distances, extrapolated, strict=False)), distances[-1])
+    reference = kind.forces.pop()
+    distances = [_distance(force, reference) for force in kind.forces]
+    errors = (*map(max, distances, kind.errors()), distances[-1])
     smallest = min(errors)
     limit = tolerance if smallest <= tolerance else LITTLE_GAIN * smallest
     step_s, error = next(
         (s, e) for s, e in zip(kind.steps_s, errors, strict=False) if e <= limit
     )
-    order = _order([_distance(a, b) for a, b in pairwise(forces)])
+    order = _order(kind.changes())
     return Convergence(
         tuple(kind.steps_s), errors, order, step_s, error, error <= tolerance
     )

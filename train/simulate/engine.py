@@ -159,71 +159,14 @@ class PhysicsRun:
     images: dict[str, NDArray[np.float32]]
     trials: Batch
 
-
-def run_physics(
-    scene: Scene,
-    specs: tuple[TrialSpec, ...],
-    *,
-    plan: Plan | None = None,
-    images: bool = True,
-) -> PhysicsRun:
-    """The physics of trials run side by side, each with the same bits as it has alone.
-
-    Args:
-        plan: as of `begin`.
-        images: False leaves out the load on the taxels.
-
-    Raises:
-        InputError: as of `begin`.
-        EdgeError: the solver did not find a contact's loads, or a trial gained energy.
-    """
-    batch = begin(scene, specs, plan=plan)
-    frames = frame_count(scene)
-    log = _Log.of(batch, frames, images=images)
-    active = starts = batch.everyone
-    while len(active):
-        if len(starts):
-            start_frames(starts)
-        active.run(*STEP)
-        active.clock.left -= 1
-        ends = active.only(active.clock.left == 0)
-        if len(ends):
-            ends.clock.frame += 1
-            # A frame ends at its own time: sums of steps would drift from it.
-            ends.clock.t = ends.clock.frame / scene.rate_hz
-            ends.run(*SAMPLE)
-            log.take(ends)
-            active = active.only(active.clock.frame < frames - 1)
-        starts = ends.only(ends.clock.frame < frames - 1)
-    lost = np.count_nonzero(batch.bed.lost)
-    if lost:
-        raise EdgeError(
-            f"{scene.name}: the forearm's tilt was not found in {lost} trials; give "
-            "skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
-        )
-    times = np.arange(frames) / scene.rate_hz
-    check_energy(batch, log.joints, times)
-    return PhysicsRun(
-        times, log.joints, log.force, log.traces, log.window, log.images, batch
-    )
-
-
-@dataclass(frozen=True)
-class _Log:
-    """The frames of a run, as it keeps them; see `PhysicsRun`."""
-
-    joints: Array
-    force: Array
-    traces: dict[str, Array]
-    window: NDArray[np.float32]
-    images: dict[str, NDArray[np.float32]]
-
     @classmethod
-    def of(cls, batch: Batch, frames: int, *, images: bool) -> Self:
-        """An empty log, with the joints at the start."""
+    def of(cls, batch: Batch, *, images: bool) -> Self:
+        """A run before its first step, with the joints at the start."""
         n = batch.n
+        frames = frame_count(batch.scene)
         shape = n, frames if images else 0, *batch.touch.image.shape[:2]
-        log = cls(
+        run = cls(
+            t=np.arange(frames) / batch.scene.rate_hz,
             joints=np.empty((n, frames, len(batch.arm.q))),
             force=np.zeros((n, frames)),
             traces={},
@@ -232,9 +175,10 @@ class _Log:
                 call.owner: np.zeros((*shape, 2), dtype=np.float32)
                 for call in batch.plan.stages[TRACTION]
             },
+            trials=batch,
         )
-        log.joints[:, 0] = batch.arm.q.T
-        return log
+        run.joints[:, 0] = batch.arm.q.T
+        return run
 
     def take(self, ends: Trials) -> None:
         """Take in the frames of trials that end one."""
@@ -259,6 +203,51 @@ class _Log:
             loads = call.function(rubbed) * scale
             image = np.moveaxis(loads, (0, -1), (-1, 0))
             self.images[call.owner][rubbed.places, rubbed.clock.frame] = image
+
+
+def run_physics(
+    scene: Scene,
+    specs: tuple[TrialSpec, ...],
+    *,
+    plan: Plan | None = None,
+    images: bool = True,
+) -> PhysicsRun:
+    """The physics of trials run side by side, each with the same bits as it has alone.
+
+    Args:
+        plan: as of `begin`.
+        images: False leaves out the load on the taxels.
+
+    Raises:
+        InputError: as of `begin`.
+        EdgeError: the solver did not find a contact's loads, or a trial gained energy.
+    """
+    batch = begin(scene, specs, plan=plan)
+    run = PhysicsRun.of(batch, images=images)
+    last = len(run.t) - 1
+    active = starts = batch.everyone
+    while len(active):
+        if len(starts):
+            start_frames(starts)
+        active.run(*STEP)
+        active.clock.left -= 1
+        ends = active.only(active.clock.left == 0)
+        if len(ends):
+            ends.clock.frame += 1
+            # A frame ends at its own time: sums of steps would drift from it.
+            ends.clock.t = ends.clock.frame / scene.rate_hz
+            ends.run(*SAMPLE)
+            run.take(ends)
+            active = active.only(active.clock.frame < last)
+        starts = ends.only(ends.clock.frame < last)
+    lost = np.count_nonzero(batch.bed.lost)
+    if lost:
+        raise EdgeError(
+            f"{scene.name}: the forearm's tilt was not found in {lost} trials; give "
+            "skin.taxel_n_m, the object's stiffness or [step_s] less extreme values"
+        )
+    check_energy(batch, run.joints, run.t)
+    return run
 
 
 def start_frames(starts: Trials) -> None:

@@ -9,7 +9,7 @@ stage.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -95,6 +95,10 @@ class Plan:
     effects: tuple[tuple[str, ...], ...]
     calls: dict[str, Mask]
     stages: dict[str, list[Call]]
+
+    def with_hooks(self, **stages: list[Call]) -> Self:
+        """The plan with other hooks in some stages."""
+        return replace(self, stages={**self.stages, **stages})
 
 
 def module_of(effect: str) -> Any:

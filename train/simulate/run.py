@@ -12,9 +12,10 @@ from edge import saving
 from edge.recording import Recording
 from edge.writing import check_writable
 from train.cluster import on_cluster
-from train.simulate.arm import Places
+from train.simulate.arm import Array, Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured
 from train.simulate.engine import PhysicsRun, readings
+from train.simulate.readings import Readings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import FAMILIES
 from train.simulate.truth import true_runs
@@ -53,40 +54,12 @@ def recordings(
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a run, or of some; arguments as of
     `readings`."""
-    trials = physics.trials
-    scene = scene or trials.scene
-    arm = scene.arm.to_dict()
-    skin = scene.skin.to_dict()
+    scene = scene or physics.trials.scene
     for reading in readings(physics, which, scene):
-        trial = reading.trial
         arrived = slice(None) if reading.kept is None else reading.kept
         t = reading.t if reading.times is None else reading.times
-        trial_values = {
-            name: float(value[reading.which]) for name, value in trials.values.items()
-        }
-        soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
-        file = file_name(scene, trial)
-        meta: dict[str, Any] = {
-            "labels": {
-                "category": f"{soft}-{trial.condition}",
-                "mobility": trial.condition,
-                "softness": soft,
-                "object": trial.object.name,
-            },
-            "skin": skin,
-            "arm": arm,
-            "source": f"simulated: {scene.name}",
-            "trial": file.removesuffix(".npz"),
-            "simulation": {
-                "seed": scene.seed,
-                "step_s": trial.step_s,
-                "family": trial.object.family,
-                "redrawn": trial.attempt,
-                "effects": list(reading.effects),
-                "values": {k: v for k, v in trial_values.items() if math.isfinite(v)},
-            },
-        }
         shear = reading.shear()
+        file = file_name(scene, reading.trial)
         yield (
             file,
             Recording(
@@ -94,10 +67,38 @@ def recordings(
                 frames=reading.frames()[arrived],
                 joints=reading.joints[arrived],
                 valid=reading.valid,
-                meta=meta,
+                meta=_meta(reading, physics.trials.values, Path(file).stem),
                 shear=None if shear is None else shear[arrived],
             ),
         )
+
+
+def _meta(reading: Readings, values: dict[str, Array], name: str) -> dict[str, Any]:
+    """The metadata of a trial's recording, with the values of its batch."""
+    scene = reading.scene
+    trial = reading.trial
+    soft = "soft" if FAMILIES[trial.object.family].thickness else "rigid"
+    of_trial = {key: float(numbers[reading.which]) for key, numbers in values.items()}
+    return {
+        "labels": {
+            "category": f"{soft}-{trial.condition}",
+            "mobility": trial.condition,
+            "softness": soft,
+            "object": trial.object.name,
+        },
+        "skin": scene.skin.to_dict(),
+        "arm": scene.arm.to_dict(),
+        "source": f"simulated: {scene.name}",
+        "trial": name,
+        "simulation": {
+            "seed": scene.seed,
+            "step_s": trial.step_s,
+            "family": trial.object.family,
+            "redrawn": trial.attempt,
+            "effects": list(reading.effects),
+            "values": {k: v for k, v in of_trial.items() if math.isfinite(v)},
+        },
+    }
 
 
 def simulate_trials(
@@ -160,9 +161,9 @@ def write(
     target = Path(folder)
     check_writable(target)
     convergences = measured(scene)
-    work = batches_of(
-        scene, batch, convergences, jobs if jobs > 0 else cpu_count() or 1
-    )
+    first = {kind: specs[0] for kind, specs in kinds(scene).items()}
+    processes = jobs if jobs > 0 else cpu_count() or 1
+    work = batches_of(scene, batch, convergences, processes)
     paths = []
     redrawn = 0
     unfelt = 0
@@ -173,7 +174,7 @@ def write(
         unfelt += trial.frames.max(initial=0) <= scene.skin.onset
         progress(1)
     rough = {
-        kinds(scene)[kind][0].key: convergence.error
+        first[kind].key: convergence.error
         for kind, convergence in convergences.items()
         if not convergence.within
     }

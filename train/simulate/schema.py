@@ -19,6 +19,11 @@ class Field:
     """Whether it must be a whole number."""
 
 
+def above_0(high: float, default: float | None, says: str) -> Field:
+    """A number above 0, which 0 itself is not."""
+    return Field(0.0, high, default, says, open_low=True)
+
+
 @dataclass(frozen=True)
 class Effect:
     """When a trial calls for an effect; the module of its name, loaded only then,
@@ -53,7 +58,7 @@ TRIALS = {
     ),
 }
 LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
-TAXEL = Field(0.0, 1e15, 10_000.0, "stiffness of a taxel in N/m", open_low=True)
+TAXEL = above_0(1e15, 10_000.0, "stiffness of a taxel in N/m")
 """At 1e16 N/m the depth of a touch is below the rounding error of a metre."""
 LABELS = {
     "window_s": Field(
@@ -90,46 +95,34 @@ OBJECT = {
     "friction_static": Field(0.0, 5.0, None, "mu_s"),
     "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
     "skin_friction": Field(0.0, 5.0, None, "mu between the skin and the object's face"),
-    "width_m": Field(0.0, 10.0, 1.0, "the face along the forearm", open_low=True),
-    "breadth_m": Field(0.0, 10.0, 10.0, "the face across the forearm", open_low=True),
+    "width_m": above_0(10.0, 1.0, "the face along the forearm"),
+    "breadth_m": above_0(10.0, 10.0, "the face across the forearm"),
     "radius_m": Field(1e-3, 1e6, 1e6, "how the face curves along the forearm"),
-    "height_m": Field(0.0, 10.0, None, "of the contact above the floor", open_low=True),
-    "base_m": Field(
-        0.0, 10.0, None, "of the object's foot in the push's direction", open_low=True
-    ),
-    "foot_m": Field(0.0, 10.0, None, "diameter of the object's foot", open_low=True),
+    "height_m": above_0(10.0, None, "of the contact above the floor"),
+    "base_m": above_0(10.0, None, "of the object's foot in the push's direction"),
+    "foot_m": above_0(10.0, None, "diameter of the object's foot"),
     "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
     "slope_deg": Field(
         -20.0, 20.0, None, "of the surface under the object, uphill along the push"
     ),
-    "stribeck_m_s": Field(
-        0.0, 10.0, None, "speed at which friction has fallen", open_low=True
-    ),
-    "modulus_pa": Field(0.0, 1e18, 12e3, "of the elastic foundation", open_low=True),
+    "stribeck_m_s": above_0(10.0, None, "speed at which friction has fallen"),
+    "modulus_pa": above_0(1e18, 12e3, "of the elastic foundation"),
     "depth_m": Field(1e-4, 10.0, 0.10, "of the elastic foundation"),
     "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
-    "relax_s": Field(0.0, 1e6, 0.5, "its time", open_low=True),
+    "relax_s": above_0(1e6, 0.5, "its time"),
     "stem_count": Field(1, 200, 12, "stems the forearm can meet", integer=True),
-    "stem_n_m": Field(
-        0.0, 1e12, 15.0, "stiffness of a stem, 3 E I / L^3", open_low=True
-    ),
+    "stem_n_m": above_0(1e12, 15.0, "stiffness of a stem, 3 E I / L^3"),
     "stem_spread_m": Field(0.0, 1.0, 0.06, "depth over which the stems stand"),
-    "stem_slip_m": Field(
-        0.0, 10.0, 0.12, "bend at which a stem slips off", open_low=True
-    ),
+    "stem_slip_m": above_0(10.0, 0.12, "bend at which a stem slips off"),
     "stem_damping": Field(0.0, 1.0, 0.15, "damping ratio of a stem"),
     "stem_deviation": Field(
         0.0, 2.0, 0.3, "of the logarithm of the stems' stiffnesses"
     ),
-    "stem_kg": Field(0.0, 10.0, 0.02, "moving mass of a stem", open_low=True),
-    "bubble_n_m": Field(
-        0.0, 1e12, 2000.0, "stiffness of a bubble at rest", open_low=True
-    ),
-    "bubble_m": Field(0.0, 0.1, 0.004, "height of a bubble", open_low=True),
-    "pop_n": Field(0.0, 1e6, 10.0, "force at which a bubble bursts", open_low=True),
-    "cover_n_m": Field(
-        0.0, 1e12, None, "stiffness of a sleeve, per taxel", open_low=True
-    ),
+    "stem_kg": above_0(10.0, 0.02, "moving mass of a stem"),
+    "bubble_n_m": above_0(1e12, 2000.0, "stiffness of a bubble at rest"),
+    "bubble_m": above_0(0.1, 0.004, "height of a bubble"),
+    "pop_n": above_0(1e6, 10.0, "force at which a bubble bursts"),
+    "cover_n_m": above_0(1e12, None, "stiffness of a sleeve, per taxel"),
     "cover_spread": Field(0.0, 0.2, 0.1, "part of a taxel's load each neighbour takes"),
 }
 STIFFNESSES = ("modulus_pa", "stem_n_m", "bubble_n_m")
@@ -196,11 +189,7 @@ EFFECTS: dict[str, Effect] = {
     ),
     "friction": Effect(
         "contact",
-        {
-            "shear_n_m": Field(
-                0.0, 1e12, 1e4, "stiffness of the skin along the face", open_low=True
-            )
-        },
+        {"shear_n_m": above_0(1e12, 1e4, "stiffness of the skin along the face")},
         keys=("skin_friction",),
     ),
     "sliding": Effect("contact", condition="movable"),
@@ -219,9 +208,7 @@ EFFECTS: dict[str, Effect] = {
         "sensor", {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of slopes")}
     ),
     "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0, "standard deviation")}),
-    "saturation": Effect(
-        "sensor", {"newton": Field(0.0, 1e6, 17.0, "the limit", open_low=True)}
-    ),
+    "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0, "the limit")}),
     "dead_band": Effect(
         "sensor", {"counts": Field(0.0, 65535, 50.0, "readings below are zero")}
     ),

@@ -69,73 +69,74 @@ Trace = namedtuple("Trace", "t force q target slide speed depth")
 """The rig's motion and forces, (steps, n) each."""
 
 
+Law = namedtuple("Law", "slopes intercepts gaps", defaults=([[0.0]], [[-math.inf]]))
+"""The lines K a - B of a bed, (S, n) each; all of them are looked at where the gaps of
+its springs are not given."""
+TAXELS = Law([[1e4]])
+
+
 class Rig:
     """n pushers of stiffness `arm_k` whose ends run at `speed` against beds of springs.
 
     The step is the simulator's own; only the arm's geometry is left out (one joint of
-    lever 1). All lines of a bed's law are looked at where the gaps of its springs are
-    not given.
+    lever 1).
     """
 
-    def __init__(  # noqa: PLR0913 - the physics of one test each
+    def __init__(
         self,
-        *,
         h,
+        law=TAXELS,
+        effects=(),
+        *,
         arm_k=115.0,
         arm_d=0.0,
         speed=0.15,
         travel_s=1e9,
-        effects=(),
-        gaps=((-math.inf,),),
-        slopes=((1e4,),),
-        intercepts=((0.0,),),
         **values,
     ):
-        given = [np.asarray(v, dtype=float) for v in values.values()]
-        law = [np.asarray(part, dtype=float) for part in (gaps, slopes, intercepts)]
-        n = max([v.size for v in (*given, np.asarray(h), law[1][0])])
-        box = {"name": "x", "family": "rigid", "conditions": ["fixed"]}
-        scene = from_dict({"object": [box]})
-        values = {
-            key: np.broadcast_to(v, (n,)) for key, v in zip(values, given, strict=True)
-        }
+        law = Law(*map(np.asarray, law))
+        n = max(np.size(v) for v in (*values.values(), h, law.slopes[0]))
+        values = {key: np.broadcast_to(v, n) for key, v in values.items()}
+        scene = from_dict({"object": one_object()})
         specs = (TrialSpec(scene.objects[0], "fixed", 0),) * n
         self.trials = t = Batch(scene, specs, values, plan_of((effects,) * n))
-        t.clock.h = np.broadcast_to(np.asarray(h, float), (n,)).copy()
-        t.joints.rate, t.joints.stiffness, t.joints.damping = (
-            np.zeros((5, 1)),
-            np.ones((5, 1)),
-            np.zeros((5, 1)),
-        )
+        t.clock.h = h
+        t.joints.rate = np.zeros((5, 1))
+        t.joints.stiffness = np.ones((5, 1))
+        t.joints.damping = np.zeros((5, 1))
         t.joints.rate[0] = speed
         t.joints.stiffness[0] = arm_k
         t.joints.damping[0] = arm_d
         t.arm.travel_s[0] = travel_s
         t.contact.jacobian[0, 0] = 1.0
-        shape = (len(law[1]), n)
-        for name, part in zip(("law_gaps", "slopes", "intercepts"), law, strict=True):
-            t.bed.arrays[name] = np.broadcast_to(part, shape)
+        shape = (len(law.slopes), n)
+        t.bed.arrays["law_gaps"] = np.broadcast_to(law.gaps, shape)
+        t.bed.arrays["slopes"] = np.broadcast_to(law.slopes, shape)
+        t.bed.arrays["intercepts"] = np.broadcast_to(law.intercepts, shape)
         t.everyone.run("stand", *TUNE)
         t.contact.compliance[0] = t.arm.step_compliance[0]
 
     def run(self, steps: int) -> Trace:
         t = self.trials
         seen = []
-        still = np.zeros(self.trials.n)
+        still = SimpleNamespace(slide=np.zeros(t.n), speed=np.zeros(t.n))
+        mover = t.states.get("sliding", still)
         for _ in range(steps):
             t.everyone.run(*STEP)
-            mover = t.states.get("sliding", SimpleNamespace(slide=still, speed=still))
-            now = (
-                t.clock.t,
-                t.contact.loads[0],
-                t.arm.q[0],
-                t.everyone.equilibrium(t.clock.t)[0],
+            now = Trace(
+                t=t.clock.t,
+                force=t.contact.loads[0],
+                q=t.arm.q[0],
+                target=t.everyone.equilibrium(t.clock.t)[0],
+                slide=mover.slide,
+                speed=mover.speed,
+                depth=t.contact.depth[0],
             )
-            seen.append(np.array([*now, mover.slide, mover.speed, t.contact.depth[0]]))
+            seen.append(np.array(now))
         return Trace(*np.moveaxis(seen, 1, 0))
 
 
 def slider(h, mass, static, kinetic, **rig) -> Rig:
     """A rig that pushes masses on a floor with friction."""
     moves = {"mass_kg": mass, "friction_static": static, "friction_kinetic": kinetic}
-    return Rig(h=h, effects=("sliding",), **moves, **rig)
+    return Rig(h, effects=("sliding",), **moves, **rig)

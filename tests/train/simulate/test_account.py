@@ -56,10 +56,9 @@ def test_a_scene_says_why_its_steps_are_not_measured(tmp_path):
 def test_the_error_that_the_demo_states_is_that_which_is_measured():
     scene = load(SCENES / "demo.toml")
     groups = kinds(scene)
-    measured = measure(scene, list(groups.values()))
     worst = 0.0
-    for specs, convergence in zip(groups.values(), measured, strict=True):
-        place = convergence.steps_s.index(specs[0].step_s)
+    for kind, convergence in measure(scene, groups).items():
+        place = convergence.steps_s.index(groups[kind][0].step_s)
         worst = max(worst, convergence.errors[place])
     assert worst <= 0.012
     assert "at most 1.2 %" in scene.step_reason

@@ -36,7 +36,7 @@ def test_a_sponge_under_a_steady_push_creeps_as_its_law_says():
     eta = np.array([20.0, 60.0])
     speed = 0.15
     stiffness = 1.0 / (1.0 / 115.0 + 1.0 / 1e4)
-    trace = Rig(h=5e-4, speed=speed, effects=("sponge",), sponge_n_s_m=eta).run(2000)
+    trace = Rig(5e-4, effects=("sponge",), speed=speed, sponge_n_s_m=eta).run(2000)
     want = eta * speed * (1.0 - np.exp(-stiffness * trace.t / eta))
     np.testing.assert_allclose(trace.force, want, atol=2e-3 * want.max())
 

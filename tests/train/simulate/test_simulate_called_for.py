@@ -4,6 +4,7 @@ import json
 import re
 import sys
 import types
+from itertools import product
 
 import numpy as np
 import pytest
@@ -107,22 +108,37 @@ STATE = set("stems tilt inertia friction sliding turning tipping viscous".split(
 """Effects with state of their own."""
 
 
-def test_3_only_the_called_effects_state_exists():
+@pytest.fixture(scope="module")
+def batches():
+    """A batch of each kind of trials, and the effects that it calls for."""
     called = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
     trial_scene = scene(*called, objects=everything())
-    for i in range(len(kinds(trial_scene))):
-        batch, effects = batch_of(trial_scene, i)
-        expected = STATE & {*effects, "viscous"}
-        assert set(batch.trials.states) == expected, effects
-        traces = {"sliding": "slide_m", "turning": "turn_rad"}
+    return [batch_of(trial_scene, i) for i in range(len(kinds(trial_scene)))]
+
+
+def test_3_only_the_called_effects_state_exists(batches):
+    for batch, effects in batches:
+        assert set(batch.trials.states) == STATE & {*effects, "viscous"}, effects
+
+
+def test_3_only_the_called_effects_leave_traces(batches):
+    traces = {"sliding": "slide_m", "turning": "turn_rad"}
+    for batch, effects in batches:
         kept = {name for effect, name in traces.items() if effect in effects}
         assert set(batch.traces) == {"depth_m", *kept}
-        assert batch.seen[0].kept is not None
-        assert batch.seen[0].valid is not None
-    bare = batch_of(scene(), 0)[0]
+
+
+@pytest.mark.parametrize("name", ["times", "kept", "valid"])
+def test_3_only_the_called_sensors_effects_leave_theirs(batches, name):
+    assert all(getattr(batch.seen[0], name) is not None for batch, _ in batches)
+    bare, _ = batch_of(scene())
+    assert getattr(bare.seen[0], name) is None
+
+
+def test_3_without_effects_there_is_only_the_depth():
+    bare, _ = batch_of(scene())
     assert bare.trials.states == {}
     assert set(bare.traces) == {"depth_m"}
-    assert bare.seen[0].times is bare.seen[0].kept is bare.seen[0].valid is None
 
 
 def test_4_adding_an_effect_leaves_the_others_draws():
@@ -144,45 +160,57 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     np.testing.assert_array_equal(first, second)
 
 
-def test_5_each_trial_runs_its_own_hooks_and_no_other():
+@pytest.fixture(scope="module")
+def plan():
+    """The plan of one trial of each kind, which call for every effect."""
     layers = ("foundation", "lateral", "bottoming", "relaxation")
     implied = (*layers, "pop", "stems", "shear")
     added = [name for name in EFFECTS if name not in implied]
     trial_scene = scene(*added, objects=everything(), axes=3)
     specs = tuple(specs[0] for specs in kinds(trial_scene).values())
-    plan = make_plan(trial_scene, specs)
-    seen = set()
-    for i, effects in enumerate(plan.effects):
-        shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
-        owners = ["base", *shared, *effects]
-        for stage in STAGES:
-            ran = [call.owner for call in plan.stages[stage] if call.which[i]]
-            have = [name for name in owners if hasattr(module_of(name), stage)]
-            assert ran == (have[-1:] if stage in INSTEAD else have), (effects, stage)
-        seen |= set(effects)
-    assert seen == set(EFFECTS)
+    return make_plan(trial_scene, specs)
 
 
-@pytest.mark.parametrize("sensor", [False, True])
-def test_6_results_do_not_depend_on_the_batch(sensor):
-    add = ["tilt", "inertia"]
-    if sensor:
-        add += [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
+def owners_of(effects, stage):
+    """The modules whose hooks a trial of these effects runs in a stage, in order."""
+    shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
+    have = [n for n in ("base", *shared, *effects) if hasattr(module_of(n), stage)]
+    return have[-1:] if stage in INSTEAD else have
+
+
+def test_5_each_trial_runs_its_own_hooks_and_no_other(plan):
+    for (i, effects), stage in product(enumerate(plan.effects), STAGES):
+        ran = [call.owner for call in plan.stages[stage] if call.which[i]]
+        assert ran == owners_of(effects, stage), (effects, stage)
+
+
+def test_5_these_trials_call_for_every_effect(plan):
+    assert set().union(*plan.effects) == set(EFFECTS)
+
+
+def bits(batch, i):
+    """{name: bytes} of what a trial's recording is made of."""
+    names = ("times", "kept", "valid")
+    arrays = {name: getattr(batch.seen[i], name) for name in names}
+    arrays |= {name: getattr(batch, name)[i] for name in ("counts", "joints", "force")}
+    return {name: a.tobytes() for name, a in arrays.items() if a is not None}
+
+
+SENSORS = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
+
+
+@pytest.mark.parametrize(("sensors", "arrays"), [((), 3), (SENSORS, 6)])
+def test_6_results_do_not_depend_on_the_batch(sensors, arrays):
+    add = ["tilt", "inertia", *sensors]
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
     every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
     together = run_batch(trial_scene, every)
+    assert len(bits(together, 0)) == arrays
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
         some = run_batch(trial_scene, specs)
-        where = [every.index(spec) for spec in specs]
-        for name in ("counts", "joints", "force"):
-            bits = getattr(together, name)[where].tobytes()
-            assert getattr(some, name).tobytes() == bits, (name, specs[0].key)
-        for one_seen, k in zip(some.seen, where, strict=True) if sensor else ():
-            for name in ("times", "kept", "valid"):
-                read = getattr(one_seen, name)
-                before = getattr(together.seen[k], name)
-                assert read.tobytes() == before.tobytes(), (name, specs[0].key)
+        for i, spec in enumerate(specs):
+            assert bits(some, i) == bits(together, every.index(spec)), spec.key
 
 
 def test_each_required_effect_has_its_reason():

@@ -6,7 +6,7 @@ contact, whatever its effects are: nothing in free motion, and never less than n
 in sum. The speed and the lean of a pushed object take no more than the contact took.
 """
 
-from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -68,9 +68,7 @@ class Ledger:
         self.meddle = meddle
         plan = make_plan(scene, specs)
         book = Call("ledger", self.book, np.ones(len(specs), dtype=bool))
-        self.plan = replace(
-            plan, stages={**plan.stages, "settle": [*plan.stages["settle"], book]}
-        )
+        self.plan = plan.with_hooks(settle=[*plan.stages["settle"], book])
         self.inertia = (
             np.array(scene.inertia)[:, None] if "inertia" in plan.calls else 0.0
         )
@@ -154,13 +152,12 @@ def lean(t, mover):
 def pair_scene(first, second):
     """A scene whose object calls for two effects and for nothing that they do not need;
     None where no object can have both."""
-    pair = {first, second}
-    pair |= {need for name in pair for need in EFFECTS[name].needs}
+    pair = {first, second, *EFFECTS[first].needs, *EFFECTS[second].needs}
     families = [set(EFFECTS[n].families) for n in pair if EFFECTS[n].families]
-    common = sorted(set.intersection(*families)) if families else ["rigid"]
+    common = sorted(set.intersection(*families or [{"rigid"}]))
     if not common:
         return None
-    called = [key for name in pair for key in EFFECTS[name].keys]
+    called = chain(*(EFFECTS[name].keys for name in pair))
     keys = {key: RANGES[key] for key in ("width_m", *MOVES, *called)}
     family = common[0]
     condition = "movable" if "sliding" in pair else "fixed"

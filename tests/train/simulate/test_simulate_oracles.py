@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import (
+    Law,
     Rig,
     make,
     movable,
@@ -73,7 +74,7 @@ class TestArm:
         k = 20.0
         d = 1.11
         h = 1e-4
-        rig = Rig(h=h, arm_k=k, arm_d=d, speed=1e6, travel_s=1e-6, slopes=[[0.0]])
+        rig = Rig(h=h, arm_k=k, arm_d=d, speed=1e6, travel_s=1e-6, law=Law([[0.0]]))
         trace = rig.run(3000)
         want = 1.0 - np.exp(-trace.t[:, 0] * k / d)
         np.testing.assert_allclose(trace.q[:, 0], want, atol=2e-3)
@@ -106,7 +107,7 @@ class TestSliding:
     MU_K = 0.4
 
     def rig(self, h, speed=0.15):
-        return slider(h, self.MASS, self.MU_S, self.MU_K, speed=speed, slopes=[[1e7]])
+        return slider(h, self.MASS, self.MU_S, self.MU_K, speed=speed, law=Law([[1e7]]))
 
     def test_it_sticks_for_mu_n_over_k_v(self):
         trace = self.rig(1e-3).run(1200)
@@ -221,7 +222,7 @@ class TestInertia:
         h = 0.01
         loss_s = 0.003
         plan = make_plan(trial_scene, specs_of(trial_scene))
-        plans = plan, replace(plan, stages={**plan.stages, "pace": []})
+        plans = plan, plan.with_hooks(pace=[])
         paced, plain = (run(trial_scene, h, plan=plan) for plan in plans)
         want = self.oracle(paced, loss_s)
         hit = slice(0, int(np.argmax(want)) + 4)

@@ -33,22 +33,31 @@ def written(demo, tmp_path_factory):
     return folder, write(demo, folder).paths
 
 
-def test_a_recording_is_as_the_contract_says(demo, written):
-    folder, paths = written
-    assert len(paths) == total_trials(demo) == 16
-    trial = load(folder / "cardboard-box-movable-01.npz")
+@pytest.fixture(scope="module")
+def trial(written):
+    return load(written[0] / "cardboard-box-movable-01.npz")
+
+
+def test_each_trial_of_a_scene_is_written(demo, written):
+    assert len(written[1]) == total_trials(demo) == 16
+
+
+def test_a_recordings_metadata_are_as_the_contract_says(demo, trial):
     assert trial.labels == {
         "category": "rigid-movable",
         "mobility": "movable",
         "softness": "rigid",
         "object": "cardboard box",
     }
-    assert trial.frames.shape[1:] == (16, 24)
-    assert trial.joints is not None
-    assert trial.joints.shape == (len(trial.t), 5)
     assert trial.layout.to_dict() == demo.skin.to_dict()
     assert trial.meta["arm"] == demo.arm.to_dict()
     assert trial.meta["simulation"]["effects"] == ["sliding", "noise", "dead_band"]
+
+
+def test_a_recordings_arrays_are_as_the_contract_says(demo, trial):
+    assert trial.frames.shape[1:] == (16, 24)
+    assert trial.joints is not None
+    assert trial.joints.shape == (len(trial.t), 5)
     np.testing.assert_allclose(np.diff(trial.t), 0.01)
     touched = trial.t[np.argmax(trial.frames.max(axis=(1, 2)) > demo.skin.onset)]
     assert touched > 0.1
@@ -85,41 +94,64 @@ def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(
     assert all(more[name] == digest for name, digest in first.items())
 
 
-def test_the_sensors_effects_reach_the_recording():
+def recorded(**effects):
+    """A recording of a narrow post, by sensors of these effects."""
+    trials = {"count": 1, "after_s": 0.6}
+    post = scene(one_object(width_m=0.03), trials=trials, effects=effects)
+    ((_, recording),) = simulate(post)
+    return recording
 
-    def recorded(**effects):
-        trials = {"count": 1, "after_s": 0.6}
-        return next(
-            simulate(scene(one_object(width_m=0.03), trials=trials, effects=effects))
-        )[1]
 
-    plain = recorded()
-    peak = plain.frames.max()
-    assert recorded(saturation={"newton": 0.5}).frames.max() == 500
-    assert set(np.unique(recorded(quantisation={"counts": 64}).frames) % 64) == {0}
-    banded = recorded(dead_band={"counts": 300}).frames
-    assert banded[banded > 0].min() >= 300
-    dead = recorded(dead_taxels={"part": 0.3, "known": 1})
-    assert dead.valid is not None
-    assert 0.6 < dead.valid.mean() < 0.8
-    assert not dead.frames[:, ~dead.valid].any()
-    assert recorded(dead_taxels={"part": 0.3, "known": 0}).valid is None
-    late = recorded(jitter={"s": 0.002})
-    assert len(np.unique(np.diff(late.t).round(6))) > 10
-    assert (np.diff(late.t) > 0.0).all()
-    fewer = recorded(dropped_frames={"part": 0.4})
-    assert 0.45 < len(fewer.t) / len(plain.t) < 0.75
-    where = np.searchsorted(plain.t, fewer.t)
-    np.testing.assert_array_equal(fewer.frames, plain.frames[where])
-    leak = recorded(crosstalk={"part": 0.05})
-    assert (leak.frames > 0).sum() > (plain.frames > 0).sum()
-    lag = recorded(hysteresis={"counts": 100}).frames.astype(int)
-    assert lag.max() == pytest.approx(int(peak) - 100, abs=1)
-    noise = recorded(noise={"counts": 6})
-    rest = noise.frames[:10].astype(float)
-    assert 6 * 0.35 < rest.mean() < 6 * 0.45  # half of a normal law: 0.4 deviations
-    drift = recorded(drift={"counts_per_s": 50})
-    assert drift.frames[-1].mean() > drift.frames[5].mean() > 0.0
+class TestSensors:
+    @pytest.fixture(scope="class")
+    def plain(self):
+        return recorded()
+
+    def test_saturation_cuts_the_counts(self):
+        assert recorded(saturation={"newton": 0.5}).frames.max() == 500
+
+    def test_quantisation_leaves_whole_steps(self):
+        frames = recorded(quantisation={"counts": 64}).frames
+        assert set(np.unique(frames % 64)) == {0}
+
+    def test_a_dead_band_leaves_no_small_counts(self):
+        frames = recorded(dead_band={"counts": 300}).frames
+        assert frames[frames > 0].min() >= 300
+
+    def test_known_dead_taxels_are_invalid_and_read_zero(self):
+        dead = recorded(dead_taxels={"part": 0.3, "known": 1})
+        assert 0.6 < dead.valid.mean() < 0.8
+        assert not dead.frames[:, ~dead.valid].any()
+
+    def test_unknown_dead_taxels_are_not_told(self):
+        assert recorded(dead_taxels={"part": 0.3, "known": 0}).valid is None
+
+    def test_jitter_shifts_the_times(self):
+        between = np.diff(recorded(jitter={"s": 0.002}).t)
+        assert len(np.unique(between.round(6))) > 10
+        assert (between > 0.0).all()
+
+    def test_dropped_frames_are_missing_and_the_others_stay(self, plain):
+        fewer = recorded(dropped_frames={"part": 0.4})
+        assert 0.45 < len(fewer.t) / len(plain.t) < 0.75
+        where = np.searchsorted(plain.t, fewer.t)
+        np.testing.assert_array_equal(fewer.frames, plain.frames[where])
+
+    def test_crosstalk_reaches_further_taxels(self, plain):
+        leak = recorded(crosstalk={"part": 0.05})
+        assert (leak.frames > 0).sum() > (plain.frames > 0).sum()
+
+    def test_hysteresis_lags_by_half_its_loop(self, plain):
+        lag = recorded(hysteresis={"counts": 100}).frames.astype(int)
+        assert lag.max() == pytest.approx(int(plain.frames.max()) - 100, abs=1)
+
+    def test_the_mean_of_noise_is_that_of_half_a_normal_law(self):
+        rest = recorded(noise={"counts": 6}).frames[:10].astype(float)
+        assert 6 * 0.35 < rest.mean() < 6 * 0.45  # 0.4 deviations
+
+    def test_a_baseline_drifts(self):
+        frames = recorded(drift={"counts_per_s": 50}).frames
+        assert frames[-1].mean() > frames[5].mean() > 0.0
 
 
 class TestCommand:

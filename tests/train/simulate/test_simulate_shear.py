@@ -14,14 +14,23 @@ from train.simulate.effects import shear
 from train.simulate.effects.shear import shared
 from train.simulate.run import recordings
 
-SETTINGS = {"trials": {"count": 2, "after_s": 1.0}}
-THREE = {"skin": {"axes": 3}}
 STICKY_FOAM = one_object(family="foam", skin_friction=5.0, width_m=0.2)
-BRIEF = {"trials": {"count": 2, "after_s": 0.3}}
 
 
-def box(mu, **keys):
-    return one_object(skin_friction=mu, width_m=0.05, **keys)
+def box(mu):
+    return one_object(skin_friction=mu, width_m=0.05)
+
+
+def felt(thing, *add, after_s=1.0, axes=3, **effects):
+    """A run of two trials, on a skin of three axes."""
+    trials = {"count": 2, "after_s": after_s}
+    effects = {"add": list(add), **effects}
+    return run(scene(thing, effects=effects, trials=trials, skin={"axes": axes}))
+
+
+def traction(batch):
+    """The tangential load along the rows and around the columns, (rows, C, n) each."""
+    return shear.traction(batch.trials.everyone)
 
 
 def water_level(pull: int, limits: list[int]) -> list[Fraction]:
@@ -61,29 +70,29 @@ def test_a_pull_beyond_all_limits_is_shared_by_them():
 @pytest.mark.parametrize("mu", [0.05, 0.4, 5.0])
 @pytest.mark.parametrize("add", [(), ("tilt",)])
 def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
-    batch = run(scene(box(mu), effects={"add": list(add)}, **SETTINGS, **THREE))
-    along = shear.traction(batch.trials.everyone)[0].sum(axis=(0, 1))
+    batch = felt(box(mu), *add)
+    along = traction(batch)[0].sum(axis=(0, 1))
     pull = batch.trials.contact.pull
     assert (np.abs(pull) > 0.01).all()
     np.testing.assert_allclose(along, pull, rtol=1e-9)
 
 
 def test_the_skin_is_drawn_against_its_own_motion():
-    batch = run(scene(box(0.4), **SETTINGS, **THREE))
+    batch = felt(box(0.4))
     t = batch.trials
     stretch = t.states["friction"].stretch
     assert (stretch < 0.0).all()  # the skin has moved against the face's direction
     forearm = t.scene.kinematics.pose(t.arm.q).rotation[2]
     towards_wrist = -(t.contact.along_face * forearm).sum(axis=0)
     moved = np.sign(stretch * towards_wrist)
-    pulled = np.sign(shear.traction(batch.trials.everyone)[0].sum(axis=(0, 1)))
+    pulled = np.sign(traction(batch)[0].sum(axis=(0, 1)))
     assert (moved == -pulled).all()
 
 
 def test_taxels_that_all_stick_bear_alike():
-    batch = run(scene(STICKY_FOAM, **BRIEF, **THREE))
+    batch = felt(STICKY_FOAM, after_s=0.3)
     t = batch.trials
-    along = shear.traction(batch.trials.everyone)[0]
+    along = traction(batch)[0]
     loaded = t.touch.image > 0.0
     assert loaded.sum() > 10
     alike = t.contact.pull / loaded.sum(axis=(0, 1))
@@ -92,25 +101,26 @@ def test_taxels_that_all_stick_bear_alike():
 
 
 def test_taxels_that_all_slip_bear_friction_times_their_load():
-    slow = {"trials": {"count": 2, "after_s": 4.0}}
-    t = run(scene(box(0.05), **slow, **THREE)).trials
-    along = np.abs(shear.traction(t.everyone)[0])
-    assert (t.touch.force > 10.0).all()
+    batch = felt(box(0.05), after_s=4.0)
+    touch = batch.trials.touch
+    assert (touch.force > 10.0).all()
     # The pull obeys the load of the step before, which is less by its growth.
-    np.testing.assert_allclose(along, 0.05 * t.touch.image, rtol=5e-3)
+    along = np.abs(traction(batch)[0])
+    np.testing.assert_allclose(along, 0.05 * touch.image, rtol=5e-3)
 
 
 def test_no_taxel_leaves_its_cone():
-    batch = run(scene(box(0.4), effects={"add": ["tilt"]}, **SETTINGS, **THREE))
+    batch = felt(box(0.4), "tilt")
     t = batch.trials
-    size = np.hypot(*shear.traction(t.everyone))
+    size = np.hypot(*traction(batch))
     slack = np.maximum(np.abs(t.contact.pull) / (0.4 * t.touch.force), 1.0)
     assert (size <= 0.4 * t.touch.image * slack * (1.0 + 1e-12)).all()
 
 
 def test_around_the_forearm_a_load_acts_along_the_faces_normal():
-    t = run(scene(STICKY_FOAM, **BRIEF, **THREE)).trials
-    _, around = shear.traction(t.everyone)
+    batch = felt(STICKY_FOAM, after_s=0.3)
+    t = batch.trials
+    _, around = traction(batch)
     assert (t.touch.image.any(axis=0).sum(axis=0) > 1).all()
     expected = t.touch.image * np.sin(t.bed.column_angle)
     np.testing.assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
@@ -122,11 +132,12 @@ def test_around_the_forearm_a_load_acts_along_the_faces_normal():
 def test_a_face_that_turns_takes_the_normal_with_it():
     foam = {"family": "foam", "skin_friction": 1.0, "width_m": 0.2}
     thing = movable(0.3, 0.2, 0.2, aside_m=0.05, foot_m=0.1, **foam)
-    t = run(scene(thing, **SETTINGS, **THREE)).trials
+    batch = felt(thing)
+    t = batch.trials
     turned = t.contact.turned
     assert (turned > 0.1).all()
     t.contact.pull[:] = 0.0
-    along, around = shear.traction(t.everyone)
+    along, around = traction(batch)
     expected = t.touch.image * np.sin(t.bed.column_angle - turned)
     assert np.count_nonzero(expected) > 20
     np.testing.assert_allclose(around, expected, rtol=1e-12)
@@ -134,14 +145,13 @@ def test_a_face_that_turns_takes_the_normal_with_it():
 
 
 def test_without_skin_friction_there_is_no_shear():
-    t = run(scene(one_object(), **SETTINGS, **THREE)).trials
-    assert not shear.traction(t.everyone).any()
+    assert not traction(felt(one_object())).any()
 
 
 def test_nothing_but_the_shear_differs_from_the_scene_without_it():
-    add = {"effects": {"add": ["tilt", "noise", "dead_band"]}}
-    plain = recordings(run(scene(box(0.4), **add, **SETTINGS)))
-    three = recordings(run(scene(box(0.4), **add, **SETTINGS, **THREE)))
+    add = ("tilt", "noise", "dead_band")
+    plain = recordings(felt(box(0.4), *add, axes=1))
+    three = recordings(felt(box(0.4), *add))
     pairs = list(zip(plain, three, strict=True))
     assert len(pairs) == 2
     for (_, without), (_, sheared) in pairs:
@@ -153,23 +163,19 @@ def test_nothing_but_the_shear_differs_from_the_scene_without_it():
 
 
 def test_both_axes_have_the_taxels_noise_and_dead_band():
-    quiet = {"add": ["noise"], "noise": {"counts": 5.0}}
-    still = scene(box(0.0), effects=quiet, **SETTINGS, **THREE)
-    (_, noisy), _ = recordings(run(still))
+    quiet = {"noise": {"counts": 5.0}}
+    (_, noisy), _ = recordings(felt(box(0.0), **quiet))
     spread = noisy.shear.reshape(-1, 2).std(axis=0)
     assert spread == pytest.approx([5.0, 5.0], rel=0.02)
-    banded = {**quiet, "add": ["noise", "dead_band"], "dead_band": {"counts": 30.0}}
-    (_, calm), _ = recordings(run(scene(box(0.0), effects=banded, **SETTINGS, **THREE)))
+    (_, calm), _ = recordings(felt(box(0.0), **quiet, dead_band={"counts": 30.0}))
     untouched = calm.frames == 0
     assert untouched.sum() > 1000
     assert not calm.shear[untouched].any()
 
 
 def test_a_dead_taxel_has_no_shear():
-    add = {"add": ["noise", "dead_taxels"], "dead_taxels": {"part": 0.2}}
-    (_, recording), _ = recordings(
-        run(scene(box(0.4), effects=add, **SETTINGS, **THREE))
-    )
+    batch = felt(box(0.4), "noise", dead_taxels={"part": 0.2})
+    (_, recording), _ = recordings(batch)
     assert not recording.valid.all()
     assert not recording.shear[:, ~recording.valid].any()
     assert recording.shear[:, recording.valid].any()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve, toeplitz
 
-from tests.train.simulate.scenes import Rig, make, one_object, run
+from tests.train.simulate.scenes import Law, Rig, make, one_object, run
 from train.simulate import contact
 from train.simulate.effects import cover, lateral
 from train.simulate.effects.pop import BREAKS, SLOPES
@@ -23,11 +23,9 @@ class TestRelaxation:
         ratio = 1.2
         rate = 0.02
         up = 0.5
-        law = {"effects": ("relaxation",), "relax_ratio": ratio, "relax_s": tau}
-        steps_s = [0.01, 0.002, 0.1]
-        rig = Rig(
-            h=steps_s, arm_k=1e12, speed=rate, travel_s=up, slopes=[[k] * 3], **law
-        )
+        push = {"arm_k": 1e12, "speed": rate, "travel_s": up}
+        solid = {"relax_ratio": ratio, "relax_s": tau}
+        rig = Rig([0.01, 0.002, 0.1], Law([[k]]), ("relaxation",), **push, **solid)
         trace = rig.run(150)
         t = trace.t
         ramp = np.minimum(t, up)

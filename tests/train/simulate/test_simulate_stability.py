@@ -3,7 +3,7 @@ judged."""
 
 import numpy as np
 
-from tests.train.simulate.scenes import Rig, slider
+from tests.train.simulate.scenes import Law, Rig, slider
 from train.simulate import contact
 from train.simulate.contact import GRAVITY
 
@@ -51,7 +51,7 @@ def judge(trace, stiffness, mass, mu_s, mu_k):
 def test_the_judge_rejects_a_finite_trace_that_reset_itself():
     # A general engine's soft body went NaN, reset itself and ended finite with zero
     # force.
-    trace = slider(0.01, 5.0, MU_S, MU_K, slopes=[[1e3]]).run(60)
+    trace = slider(0.01, 5.0, MU_S, MU_K, law=Law([[1e3]])).run(60)
     assert judge(trace, 1e3, 5.0, MU_S, MU_K) == []
     trace.force[30:] = 0.0
     trace.q[30:] = trace.target[30:]
@@ -66,8 +66,7 @@ def test_taxel_forces_as_stiffness_times_depth_lose_digits():
     gaps = np.sort(rng.uniform(0.0, 1e-3, (7, n)), axis=0)
     gaps[0] = 0.0
     k = np.full((7, n), stiff)
-    law = dict(zip(("slopes", "intercepts"), contact.bed_law(gaps, k), strict=True))
-    trace = Rig(h=0.01, gaps=gaps, **law).run(50)
+    trace = Rig(0.01, Law(*contact.bed_law(gaps, k), gaps)).run(50)
     force = trace.force[-1]
     loads = contact.spring_loads(trace.depth[-1:], gaps, k, 1.0)
     naive = loads.sum(axis=(0, 1))
