@@ -6,15 +6,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from train.simulate.convergence import Convergence, Kind, kinds, measure
-from train.simulate.engine import frame_count, readings, run_physics
+from train.simulate.engine import batch_size, readings, run_physics
 from train.simulate.plan import Call, make_plan, required_effects
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import EFFECTS, SHARED
 
 BASE = "(base)"
 """Names the work of all trials: the arm, the skin, and the loop over the steps."""
-MOST_TRIALS = 400
-"""Trials that run side by side, as when recordings are written."""
 MANY_STEPS = 100_000
 """Steps of a trial from which a run says how long it will take."""
 TIMED_FRAMES = 20
@@ -86,8 +84,9 @@ def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
     watch = Stopwatch()
     callers: dict[str, int] = {}
     begun = time.perf_counter()
-    for first in range(0, len(specs), MOST_TRIALS):
-        batch = tuple(specs[first : first + MOST_TRIALS])
+    size = batch_size(scene)
+    for first in range(0, len(specs), size):
+        batch = tuple(specs[first : first + size])
         plan = make_plan(scene, batch)
         for name, mask in plan.calls.items():
             callers[name] = callers.get(name, 0) + int(mask.sum())
@@ -119,13 +118,14 @@ def duration(scene: Scene) -> str:
     steps = round(seconds / min(spec.step_s for spec in specs))
     if steps <= MANY_STEPS:
         return ""
+    size = batch_size(scene)
     frame_s = 1.0 / scene.rate_hz
-    batch = tuple(replace(spec, step_s=frame_s) for spec in specs[:MOST_TRIALS])
+    batch = tuple(replace(spec, step_s=frame_s) for spec in specs[:size])
     brief = replace(scene, trials={**scene.trials, "after_s": TIMED_FRAMES * frame_s})
     begun = time.perf_counter()
     run_physics(brief, batch)
-    a_step_s = (time.perf_counter() - begun) / (frame_count(brief) - 1)
-    batches = -(-len(specs) // MOST_TRIALS)
+    a_step_s = (time.perf_counter() - begun) / (brief.frame_count - 1)
+    batches = -(-len(specs) // size)
     hours = batches * steps * a_step_s / 3600.0
     return (
         f"{steps:,} steps a trial: this will take about {hours:.2g} hours of one core"

@@ -34,6 +34,11 @@ from train.simulate.scene_model import Scene, TrialSpec, Value
 from train.simulate.schema import STIFFNESSES
 from train.simulate.trials import Batch, Trials
 
+MOST_TRIALS = 400
+"""Most trials simulated side by side. Larger batches save little, as their arrays no
+longer fit into a processor's cache."""
+MOST_FRAMES = 400_000
+"""Most frames of all trials simulated side by side; each takes about 1 kB of memory."""
 ENERGY_MADE = 0.01
 """Tolerance as a part of the work put in, since frames only sample that work."""
 SCALED = {
@@ -97,10 +102,9 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
     return out
 
 
-def frame_count(scene: Scene) -> int:
-    """Number of frames of a trial: the longest lead, the time after it, and the frame
-    at t = 0."""
-    return round((scene.lead.high + scene.trials["after_s"]) * scene.rate_hz) + 1
+def batch_size(scene: Scene) -> int:
+    """Number of a scene's trials that are simulated side by side."""
+    return max(1, min(MOST_TRIALS, MOST_FRAMES // scene.frame_count))
 
 
 def begin(
@@ -163,7 +167,7 @@ class PhysicsRun:
     def of(cls, batch: Batch, *, images: bool) -> Self:
         """A run before its first step, with the joints at the start."""
         n = batch.n
-        frames = frame_count(batch.scene)
+        frames = batch.scene.frame_count
         shape = n, frames if images else 0, *batch.touch.image.shape[:2]
         run = cls(
             t=np.arange(frames) / batch.scene.rate_hz,

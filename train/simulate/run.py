@@ -14,15 +14,11 @@ from edge.writing import check_writable
 from train.cluster import on_cluster
 from train.simulate.arm import Array, Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured
-from train.simulate.engine import PhysicsRun, readings
+from train.simulate.engine import PhysicsRun, batch_size, readings
 from train.simulate.readings import Readings
 from train.simulate.scene_model import Scene, TrialSpec
 from train.simulate.schema import FAMILIES
 from train.simulate.truth import true_runs
-
-BATCH = 400
-"""Most trials simulated side by side. Larger batches save little, as their arrays no
-longer fit into a processor's cache; each trial takes about 0.4 MB of memory."""
 
 
 @dataclass(frozen=True)
@@ -111,25 +107,26 @@ def simulate_trials(
 
 def batches_of(
     scene: Scene,
-    batch: int = BATCH,
+    batch: int | None = None,
     convergences: dict[Kind, Convergence] | None = None,
     jobs: int = 1,
 ) -> list[tuple[TrialSpec, ...]]:
     """Batches of the scene's trials, of about equal work.
 
     Args:
-        batch: most trials in each.
+        batch: most trials in each; as many as suit the scene where None.
         convergences: the measured steps (`measured`), for a scene that gives no step.
         jobs: smallest number of batches, if there are so many trials.
     """
     if convergences is None:
         convergences = measured(scene)
     every = [spec for specs in kinds(scene, convergences).values() for spec in specs]
-    count = min(max(-(-len(every) // batch), jobs), len(every))
+    size = batch or batch_size(scene)
+    count = min(max(-(-len(every) // size), jobs), len(every))
     return [tuple(every[i::count]) for i in range(count)]
 
 
-def simulate(scene: Scene, batch: int = BATCH) -> Iterator[tuple[str, Recording]]:
+def simulate(scene: Scene, batch: int | None = None) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a scene, simulated in this process."""
     for specs in batches_of(scene, batch):
         yield from simulate_trials(scene, specs)
@@ -139,7 +136,7 @@ def write(
     scene: Scene,
     folder: str | Path,
     *,
-    batch: int = BATCH,
+    batch: int | None = None,
     jobs: int = 1,
     address: str | None = None,
     progress: Callable[[int], Any] = lambda done: None,
@@ -149,7 +146,7 @@ def write(
     The files' bytes depend on the scene and its seed alone.
 
     Args:
-        batch: most trials simulated side by side.
+        batch: most trials simulated side by side; see `batches_of`.
         jobs: processes on this machine (joblib).
         address: of a Dask scheduler that runs the batches and sends the recordings
             back.

@@ -11,6 +11,7 @@ import numpy as np
 
 from edge.config import REQUIRED, ConfigTable, read_toml
 from edge.errors import InputError
+from edge.recording import LARGEST_BYTES
 from edge.skin.file import shipped
 from edge.touch.arm import Chain
 from edge.touch.arm_file import read_arm
@@ -132,6 +133,12 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
                 f"object {needed}, "
                 f"or leave spread.{key} out"
             )
+    if scene.recording_bytes > LARGEST_BYTES:
+        raise InputError(
+            f"{where}: a recording of {scene.frame_count} frames would hold more than "
+            f"{LARGEST_BYTES} bytes, which no command reads; give trials.after_s or "
+            "trials.rate_hz less"
+        )
     check_supported(scene, where)
     return scene
 

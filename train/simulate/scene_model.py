@@ -1,6 +1,7 @@
 """A checked scene: its objects, the values that its trials share, and the table it is
 read from."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -180,6 +181,20 @@ class Scene:
     def count(self) -> int:
         """Number of trials of each object in each condition."""
         return int(self.trials["count"])
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames of a trial: the longest lead, the time after it, and the
+        frame at t = 0."""
+        return round((self.lead.high + self.trials["after_s"]) * self.rate_hz) + 1
+
+    @property
+    def recording_bytes(self) -> int:
+        """Bytes of a trial's times, joint angles and counts."""
+        axes = self.skin.axes or 1
+        return self.frame_count * (
+            8 + 8 * self.arm.dof + 2 * axes * math.prod(self.skin.shape)
+        )
 
     def setting(self, effect: str, key: str) -> float:
         """A setting of an effect, or its default."""

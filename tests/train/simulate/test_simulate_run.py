@@ -11,7 +11,7 @@ from edge.recording import load
 from tests.train.simulate.scenes import make, one_object, scene
 from train.__main__ import main
 from train.simulate import scene as scenes
-from train.simulate.run import simulate, total_trials, write
+from train.simulate.run import batches_of, simulate, total_trials, write
 
 DEMO = Path(__file__).parents[3] / "train" / "scenes" / "demo.toml"
 
@@ -70,6 +70,13 @@ def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path,
     write(demo, tmp_path, progress=seen.append, **how)
     assert digests(tmp_path) == digests(written[0])
     assert sum(seen) == 16
+
+
+def test_long_trials_are_simulated_fewer_side_by_side():
+    """As many as ordinary ones would take 20 GB of memory."""
+    batches = batches_of(make(one_object(), count=50, rate_hz=1000.0, after_s=59.8))
+    assert {len(specs) for specs in batches} <= {5, 6}
+    assert sum(map(len, batches)) == 50
 
 
 def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):

@@ -182,6 +182,12 @@ def test_a_mistake_gets_one_sentence_with_the_key_and_the_values_allowed(
     assert "\n" not in str(error.value)
 
 
+def test_trials_whose_recordings_no_command_would_read_are_refused():
+    trials = {"after_s": 60.0, "rate_hz": 5000.0}
+    with pytest.raises(InputError, match="a recording of 301001 frames would hold"):
+        from_dict({**GOOD, "trials": trials, "step_s": {}})
+
+
 def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
     (tmp_path / "one.toml").write_text(
         'name = "one"\n[trials]\ncount = 3\nafter_s = 1.5\n[spread]\nyaw_deg = 2.0\n'
