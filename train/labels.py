@@ -1,7 +1,9 @@
 """Labels of contacts, and those that follow from others."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import permutations
+from itertools import chain, permutations
+from typing import Any
 
 from edge.errors import InputError
 from edge.recording import Recording
@@ -34,10 +36,18 @@ def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
             f"meta.contacts labels {len(contacts)} contacts, {count} are found; "
             "correct the labels or the threshold"
         )
-    return [
-        {**recording.labels, **{str(k): str(v) for k, v in own.items()}}
-        for own in contacts
-    ]
+    return [{**recording.labels, **_as_texts(labels)} for labels in contacts]
+
+
+def _as_texts(labels: Mapping[str, Any]) -> dict[str, str]:
+    """A contact's labels; those that are whole numbers become text."""
+    texts = {
+        task: str(label) if type(label) is int else label
+        for task, label in labels.items()
+    }
+    if not all(isinstance(name, str) and name for name in chain(*texts.items())):
+        raise InputError("meta.contacts must map task names to labels, both text")
+    return texts
 
 
 def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
@@ -79,9 +89,7 @@ def shared_tasks(
     Raises:
         InputError: there is none.
     """
-    counts = {
-        task: sum(task in labels for labels in trials) for task in set().union(*trials)
-    }
+    counts = Counter(chain(*trials))
     tasks = sorted(
         task
         for task, count in counts.items()

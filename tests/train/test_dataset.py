@@ -213,12 +213,21 @@ def test_of_several_contacts_the_first_is_used_unless_the_labels_say_more(
     assert load_trials([tmp_path]).labels("object").tolist() == ["one", "other"]
 
 
+def test_a_contacts_label_that_is_a_whole_number_becomes_text(two, tmp_path):
+    save(tmp_path / "two.npz", described(two, contacts=[{"object": 7}, {}]))
+    first, second = load_trials([tmp_path]).trials
+    assert first.labels == {**second.labels, "object": "7"}
+
+
 @pytest.mark.parametrize(
     ("contacts", "word"),
     [
         ([{"object": "one"}], "labels 1 contacts, 2 are found"),
         ("both", 'must be "alike" or a list'),
         ([1, 2], 'must be "alike" or a list'),
+        ([{"object": None}, {}], "must map task names to labels, both text"),
+        ([{"object": ""}, {}], "must map task names to labels, both text"),
+        ([{"object": True}, {}], "must map task names to labels, both text"),
     ],
 )
 def test_labels_of_contacts_that_do_not_fit_are_one_sentence(

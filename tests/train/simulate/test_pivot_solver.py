@@ -1,9 +1,8 @@
 """The loads on a pivoting forearm are the one minimum of a convex energy, or are
 refused."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,15 +14,109 @@ from train.simulate.pivot_solver import GUARDED_ROUNDS, Pivots, search
 from train.simulate.scene_model import Value
 
 
+@dataclass
+class Beds:
+    """Forearms of 16 rows and 7 columns against faces.
+
+    gaps and stiffness (7, n) are those of a row's springs; weight, line_gap and lever
+    (16, n) of the rows; free (2, n) and c (3, n) as of `Pivots`.
+    """
+
+    gaps: np.ndarray
+    stiffness: np.ndarray
+    weight: np.ndarray
+    line_gap: np.ndarray
+    lever: np.ndarray
+    free: np.ndarray
+    c: np.ndarray
+
+    @classmethod
+    def drawn(cls, n, seed):
+        """From soft to very stiff."""
+        rng = np.random.default_rng(seed)
+        angles = np.radians(15.0 * np.arange(-3, 4))[:, None]
+        lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
+        c00 = 10.0 ** rng.uniform(-3, 0, n)
+        c11 = 10.0 ** rng.uniform(-2, 0.5, n)
+        stiffness = 10.0 ** rng.uniform(1, 12, n)
+        line_gap = lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n))
+        weight = np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0)
+        free = np.array([rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n)])
+        c01 = rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11)
+        return cls(
+            gaps=np.sort(0.046 * (1.0 - np.cos(angles)), axis=0) + np.zeros(n),
+            stiffness=stiffness + np.zeros((7, 1)),
+            weight=weight,
+            line_gap=line_gap,
+            lever=lever,
+            free=free,
+            c=np.array([c00, c01, c11]),
+        )
+
+    def way(self, loads):
+        """(2, n) how far the arm gives way to a force and a moment (2, n)."""
+        c00, c01, c11 = self.c
+        force, moment = loads
+        return np.array([c00 * force + c01 * moment, c01 * force + c11 * moment])
+
+    def springs(self, y):
+        """Depth and stiffness (16, 7, n) of the springs touched at y (2, n)."""
+        inside = (y[0] + self.lever * y[1] - self.line_gap)[:, None] - self.gaps
+        return inside, (inside > 0.0) * self.stiffness * self.weight[:, None]
+
+    def loads(self, y):
+        """(2, n) force and moment of the beds at a depth and a tilt y (2, n)."""
+        inside, held = self.springs(y)
+        force = (inside * held).sum(axis=1)
+        return np.array([force.sum(axis=0), (force * self.lever).sum(axis=0)])
+
+    def search(self, guarded_rounds=GUARDED_ROUNDS):
+        """The simulator's answers (2, n), searched for from no load, and whether it
+        lost them."""
+        springs = self.gaps[:, None], self.stiffness[:, None]
+        rows = self.weight, self.line_gap, self.lever
+        n = self.free.shape[1]
+        gain = np.ones(n)
+        load = np.zeros((16, n))
+        pivots = Pivots(lambda depth: springs, *rows, gain, load, self.free, self.c)
+        loads, _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
+        return loads, lost
+
+    def error(self, loads):
+        """Distance from the one answer, metres at the skin: the step that exact Newton
+        would take.
+
+        The energy is strictly convex, so a point with no step left is its minimum.
+        """
+        y = self.free - self.way(loads)
+        _, held = self.springs(y)
+        k = held.sum(axis=1)
+        stiffness = k.sum(axis=0)
+        some = np.where(stiffness > 0.0, stiffness, 1.0)
+        mean = (k * self.lever).sum(axis=0) / some
+        spread = (k * (self.lever - mean) ** 2).sum(axis=0)
+        r0, r1 = self.way(self.loads(y) - loads)
+        # (I + C H) p = r, about the mean lever, where H is diagonal.
+        c00, c01, c11 = self.c
+        a01 = c01 + mean * c11
+        a00 = c00 + mean * (c01 + a01)
+        r0 = r0 + mean * r1
+        both = (a00 * c11 - a01 * a01) * stiffness * spread
+        det = 1.0 + a00 * stiffness + c11 * spread + both
+        p0 = ((1.0 + c11 * spread) * r0 - a01 * spread * r1) / det
+        p1 = ((1.0 + a00 * stiffness) * r1 - a01 * stiffness * r0) / det
+        return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)
+
+
 def test_newton_on_the_tilt_needs_its_line_search():
-    beds, free, c = tilt_cases(600, seed=1)
-    answer = tilt_loads(beds, free, c)
-    assert tilt_error(beds, free, c, answer).max() < 1e-9
-    assert not answer.lost.any()
-    loads = tilt_loads(beds, free, c, guarded_rounds=0)
-    wrong = tilt_error(beds, free, c, loads) > 1e-6
+    beds = Beds.drawn(600, seed=1)
+    loads, lost = beds.search()
+    assert beds.error(loads).max() < 1e-9
+    assert not lost.any()
+    loads, lost = beds.search(guarded_rounds=0)
+    wrong = beds.error(loads) > 1e-6
     assert wrong.sum() >= 1
-    assert loads.lost[wrong].all()
+    assert lost[wrong].all()
 
 
 def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
@@ -37,101 +130,29 @@ def test_a_tilt_that_is_not_found_is_refused(monkeypatch):
 def test_an_arm_of_one_joint_turns_by_the_root_of_one_equation():
     # Its push and its tilt go together, as on an arm of 20 cm and more, and C has no
     # inverse.
-    beds, free, (c00, *_) = tilt_cases(600, seed=2)
+    beds = Beds.drawn(600, seed=2)
+    c00 = beds.c[0]
     lean = np.linspace(-5.0, 5.0, 600)
     c01 = lean * c00
-    answer = tilt_loads(beds, free, (c00, c01, lean * c01))
-    assert not answer.lost.any()
-    way = c00 * answer.force + c01 * answer.moment
+    beds = replace(beds, c=np.array([c00, c01, lean * c01]))
+    answer, lost = beds.search()
+    assert not lost.any()
+
+    def loads_after(way):
+        return beds.loads(beds.free - np.array([way, lean * way]))
 
     def missing(way):
-        force, moment = bed_loads(beds, free[0] - way, free[1] - lean * way)
-        return way - (c00 * force + c01 * moment)
+        return way - beds.way(loads_after(way))[0]
 
-    high = np.abs(missing(0.0))
+    high = np.abs(missing(np.zeros(600)))
     low = -high
     for _ in range(200):
         middle = 0.5 * (low + high)
-        low = np.where(missing(middle) < 0.0, middle, low)
-        high = np.where(missing(middle) < 0.0, high, middle)
+        short = missing(middle) < 0.0
+        low = np.where(short, middle, low)
+        high = np.where(short, high, middle)
+    way = beds.way(answer)[0]
     np.testing.assert_allclose(way, 0.5 * (low + high), rtol=0.0, atol=1e-12)
-    want = np.array(bed_loads(beds, free[0] - way, free[1] - lean * way))
     soft = beds.stiffness[0] < 1e6
-    answered = np.array([answer.force, answer.moment])
-    np.testing.assert_allclose(answered[:, soft], want[:, soft], rtol=1e-6, atol=1e-6)
-
-
-def bed_loads(springs, y0, y1):
-    """Force and moment of beds at a depth and a tilt."""
-    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
-    force = (np.maximum(inside, 0.0) * springs.stiffness * springs.weight[:, None]).sum(
-        axis=1
-    )
-    return force.sum(axis=0), (force * springs.lever).sum(axis=0)
-
-
-def tilt_cases(n, seed):
-    """Forearms of 16 rows and 7 columns against faces, from soft to very stiff."""
-    rng = np.random.default_rng(seed)
-    angles = np.radians(15.0 * np.arange(-3, 4))[:, None]
-    lever = (np.arange(16) - 7.5)[:, None] * 0.0108 + rng.uniform(-0.04, 0.04, n)
-    c00 = 10.0 ** rng.uniform(-3, 0, n)
-    c11 = 10.0 ** rng.uniform(-2, 0.5, n)
-    springs = SimpleNamespace(
-        gaps=np.sort(0.046 * (1.0 - np.cos(angles)), axis=0) + np.zeros(n),
-        stiffness=10.0 ** rng.uniform(1, 12, n) + np.zeros((7, 1)),
-        line_gap=lever**2 / (2.0 * 10.0 ** rng.uniform(-1, 6, n)),
-        weight=np.clip(rng.uniform(-0.5, 1.5, (16, n)), 0.0, 1.0),
-        lever=lever,
-    )
-    free = (rng.uniform(-0.01, 0.1, n), rng.uniform(-0.6, 0.6, n))
-    c = (c00, rng.uniform(-0.9, 0.9, n) * np.sqrt(c00 * c11), c11)
-    return springs, free, c
-
-
-def tilt_loads(springs, free, c, guarded_rounds=GUARDED_ROUNDS):
-    """The simulator's answers, searched for from no load."""
-    n = len(free[0])
-    gaps = springs.gaps
-    beds = gaps[:, None], springs.stiffness[:, None]
-    rows = springs.weight, springs.line_gap, springs.lever
-    load = np.zeros((16, n))
-    pivots = Pivots(
-        lambda depth: beds, *rows, np.ones(n), load, np.array(free), np.array(c)
-    )
-    (force, moment), _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
-    return SimpleNamespace(force=force, moment=moment, lost=lost)
-
-
-def tilt_error(springs, free, c, loads):
-    """Distance from the one answer, metres at the skin: the step that exact Newton
-    would take.
-
-    The energy is strictly convex, so a point with no step left is its minimum.
-    """
-    y0 = free[0] - (c[0] * loads.force + c[1] * loads.moment)
-    y1 = free[1] - (c[1] * loads.force + c[2] * loads.moment)
-    inside = (y0 + springs.lever * y1 - springs.line_gap)[:, None] - springs.gaps
-    held = (inside > 0.0) * springs.stiffness * springs.weight[:, None]
-    force = (inside * held).sum(axis=1)
-    k = held.sum(axis=1)
-    stiffness = k.sum(axis=0)
-    mean = (k * springs.lever).sum(axis=0) / np.where(stiffness > 0.0, stiffness, 1.0)
-    spread = (k * (springs.lever - mean) ** 2).sum(axis=0)
-    left = force.sum(axis=0) - loads.force
-    turning = (force * springs.lever).sum(axis=0) - loads.moment
-    r0 = c[0] * left + c[1] * turning
-    r1 = c[1] * left + c[2] * turning
-    # (I + C H) p = r, about the mean lever, where H is diagonal.
-    c01 = c[1] + mean * c[2]
-    c00 = c[0] + mean * (c[1] + c01)
-    r0 = r0 + mean * r1
-    det = (
-        1.0
-        + c00 * stiffness
-        + c[2] * spread
-        + (c00 * c[2] - c01 * c01) * stiffness * spread
-    )
-    p0 = ((1.0 + c[2] * spread) * r0 - c01 * spread * r1) / det
-    p1 = ((1.0 + c00 * stiffness) * r1 - c01 * stiffness * r0) / det
-    return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)
+    want = loads_after(way)[:, soft]
+    np.testing.assert_allclose(answer[:, soft], want, rtol=1e-6, atol=1e-6)
