@@ -115,24 +115,8 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         objects=_objects(top, seed, labels["push_n"], skin, spread),
     )
     top.done()
-    place_m = scene.place_m
-    room_m = min(skin.row0_z_m - place_m, place_m - _last_row_m(skin)) / FARTHEST
-    if spread["place_m"] > room_m + 1e-12:
-        raise InputError(
-            f"{where}: spread.place_m must be at most "
-            f"{math.floor(1e4 * room_m) / 1e4:g}, not "
-            f"{spread['place_m']:g}: some objects would be met beyond the skin's rows, "
-            "as "
-            f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the "
-            "spread away"
-        )
-    for key, needed in schema.SPREAD_OF_MOVABLE.items():
-        if spread[key] > 0.0 and not any(key in item.given for item in scene.objects):
-            raise InputError(
-                f"{where}: spread.{key} has nothing to differ in: give a movable "
-                f"object {needed}, "
-                f"or leave spread.{key} out"
-            )
+    _check_places(scene, where)
+    _check_spread(scene, where)
     if scene.recording_bytes > LARGEST_BYTES:
         raise InputError(
             f"{where}: a recording of {scene.frame_count} frames would hold more than "
@@ -141,6 +125,32 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         )
     check_supported(scene, where)
     return scene
+
+
+def _check_places(scene: Scene, where: str) -> None:
+    """Refuse a spread by which objects would be met beyond the skin's rows."""
+    skin = scene.skin
+    place_m = scene.place_m
+    spread_m = scene.spread["place_m"]
+    room_m = min(skin.row0_z_m - place_m, place_m - _last_row_m(skin)) / FARTHEST
+    if spread_m > room_m + 1e-12:
+        raise InputError(
+            f"{where}: spread.place_m must be at most {math.floor(1e4 * room_m) / 1e4:g}, "
+            f"not {spread_m:g}: some objects would be met beyond the skin's rows, as "
+            f"motion.place_m is {place_m:g} and draws lie up to {FARTHEST:g} times the "
+            "spread away"
+        )
+
+
+def _check_spread(scene: Scene, where: str) -> None:
+    """Refuse a spread around 0 that no object differs by."""
+    for key, needed in schema.SPREAD_OF_MOVABLE.items():
+        differs = any(key in item.given for item in scene.objects)
+        if scene.spread[key] > 0.0 and not differs:
+            raise InputError(
+                f"{where}: spread.{key} has nothing to differ in: give a movable "
+                f"object {needed}, or leave spread.{key} out"
+            )
 
 
 def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
