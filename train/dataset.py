@@ -369,13 +369,11 @@ def load_trials(
     shown = bar(
         work, total=count, desc="following", unit=" trials", disable=not progress
     )
-    touched = collect(posed.recordings, shown, layout)
-    labelled = complete(touched, partial=partial)
-    left_out = {
-        **labelled.lacking,
-        "joint angles": posed.without_joints,
-        "shear": without_shear,
-    }
+    touched = collect(posed.recordings, shown, layout).completed()
+    tasks = shared_tasks(touched.labels, partial=partial)
+    labelled = touched.labelled(tasks, partial=partial)
+    left_out = {f"a label for {task}": touched.without(task) for task in tasks}
+    left_out |= {"joint angles": posed.without_joints, "shear": without_shear}
     return DataSet(
         trials=labelled.trials,
         layout=layout,
@@ -384,7 +382,7 @@ def load_trials(
         digest=recordings.digest,
         names=names,
         joints=posed.joints,
-        tasks=labelled.tasks,
+        tasks=tasks,
         left_out={need: paths for need, paths in left_out.items() if paths},
         unused=touched.unused,
     )
@@ -480,23 +478,49 @@ class Touched:
         unused: files with more contacts than labels.
     """
 
-    trials: list[Trial]
-    untouched: list[LabelledFile]
+    trials: tuple[Trial, ...]
+    untouched: tuple[LabelledFile, ...]
     unused: tuple[Path, ...]
 
     @property
     def files(self) -> list[LabelledFile]:
         """The file and the labels of each trial, and of the untouched."""
-        return [(trial.path, trial.labels) for trial in self.trials] + self.untouched
+        files = [(trial.path, trial.labels) for trial in self.trials]
+        return [*files, *self.untouched]
+
+    @property
+    def labels(self) -> list[dict[str, str]]:
+        """The labels of each trial, and of the untouched."""
+        return [labels for _, labels in self.files]
 
     def completed(self) -> Touched:
         """The same contacts with the labels that follow from their others."""
-        labels = iter(completed([labels for _, labels in self.files]))
-        return replace(
-            self,
-            trials=[replace(trial, labels=next(labels)) for trial in self.trials],
-            untouched=[(path, next(labels)) for path, _ in self.untouched],
-        )
+        labels = iter(completed(self.labels))
+        trials = [replace(trial, labels=next(labels)) for trial in self.trials]
+        untouched = [(path, next(labels)) for path, _ in self.untouched]
+        return Touched(tuple(trials), tuple(untouched), self.unused)
+
+    def without(self, task: str) -> tuple[Path, ...]:
+        """The files that lack a label for a task, each once."""
+        lacking = (path for path, labels in self.files if task not in labels)
+        return tuple(dict.fromkeys(lacking))
+
+    def labelled(self, tasks: Sequence[str], *, partial: bool) -> Touched:
+        """The contacts that have a label for each task; `partial`, for some.
+
+        Raises:
+            InputError: no trial has.
+        """
+        enough = any if partial else all
+
+        def suffices(labels: dict[str, str]) -> bool:
+            return enough(task in labels for task in tasks)
+
+        trials = tuple(trial for trial in self.trials if suffices(trial.labels))
+        if not trials:
+            raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
+        untouched = tuple(file for file in self.untouched if suffices(file[1]))
+        return Touched(trials, untouched, self.unused)
 
 
 def collect(
@@ -522,55 +546,7 @@ def collect(
             f"no contact in any of {len(recordings)} recordings; lower the threshold "
             f"of {layout.threshold_counts} counts"
         )
-    return Touched(trials, untouched, tuple(unused))
-
-
-@dataclass(frozen=True)
-class Labelled:
-    """Trials with all labels that follow from each other.
-
-    Attributes:
-        trials: those with the labels that are needed.
-        untouched: files without a contact, with their labels.
-        tasks: that the trials share.
-        lacking: {"a label for TASK": files that have none}.
-    """
-
-    trials: tuple[Trial, ...]
-    untouched: tuple[LabelledFile, ...]
-    tasks: tuple[str, ...]
-    lacking: dict[str, tuple[Path, ...]]
-
-
-def complete(touched: Touched, *, partial: bool) -> Labelled:
-    """Add the labels that follow from others, and drop what has too few.
-
-    Args:
-        touched: the contacts.
-        partial: keep a trial that has a label for some task, else for each.
-
-    Raises:
-        InputError: no trial has the labels.
-    """
-    touched = touched.completed()
-    files = touched.files
-    tasks = shared_tasks([labels for _, labels in files], partial=partial)
-    lacking = {f"a label for {task}": _files_without(task, files) for task in tasks}
-    enough = any if partial else all
-
-    def suffices(labels: dict[str, str]) -> bool:
-        return enough(task in labels for task in tasks)
-
-    trials = tuple(trial for trial in touched.trials if suffices(trial.labels))
-    if not trials:
-        raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
-    untouched = tuple(file for file in touched.untouched if suffices(file[1]))
-    return Labelled(trials, untouched, tasks, lacking)
-
-
-def _files_without(task: str, files: Iterable[LabelledFile]) -> tuple[Path, ...]:
-    """The files that lack a label for a task, each once."""
-    return tuple(dict.fromkeys(path for path, labels in files if task not in labels))
+    return Touched(tuple(trials), tuple(untouched), tuple(unused))
 
 
 Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
