@@ -109,11 +109,12 @@ def recorded(**effects):
     return recording
 
 
-class TestSensors:
-    @pytest.fixture(scope="class")
-    def plain(self):
-        return recorded()
+@pytest.fixture(scope="module")
+def plain():
+    return recorded()
 
+
+class TestSensors:
     def test_saturation_cuts_the_counts(self):
         assert recorded(saturation={"newton": 0.5}).frames.max() == 500
 

@@ -22,16 +22,18 @@ def scene(*objects, **rest):
     return scenes.scene(objects, **{"trials": trials, **rest})
 
 
+@pytest.fixture(scope="module")
+def boxes():
+    """Boxes, some of which are too heavy to slide."""
+    return scene(BOX, trials={"count": 12, "after_s": 1.4})
+
+
+@pytest.fixture(scope="module")
+def simulations(boxes):
+    return [recording.meta["simulation"] for _, recording in simulate(boxes)]
+
+
 class TestLabels:
-    @pytest.fixture(scope="class")
-    def boxes(self):
-        """Boxes, some of which are too heavy to slide."""
-        return scene(BOX, trials={"count": 12, "after_s": 1.4})
-
-    @pytest.fixture(scope="class")
-    def simulations(self, boxes):
-        return [recording.meta["simulation"] for _, recording in simulate(boxes)]
-
     def test_a_movable_object_slides_within_the_window(
         self, boxes, simulations, tmp_path
     ):
