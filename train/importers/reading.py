@@ -21,7 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.config import shown
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 
 EMPTY = "holds no values; leave it out or save it again"
@@ -156,8 +156,7 @@ class _Header:
 
 def read_text(path: Path) -> Table:
     """The table in a text file."""
-    with parsing(str(path), "a table", "; save it as text"):
-        text = _text(path)
+    with _opened(path) as text:
         form = text.form
         decimal = "."
         if text.mark in ("\t", ";"):
@@ -165,44 +164,52 @@ def read_text(path: Path) -> Table:
                 decimal = ","
                 form.append("decimal commas")
             form.append(f"separated by {MARKS[text.mark]}")
-        header = _header(path, text)
+        header = _header(text)
         data = _parsed(text, header, decimal=decimal)
         return Table(path, data, header.named, form=(*form, *header.form))
 
 
 def read_labels(path: Path) -> pd.DataFrame:
     """The columns of a text file with a header; each cell is text as it stands."""
-    with parsing(str(path), "a table", "; save it as text"):
-        text = _text(path)
-        header = _header(path, text)
+    with _opened(path) as text:
+        header = _header(text)
         return _named(_texts(text, header, range(len(header.names))), header)
 
 
 def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
-    with parsing(str(path), "a table", "; save it as text"):
-        text = _text(path)
-        _check_widths(path, text)
+    with _opened(path) as text:
+        _check_widths(text)
         table = Table(path, _parsed(text, _without_names(text)))
-        return table.numbers(table.names)
+    return table.numbers(table.names)
 
 
-def _text(path: Path) -> _Text:
-    """The text of a file, without what stands before its first row."""
-    data, form = _decoded(_unpacked(path))
-    if "\0" in data:
+@contextmanager
+def _opened(path: Path) -> Iterator[_Text]:
+    """The text of a file, for a block that reads a table in it.
+
+    Raises:
+        InputError: it cannot be read, or the block failed; the sentence names the file.
+    """
+    data = read_bytes(path, LARGEST_BYTES)
+    with parsing(str(path), "a table", "; save it as text"), about(str(path)):
+        yield _text(_unpacked(path.suffix.lower(), data))
+
+
+def _text(data: bytes) -> _Text:
+    """A text, without what stands before its first row."""
+    text, form = _decoded(data)
+    if "\0" in text:
         raise ValueError("it is not text")
-    data = re.sub("\r\n?", "\n", data)
-    _, above, body = re.split(ABOVE, data, maxsplit=1)
+    text = re.sub("\r\n?", "\n", text)
+    _, above, body = re.split(ABOVE, text, maxsplit=1)
     line = body.partition("\n")[0]
     if len(line) > LONGEST_LINE:
-        raise InputError(
-            f"{path}: has a line of {len(line) >> 20} MB, too long for a frame"
-        )
+        raise InputError(f"has a line of {len(line) >> 20} MB, too long for a frame")
     mark = next(filter(line.__contains__, MARKS), "")
     body = re.sub(rf"(?am)^(?:#.*|[^\S\n{mark}]*)(?:\n|\Z)", "", body)
     if not body:
-        raise InputError(f"{path}: {EMPTY}")
+        raise InputError(EMPTY)
     rows = list(islice(_rows(body, mark), 2))
     comments = re.findall("^#.*", above, re.M)
     return _Text(body, mark, rows, "".join(comments[-1:]), form)
@@ -216,16 +223,14 @@ def _rows(text: str, mark: str) -> Iterator[list[str]]:
     return csv.reader(lines, delimiter=mark, skipinitialspace=True)
 
 
-def _check_widths(path: Path, text: _Text) -> None:
+def _check_widths(text: _Text) -> None:
     """Refuse rows of another width than the first, but for a separator at the end."""
     width = len(text.rows[0])
     for number, row in enumerate(_rows(text.body, text.mark), 1):
         ends_in_mark = len(row) == width + 1 and not row[-1].strip()
         if len(row) != width and not ends_in_mark:
             values = f"{len(row)} value{'s' * (len(row) != 1)}"
-            raise InputError(
-                f"{path}: row {number} has {values}, and the first row {width}"
-            )
+            raise InputError(f"row {number} has {values}, and the first row {width}")
 
 
 def _names(cells: list[str]) -> list[str]:
@@ -238,7 +243,7 @@ def _without_names(text: _Text) -> _Header:
     return _Header(numbered("", len(text.rows[0])), False, 0)
 
 
-def _header(path: Path, text: _Text) -> _Header:
+def _header(text: _Text) -> _Header:
     """The names of a text's columns: in its first row, or in the comment above it.
 
     Raises:
@@ -247,14 +252,12 @@ def _header(path: Path, text: _Text) -> _Header:
     header = _stated(text)
     for name, count in Counter(header.names).items():
         if HEX.fullmatch(name):
-            raise InputError(f"{path}: {name} is no decimal number; save it as one")
+            raise InputError(f"{name} is no decimal number; save it as one")
         if name and count > 1:
-            raise InputError(
-                f"{path}: two columns are named {name}; rename one of them"
-            )
-    _check_widths(path, text)
+            raise InputError(f"two columns are named {name}; rename one of them")
+    _check_widths(text)
     if header.rows == len(text.rows):
-        raise InputError(f"{path}: {EMPTY}")
+        raise InputError(EMPTY)
     return header
 
 
@@ -328,26 +331,21 @@ def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     return table[used].set_axis([unique[i] for i in used], axis=1)
 
 
-def _unpacked(path: Path) -> bytes:
-    """The bytes of a file, unpacked where it is packed."""
-    file: Any = io.BytesIO(read_bytes(path, LARGEST_BYTES))
-    suffix = path.suffix.lower()
+def _unpacked(suffix: str, data: bytes) -> bytes:
+    """The bytes of a file, unpacked where its suffix says that it is packed."""
+    file: Any = io.BytesIO(data)
     if suffix == ".zip":
         archive = zipfile.ZipFile(file)
         names = archive.namelist()
         if len(names) != 1:
-            raise InputError(
-                f"{path}: holds {len(names)} files; unpack it into a folder"
-            )
+            raise InputError(f"holds {len(names)} files; unpack it into a folder")
         file = archive.open(names[0])
     elif suffix in UNPACKERS:
         file = UNPACKERS[suffix](file)
     with file:
-        data: bytes = file.read(LARGEST_BYTES + 1)
+        data = file.read(LARGEST_BYTES + 1)
     if len(data) > LARGEST_BYTES:
-        raise InputError(
-            f"{path}: holds more than {LARGEST_BYTES >> 20} MB; save it in parts"
-        )
+        raise InputError(f"holds more than {LARGEST_BYTES >> 20} MB; save it in parts")
     return data
 
 
