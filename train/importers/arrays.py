@@ -17,7 +17,14 @@ from edge.config import shown
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
-from train.importers.reading import EMPTY, LARGEST_BYTES, Table, needs, numbered
+from train.importers.reading import (
+    EMPTY,
+    LARGEST_BYTES,
+    Table,
+    needs,
+    numbered,
+    require_unique,
+)
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = LARGEST_BYTES // 8
@@ -119,6 +126,7 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
         blocks.append(block)
         is_column = name and block.shape[1] == 1
         names += [name] if is_column else numbered(name, block.shape[1])
+    require_unique(names)
     data = pd.DataFrame(np.hstack(blocks), columns=names)
     return Table(path, data, named="" not in numbers, shape=shape, form=tuple(form))
 

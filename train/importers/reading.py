@@ -153,6 +153,14 @@ class _Header:
     rows: int
     form: tuple[str, ...] = ()
 
+    @property
+    def unique(self) -> list[str]:
+        """The names; further columns without one are told apart by their places."""
+        names = [name or f"column {place}" for place, name in enumerate(self.names, 1)]
+        if "" in self.names:
+            names[self.names.index("")] = ""
+        return names
+
 
 def read_text(path: Path) -> Table:
     """The table in a text file."""
@@ -250,11 +258,10 @@ def _header(text: _Text) -> _Header:
         InputError: two columns are named alike, or a name is a damaged number.
     """
     header = _stated(text)
-    for name, count in Counter(header.names).items():
+    for name in header.names:
         if HEX.fullmatch(name):
             raise InputError(f"{name} is no decimal number; save it as one")
-        if name and count > 1:
-            raise InputError(f"two columns are named {name}; rename one of them")
+    require_unique(header.unique)
     _check_widths(text)
     if header.rows == len(text.rows):
         raise InputError(EMPTY)
@@ -322,13 +329,8 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     """The columns by their names, without those that have neither a name nor a
     value."""
-    names = header.names
-    used = [i for i in table if names[i] or table[i].notna().any()]
-    # Further columns without a name are told apart by their places.
-    unique = [name or f"column {place}" for place, name in enumerate(names, 1)]
-    if "" in names:
-        unique[names.index("")] = ""
-    return table[used].set_axis([unique[i] for i in used], axis=1)
+    used = [i for i in table if header.names[i] or table[i].notna().any()]
+    return table[used].set_axis([header.unique[i] for i in used], axis=1)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:
@@ -394,6 +396,17 @@ def numbers_of(table: Table, name: str) -> pd.Series:
         cell = str(column[bad].iloc[0])
         raise InputError(f"{table.path}: {shown(cell)} in column {name} is no number")
     return numbers
+
+
+def require_unique(names: Iterable[str]) -> None:
+    """Refuse a table with two columns of one name.
+
+    Raises:
+        InputError: two are named alike.
+    """
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InputError(f"two columns are named {name}; rename one of them")
 
 
 def require_filled(path: Path, data: pd.DataFrame, name: str) -> None:

@@ -41,6 +41,7 @@ def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
         ({"t": np.ones(7), "a": np.ones((6, 4))}, "no axis of 7 frames"),
         ({"a": np.ones((6, 4, 2, 2))}, "has 4 dimensions"),
         ({"a": np.array(["x"])}, "holds no values"),
+        ({"a": FRAMES, "a.1": FRAMES[:, 0]}, "two columns are named a.1; rename one"),
     ],
 )
 def test_what_would_be_guessed_is_asked(stored, sentence):

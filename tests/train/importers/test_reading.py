@@ -116,6 +116,7 @@ def test_an_empty_cell_is_missing(tmp_path):
         ("", "holds no values"),
         ("t,p1\n", "holds no values"),
         ("p1,p1\n1,2\n", "two columns are named p1"),
+        (",p1,,column 3\n0,1,2,3\n", "two columns are named column 3"),
         ("0x10,2\n1,2\n", "0x10 is no decimal number"),
         ("t,p1\n0,1\n0.01\n", "row 3 has 1 value, and the first row 2"),
         ("# t\n\n1 2\n3\n", "row 2 has 1 value, and the first row 2"),
