@@ -114,7 +114,7 @@ def _term(table: Table, term: str) -> list[str]:
     names = list(table.file_names) or table.names
     if term in names:
         return [term]
-    parts = [name for name in names if name.split(".")[0] == term]
+    parts = [name for name in names if name.startswith(f"{term}.")]
     if parts:
         return parts
     ends = term.split("-")

@@ -127,6 +127,14 @@ def test_arrays_are_read_from_every_format(tmp_path, suffix):
     assert array.tolist() == FRAMES.tolist()
 
 
+def test_an_empty_data_set_of_hdf5_is_left_out(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["hand/skin"] = FRAMES
+        file["note"] = h5py.Empty("f")
+    assert list(read_arrays(tmp_path / "a.h5")) == ["hand.skin"]
+
+
 @pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat"])
 def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypatch):
     path = tmp_path / f"a{suffix}"

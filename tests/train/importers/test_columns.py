@@ -78,10 +78,11 @@ def test_what_would_be_guessed_is_asked(names, sentence):
         ("2-3", ["b", "c"]),
         ("d", ["d"]),
         ("q", ["q.1", "q.2"]),
+        ("hand.skin", ["hand.skin.1", "hand.skin.2"]),
     ],
 )
 def test_columns_are_named_by_names_ranges_and_places(wanted, names):
-    given = table("a", "b", "c", "d", "q.1", "q.2")
+    given = table("a", "b", "c", "d", "q.1", "q.2", "hand.skin.1", "hand.skin.2")
     assert taken(given, taxels=wanted, rate=10).taxels == names
 
 
