@@ -5,6 +5,7 @@ import io
 import os
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -325,51 +326,49 @@ def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, ref
 
 TABLES = int(os.environ.get("TABLES", "60"))
 """Generated tables; TABLES=2000 tries as many."""
+STEP_S = 0.02
+
+
+@st.composite
+def tables(draw):
+    """Values, and a text of them: any order of the columns, separator, unit, sign, and
+    columns that are no taxels."""
+    rows = draw(st.integers(4, 12))
+    taxels = draw(st.integers(1, 12))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    values = rng.integers(0, 1000, (rows, taxels))
+    if draw(st.booleans()):
+        values = values * rng.choice([-0.25, 0.25], values.shape)
+        values[:3] = values[0]
+    table = pd.DataFrame(values, columns=[f"p{i + 1}" for i in range(taxels)])
+    table["t"] = STEP_S * draw(st.sampled_from([1.0, 1e3, 1e6])) * np.arange(rows)
+    for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
+        table[name] = rng.integers(0, 9, rows)
+    return values, draw(st.sampled_from(["", "\n", "# a comment\n"])) + table.to_csv(
+        columns=draw(st.permutations(sorted(table))),
+        sep=draw(st.sampled_from([",", ";", "\t"])),
+        lineterminator=draw(st.sampled_from(["\n", "\r\n"])),
+        index=False,
+    )
 
 
 @settings(max_examples=TABLES, deadline=None)
-@given(data=st.data())
-def test_generated_tables_arrive_as_an_independent_reader_has_them(
-    tmp_path_factory, data
-):
-    """Any order of the columns, separator, unit, sign, and columns that are no taxels."""
-    draw = data.draw
-    taxels = draw(st.integers(1, 12))
-    rows = draw(st.integers(4, 12))
-    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
-    counts = rng.integers(0, 1000, (rows, taxels))
-    signed = draw(st.booleans())
-    values = counts * 0.25 if signed else counts
-    if signed:
-        values = values * rng.choice([-1, 1], values.shape)
-        values[:3] = values[0]
-    factor = draw(st.sampled_from([1.0, 1e3, 1e6]))
-    columns = {"t": [f"{i * 0.02 * factor:.6f}" for i in range(rows)]}
-    for i in range(taxels):
-        columns[f"p{i + 1}"] = [f"{value:g}" for value in values[:, i]]
-    for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
-        columns[name] = [str(int(n)) for n in rng.integers(0, 9, rows)]
-    order = draw(st.permutations(sorted(columns)))
-    sep = draw(st.sampled_from([",", ";", "\t"]))
-    lines = [sep.join(order)]
-    for row in range(rows):
-        lines.append(sep.join(columns[name][row] for name in order))
-    folder = tmp_path_factory.mktemp("table")
-    (folder / "in").mkdir()
-    dirt = draw(st.sampled_from(["", "\n", "# a comment\n"]))
-    ending = draw(st.sampled_from(["\n", "\r\n"]))
-    contents = dirt + "\n".join(lines) + "\n"
-    (folder / "in" / "cup_1.csv").write_text(contents, newline=ending)
-    words = ["--signed"] if signed else []
-    status, recordings = imported(folder / "in", *words)
+@given(table=tables())
+def test_generated_tables_arrive_as_they_were(tmp_path_factory, table):
+    values, contents = table
+    folder = tmp_path_factory.mktemp("table") / "in"
+    put(folder, {"cup.csv": contents})
+    words = []
+    if values.dtype == float:
+        values = np.abs(values - values[0])
+        words = ["--signed"]
+    status, recordings = imported(folder, *words)
     assert status == 0
-    recording = recordings["cup_1"]
-    expected = np.abs(counts if not signed else values - values[0])
-    scale = recording.meta["values"]["counts_per_unit"] if signed else 1
-    assert recording.frames.reshape(rows, -1) == pytest.approx(
-        expected * scale, abs=1e-6
-    )
-    assert recording.t == pytest.approx(0.02 * np.arange(rows))
+    recording = recordings["cup"]
+    scale = recording.meta.get("values", {"counts_per_unit": 1.0})["counts_per_unit"]
+    counts = recording.frames.reshape(values.shape)
+    assert counts == pytest.approx(values * scale, abs=1e-6)
+    assert recording.t == pytest.approx(STEP_S * np.arange(len(values)))
 
 
 TRIAL = "t,p1\n0,1\n0.1,2\n"

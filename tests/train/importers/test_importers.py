@@ -137,26 +137,36 @@ def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, r
     assert file.exists()
 
 
-def test_a_folder_without_grasps_and_an_arm_are_refused(tmp_path):
+def test_a_folder_without_grasps_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"holds no OBJECT/\*.dsa"):
         list(sdh2.trials(tmp_path))
+
+
+def test_an_arm_is_refused(tmp_path):
     with pytest.raises(InputError, match="joints are those of a hand"):
         list(sdh2.trials(tmp_path, Chain.cody()))
 
 
-def test_the_command_writes_a_folder_that_trains_with_the_hands_joints(
-    tmp_path, capsys
-):
+@pytest.fixture
+def three_grasps(tmp_path):
+    """The folder of three imported grasps."""
     for i in range(3):
         written(tmp_path, dsa(), f"cup_{i}.dsa")
     out = tmp_path / "out"
     assert main(["import", "sdh2", str(tmp_path), "--out", str(out)]) == 0
-    assert sorted(p.name for p in out.iterdir()) == [
-        f"000{i}_cup.npz" for i in range(3)
-    ]
-    assert f"recordings written to {out}: 3" in capsys.readouterr().out
-    assert load(out / "0000_cup.npz").joints.shape == (3, 7)
-    data = load_trials([out], Measurement(["contact_motion", "joint_change@2"]))
+    return out
+
+
+def test_the_command_writes_a_recording_for_each_grasp(capsys, three_grasps):
+    names = sorted(path.name for path in three_grasps.iterdir())
+    assert names == ["0000_cup.npz", "0001_cup.npz", "0002_cup.npz"]
+    assert load(three_grasps / names[0]).joints.shape == (3, 7)
+    assert f"recordings written to {three_grasps}: 3" in capsys.readouterr().out
+
+
+def test_imported_grasps_train_with_the_hands_joints(three_grasps):
+    features = Measurement(["contact_motion", "joint_change@2"])
+    data = load_trials([three_grasps], features)
     assert data.chain is None
     assert data.joints == 7
     assert data.features(samples=3).shape == (3, 3 + 14)
