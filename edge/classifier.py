@@ -12,8 +12,8 @@ import numpy as np
 
 from edge.errors import OutOfRange
 from edge.events import Aside, Decided, Event, Onset, Release
+from edge.model.calibration import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.model.model import Decision, Model
-from edge.model.novelty import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import flags_of, frame_doubts
 from edge.touch.frame import Frame
@@ -85,7 +85,7 @@ class Classifier:
 
     With an error rate, each task follows the fastest stopping rule that the model holds
     certified for that rate: it is decided at the first decision point that is sure
-    enough, and at the rule's last in any case (see `edge.model.stopping`). A task for
+    enough, and at the rule's last in any case (see `edge.model.calibration`). A task for
     which no rule is certified is decided at the full window, flagged `uncertified`. A
     task that is the product of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they

@@ -10,11 +10,10 @@ from typing import Protocol
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
+from edge.model.calibration import UNKNOWN, StoppingRule, check_rate
 from edge.model.info import ModelInfo
 from edge.model.model import Decision, Model
-from edge.model.novelty import UNKNOWN, check_rate
 from edge.model.refusal import refusal
-from edge.model.stopping import StoppingRule
 
 LOG = logging.getLogger(__name__)
 

@@ -5,6 +5,7 @@ import math
 import random
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 from edge.bus.protocol import Transfer, bus_error, write
@@ -71,12 +72,16 @@ class Fault:
 
 
 class FaultyBus(FakeBus):
-    """A fake bus with a script of faults; `inject` starts one."""
+    """A fake bus with a script of faults; `inject` starts one.
 
-    def __init__(self, *arguments, faults=(), seed=0, **options):
+    Where it is timed, each transaction takes the software `overhead_s`.
+    """
+
+    def __init__(self, *arguments, faults=(), overhead_s=0.0, **options):
         super().__init__(*arguments, **options)
+        self._overhead_s = overhead_s
         self._held = {}
-        self.inject(faults, seed)
+        self.inject(faults)
 
     def inject(self, faults, seed=0):
         """Start another script, which counts transactions from 0."""
@@ -92,6 +97,12 @@ class FaultyBus(FakeBus):
     def carried(self):
         """Number of transactions since the script started."""
         return self.transactions - self._first
+
+    def spend(self, bits):
+        """Count bits, and let their time and the software's pass where timed."""
+        self.bits += bits
+        if self.timed:
+            self.hand.advance(bits / self.clock_hz + self._overhead_s)
 
     def reopen(self):
         """Open it, unless a fault keeps the adapter away."""
@@ -183,9 +194,10 @@ def _another(control):
     return bytes([control[0] << 1 & 0xFF or 1])
 
 
-def faulty_buses(file, scene, clock, *, faults=(), seed=0, **options):
+def faulty_buses(file, scene, clock, *, faults=(), seed=0, overhead_s=0.0, **options):
     """`fake_buses` that meet faults from the start."""
-    buses = fake_buses(file, scene, clock, make=FaultyBus, seed=seed, **options)
+    make = partial(FaultyBus, overhead_s=overhead_s)
+    buses = fake_buses(file, scene, clock, make=make, seed=seed, **options)
     for bus in buses:
         bus.inject(faults, seed)
     return buses

@@ -36,7 +36,7 @@ def test_a_frame_passes_the_rooms_in_one_direction(ways):
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize(("frame", "most"), [("decision", 22), ("contact", 13)])
+@pytest.mark.parametrize(("frame", "most"), [("decision", 19), ("contact", 12)])
 def test_a_frame_visits_few_files(ways, frame, most):
     assert 0 < len(one_frame.files(ways[frame])) <= most
 

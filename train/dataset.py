@@ -22,15 +22,13 @@ from edge.recording import LARGEST_BYTES, Recording, load
 from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.contact import Contact, FeatureSeries
+from edge.touch.contact import Contact, FeatureSeries, feature_types
 from edge.touch.feature import KERNELS, Feature
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.measurer import features as features_of
-from edge.touch.still import WatchfulTracker
-from edge.touch.track import ContactTracker
+from edge.touch.track import ContactTracker, WatchfulTracker
 from train.arms import arm_of, joint_angles
 from train.feature_sets import axes, moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
@@ -224,7 +222,7 @@ class DataSet:
         """The same trials with some of the features measured, in the order of
         `self.names`."""
         measured_names = tuple(name for name in self.names if name in names)
-        types = features_of(measured_names)
+        types = feature_types(measured_names)
         return replace(
             self,
             names=measured_names,
@@ -297,7 +295,7 @@ class Measurement:
     @cached_property
     def types(self) -> tuple[Feature, ...]:
         """The features."""
-        return features_of(tuple(self.features))
+        return feature_types(tuple(self.features))
 
     @property
     def moves(self) -> bool:

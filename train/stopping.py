@@ -8,7 +8,7 @@ into folds, and each fold is decided by a model that was fitted, and whose setti
 chosen, without it.
 
 **Confidence.** The margin says how much nearer the training trials of the named label
-lie than those of any other (`edge.model.stopping.margin`). Logistic regression at each
+lie than those of any other (`edge.model.calibration.margin`). Logistic regression at each
 decision point turns it into the probability that the label is right (Platt,
 Probabilistic outputs for support vector machines, 1999). A label's distance is that of
 its nearest twentieth (`train.pipeline.label_distances`). So it is the same for the
@@ -37,8 +37,13 @@ from scipy.optimize import brentq
 from scipy.special import expit
 
 from edge.errors import InputError
-from edge.model.novelty import NOVELTY_RATE, Novelty
-from edge.model.stopping import Stopping, StoppingRule, margin
+from edge.model.calibration import (
+    NOVELTY_RATE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    margin,
+)
 from edge.touch.features import FEATURES
 from train.evaluate import finest, stratified_folds
 from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of

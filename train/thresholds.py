@@ -9,9 +9,8 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
-from edge.touch.still import WatchfulTracker
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
-from edge.touch.track import DEBOUNCE
+from edge.touch.track import DEBOUNCE, WatchfulTracker
 from train.dataset import DataSet, contacts, with_thresholds
 from train.labels import NO_CONTACT
 

@@ -24,8 +24,8 @@ from edge.commands.options import (
 from edge.commands.output import LOG, counted
 from edge.commands.source import Opened, reading
 from edge.events import MOST_PLACES, Aside, Decided, Event
+from edge.model.calibration import UNKNOWN
 from edge.model.model import Model
-from edge.model.novelty import UNKNOWN
 from edge.output.event_writer import LineWriter
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
@@ -158,7 +158,6 @@ def run(arguments: argparse.Namespace) -> int:
         decides=True,
         folder=arguments.keep,
         choices={name: task.labels for name, task in model.info.tasks.items()},
-        records=False,
         # Angles that another program writes go by the real clock.
         real_time=arguments.joints is not None,
     ) as live:

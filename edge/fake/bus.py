@@ -38,7 +38,7 @@ class FakeBus:
     b'\\x04'
     """
 
-    def __init__(  # noqa: PLR0913 - independent properties of a wire
+    def __init__(
         self,
         name: str = "fake",
         chips: Mapping[int, FakeChip] | None = None,
@@ -47,7 +47,6 @@ class FakeBus:
         clock_hz: int = 400_000,
         timed: bool = False,
         timeout_s: float = 0.02,
-        overhead_s: float = 0.0,
         count: Callable[[Sequence[Message]], int] = wire_bits,
     ) -> None:
         """Connect chips to a bus.
@@ -59,7 +58,6 @@ class FakeBus:
             clock_hz: of the wire.
             timed: the virtual clock advances with the bits on the wire.
             timeout_s: time of a hung transfer, where timed.
-            overhead_s: time of the software for each transaction, where timed.
             count: gives the bits on the wire of a call's messages.
         """
         self.name = name
@@ -67,7 +65,6 @@ class FakeBus:
         self.clock_hz = clock_hz
         self.timed = timed
         self.timeout_s = timeout_s
-        self.overhead_s = overhead_s
         self.hand = Hand(clock or VirtualClock())
         self.now = self.hand.now
         self.sleep = self.hand.advance
@@ -144,4 +141,4 @@ class FakeBus:
         """Count bits on the wire, and let their time pass where timed."""
         self.bits += bits
         if self.timed:
-            self.hand.advance(bits / self.clock_hz + self.overhead_s)
+            self.hand.advance(bits / self.clock_hz)

@@ -117,16 +117,15 @@ def calibrated(file: SkinFile, noise_counts: float = 0.0) -> SkinFile:
     return replace(file, calibration=calibration)
 
 
-def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
+def fake_buses(
     file: SkinFile,
     scene: Scene,
     clock: VirtualClock,
     *,
     timed: bool = False,
-    overhead_s: float = 0.0,
     noise_counts: float = 0.0,
     seed: int = 0,
-    make: type[FakeBus] = FakeBus,
+    make: Callable[..., FakeBus] = FakeBus,
 ) -> list[FakeBus]:
     """Fake chips on fake buses, as the skin's file lays them out.
 
@@ -136,7 +135,6 @@ def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
         clock: shared by the buses.
         timed: the clock advances with the bits on the wire, and conversions take their
             time.
-        overhead_s: time of the software for each transaction, where timed.
         noise_counts: standard deviation of the noise on raw values.
         seed: of the noise, and of the registers that power-up leaves undefined.
         make: makes a bus.
@@ -151,7 +149,6 @@ def fake_buses(  # noqa: PLR0913 - those of the buses, and the skin
             clock_hz=spec.clock_hz,
             timed=timed,
             timeout_s=file.reading.timeout_s,
-            overhead_s=overhead_s,
             count=_bits_counter(spec),
         )
         shape = NOISE_FRAMES if noise_counts else 1, calibration.baseline.size

@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 
 from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
-from edge.model.novelty import Novelty
-from edge.touch import measurer
-from edge.touch.contact import FeatureSeries
+from edge.model.calibration import Novelty, Stopping
+from edge.touch.contact import FeatureSeries, feature_types
 from edge.touch.feature import KERNELS
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.still import WatchfulTracker
+from edge.touch.track import WatchfulTracker
 
 if TYPE_CHECKING:
-    from edge.model.stopping import Stopping
     from edge.touch.arm import Chain
     from edge.touch.kernels import KernelTable
 
@@ -254,8 +252,6 @@ def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
     """The stopping rules of each task, where the model has decision points."""
     if not points:
         return {}
-    from edge.model.stopping import Stopping
-
     rules = meta.table("stopping")
     return {task: Stopping.from_table(rules.table(task), points) for task in rules.raw}
 
@@ -290,7 +286,7 @@ def _kernels(
 def _check_features(info: ModelInfo, name: str) -> None:
     """Refuse features that do not exist, or contradict the joints."""
     try:
-        types = measurer.features(info.features)
+        types = feature_types(info.features)
     except InputError as error:
         raise InputError(
             f"{name}: was made for the features {', '.join(info.features)}; {error}; "

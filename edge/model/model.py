@@ -46,7 +46,7 @@ class Decision(NamedTuple):
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.projection.Grid`.
         novelty: how unlike all training trials the features are (see
-            `edge.model.novelty`), of a model with decision points.
+            `edge.model.calibration`), of a model with decision points.
     """
 
     label: str

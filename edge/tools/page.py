@@ -46,7 +46,7 @@ class Page:
         recording: whether contacts are to be saved.
     """
 
-    def __init__(  # noqa: PLR0913 - independent parts of the page
+    def __init__(
         self,
         address: str,
         layout: SkinLayout,
@@ -55,7 +55,6 @@ class Page:
         folder: Path | None = None,
         labels: dict[str, str] | None = None,
         choices: Mapping[str, Sequence[str]] | None = None,
-        records: bool = True,
         decides: bool = False,
     ) -> None:
         """Serve a page.
@@ -69,8 +68,7 @@ class Page:
                 give some.
             choices: {task: the labels that it can have}, which the page offers as
                 buttons.
-            records: whether touches can be recorded there.
-            decides: a model decides on the contacts.
+            decides: a model decides on the contacts, so that none are recorded.
 
         Raises:
             InputError: the address cannot be used, or a trial in the folder cannot be
@@ -99,7 +97,6 @@ class Page:
             "units": {"force": layout.force_unit, "motion": layout.length_unit},
             "folder": None if folder is None else str(folder),
             "choices": {task: list(names) for task, names in (choices or {}).items()},
-            "records": records,
             "decides": decides,
         }
         self.server = WebServer(address, self._act)
@@ -210,7 +207,7 @@ class Page:
         if self._folder is None:
             raise InputError("this page records nothing; start it with `record --web`")
         if kind == "trials":
-            if not self._fixed["records"]:
+            if self._fixed["decides"]:
                 self.look()
             trials = list(self._trials.items())
             return [{"file": name, **trial} for name, trial in trials]

@@ -39,8 +39,7 @@ from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.still import WatchfulTracker
-from edge.touch.track import DEBOUNCE
+from edge.touch.track import DEBOUNCE, WatchfulTracker
 from edge.writing import NameTaken, check_writable
 
 if TYPE_CHECKING:

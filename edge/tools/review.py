@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.model.novelty import UNKNOWN
+from edge.model.calibration import UNKNOWN
 from edge.recording import Recording
 
 UNSURE = 0.8

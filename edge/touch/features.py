@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.errors import InputError, OutOfRange
-from edge.touch import measurer
-from edge.touch.contact import FeatureSeries
+from edge.touch.contact import FeatureSeries, feature_types
 from edge.touch.feature import PAPER, Feature, not_measured
 from edge.touch.layout import SkinLayout
 
@@ -43,7 +42,7 @@ def widths(
         InputError: a feature does not exist.
     """
     lengths = []
-    for feature in measurer.features(names):
+    for feature in feature_types(names):
         length = feature.kernels or 1
         if feature.of_joints:
             length = joints
@@ -111,7 +110,7 @@ def feature_vector(
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
     if samples < 2:
         raise InputError(f"a feature needs at least 2 samples, not {samples!r}")
-    types = measurer.features(features)
+    types = feature_types(features)
     series = series.felt(window_s)
     if series.t.size == 0:
         raise InputError("the contact has no frame")

@@ -26,8 +26,8 @@ import pandas as pd
 
 from edge.classifier import Classifier
 from edge.events import Decided
+from edge.model.calibration import UNKNOWN
 from edge.model.model import Model
-from edge.model.novelty import UNKNOWN
 from export.__main__ import main
 from tests.bench import tables
 from tests.bench.program import start

@@ -41,7 +41,7 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from edge.model.stopping import StoppingRule
+from edge.model.calibration import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
 from tests.bench import tables
 from tests.bench.program import start

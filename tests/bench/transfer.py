@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
+from edge.model.calibration import UNKNOWN
 from edge.model.model import Model
-from edge.model.novelty import UNKNOWN
 from edge.saving import save
 from edge.tools.replay import Summary, decide
 from tests.bench import tables

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.model.stopping import Stopping, StoppingRule
+from edge.model.calibration import Stopping, StoppingRule
 from train.dataset import DataSet
 from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
 from train.fitting import fit

@@ -277,7 +277,7 @@ function drawChoices(picture) {
 function drawRecord(picture) {
   $("record-part").hidden = picture.folder === null;
   if (picture.folder === null) return;
-  $("record").hidden = !picture.records;
+  $("record").hidden = picture.decides;
   drawChoices(picture);
   if (!$("label-rows").children.length && !Object.keys(picture.choices).length) {
     const labels = Object.entries(picture.labels);
@@ -289,8 +289,8 @@ function drawRecord(picture) {
   const count = trials.length;
   const number = `${count} ${count === 1 ? "touch" : "touches"} in ${picture.folder}.`;
   const saved = picture.recording ? `Each contact is saved with ${what}; ` : `Contacts are not saved (${what}); `;
-  $("recording").textContent = picture.records ? saved + number : number;
-  const late = !picture.records && performance.now() - askedAt > 2000;
+  $("recording").textContent = picture.decides ? number : saved + number;
+  const late = picture.decides && performance.now() - askedAt > 2000;
   if (picture.trials !== version || late) fetchTrials(picture.trials);
 }
 

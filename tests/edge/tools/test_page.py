@@ -233,7 +233,7 @@ def kept(tmp_path):
 
 @pytest.fixture
 def kept_page(kept, serve):
-    return serve(choices={"softness": ["soft", "hard"]}, records=False)
+    return serve(choices={"softness": ["soft", "hard"]}, decides=True)
 
 
 def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_page):

@@ -14,11 +14,11 @@ from edge.errors import InputError
 from edge.model.verify import integers_of
 from edge.touch.active import ActiveTaxels
 from edge.touch.cells import MOST_CELLS, Cells
+from edge.touch.contact import feature_types
 from edge.touch.feature import PAPER
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measurer import features
 from edge.touch.measures import QUANTITIES, ZONES, feature, names
 from edge.touch.region import largest_region
 from edge.touch.zones import Zones
@@ -96,7 +96,7 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(
     frame = frame_of(seed, shape, density, high)
     active = ActiveTaxels(frame.counts, 10, valid=frame.valid, wraps=wraps)
     contact = active.largest()
-    zones = Zones(layout, features(ALL))
+    zones = Zones(layout, feature_types(ALL))
     assert zones.names == ZONES
     row = zones.measure(active, contact, None)
     if contact is None:
@@ -113,7 +113,7 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     layout = SkinLayout(rows, cols, wraps=wraps)
     frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
     active = ActiveTaxels(frame.counts, 0)
-    zones = Zones(layout, features(["skin_length"]))
+    zones = Zones(layout, feature_types(["skin_length"]))
     row = zones.measure(active, active.largest(), None)
     line = sum(range(cols))
     squares = sum(c * c for c in range(cols))
@@ -291,7 +291,7 @@ def test_the_papers_three_are_the_default_and_come_first():
 )
 def test_a_wrong_name_is_one_sentence(wanted, sentence):
     with pytest.raises(InputError, match=sentence) as caught:
-        features(tuple(wanted))
+        feature_types(tuple(wanted))
     assert "\n" not in str(caught.value)
 
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from edge.errors import InputError
 from edge.touch import shear
 from edge.touch.active import ActiveTaxels, best_cut
+from edge.touch.contact import feature_types
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measurer import features
 from edge.touch.measures import SHEAR, ZONES, feature
 from edge.touch.zones import ZONE_WIDTH, Zones
 from tests.edge.touch.pressed import followed
@@ -46,7 +46,7 @@ def measured(layout, frame) -> tuple[dict[str, list[int]], ActiveTaxels]:
     active = ActiveTaxels(
         frame.counts, THRESHOLD, valid=frame.valid, wraps=layout.wraps
     )
-    zones = Zones(layout, features(ALL))
+    zones = Zones(layout, feature_types(ALL))
     row = zones.measure(active, active.largest(), frame.shear)
     return {
         zone: row[WIDTH * i : WIDTH * (i + 1)] for i, zone in enumerate(ZONES)
@@ -92,7 +92,7 @@ def test_sums_are_those_of_plain_loops(seed, wraps, shape):
 def test_the_normal_numbers_are_the_same_with_and_without_shear():
     frame = sheared_frame(3, LAYOUT.shape)
     active = ActiveTaxels(frame.counts, THRESHOLD, valid=frame.valid, wraps=False)
-    normal = Zones(LAYOUT, features(["contact_force"]))
+    normal = Zones(LAYOUT, feature_types(["contact_force"]))
     plain = normal.measure(active, active.largest(), None)
     zones, _ = measured(LAYOUT, frame)
     assert zones["contact"][:ZONE_WIDTH] == plain
@@ -183,7 +183,7 @@ def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
     tangential = np.full((side, side, 2), -32768, dtype=np.int16)
     frame = Frame(0.0, np.full((side, side), 65535, np.uint16), shear=tangential)
     active = ActiveTaxels(frame.counts, 0)
-    skin = Zones(layout, features(["skin_twist"]))
+    skin = Zones(layout, feature_types(["skin_twist"]))
     row = skin.measure(active, active.largest(), frame.shear)
     line = side * sum(range(side))
     assert row[ZONE_WIDTH:] == [
@@ -214,7 +214,7 @@ def test_a_frame_without_shear_is_named():
     frame = replace(sheared_frame(1, LAYOUT.shape), shear=None)
     active = ActiveTaxels(frame.counts, THRESHOLD, wraps=False)
     with pytest.raises(InputError, match="need shear, which a frame lacks"):
-        Zones(LAYOUT, features(ALL)).measure(active, active.largest(), None)
+        Zones(LAYOUT, feature_types(ALL)).measure(active, active.largest(), None)
 
 
 def test_components_have_no_logarithm_and_the_size_has():

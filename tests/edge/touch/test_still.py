@@ -6,7 +6,7 @@ import pytest
 
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.still import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
+from edge.touch.track import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
 
 LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
 PERIOD_S = 0.01

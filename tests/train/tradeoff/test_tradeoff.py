@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
+from edge.model.calibration import StoppingRule
 from edge.model.model import Model
-from edge.model.stopping import StoppingRule
 from edge.saving import save
 from edge.skin import file as skinfile
 from edge.statistics import wilson

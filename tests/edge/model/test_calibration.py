@@ -8,9 +8,15 @@ import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.novelty import Novelty, check_rate
+from edge.model.calibration import (
+    TEST_SHARE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    check_rate,
+    margin,
+)
 from edge.model.refusal import refusal
-from edge.model.stopping import TEST_SHARE, Stopping, StoppingRule, margin
 from edge.model.unusual import unusual
 
 
