@@ -14,6 +14,7 @@ def parse_address(
     """
     host_text, _, port = text.rpartition(":")
     host = host_text.strip("[]") or host
-    if not (host and port.isascii() and port.isdecimal() and int(port[:6]) in ports):
+    is_port = port.isascii() and port.isdecimal() and len(port) <= 5
+    if not (host and is_port and int(port) in ports):
         raise InputError(f"{option}{text}: give HOST:PORT, for example {example}")
     return host, int(port)
