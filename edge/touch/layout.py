@@ -226,8 +226,10 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
             "the model needs shear, which this skin does not give; export a model "
             "without it"
         )
-    # Both scales are known or neither is, as the units are equal.
+    # Both scales are known or neither is, as the units are equal. A larger ratio would
+    # take every count beyond the largest, and perhaps beyond the floats.
     ratio = (device.counts_per_newton or 1.0) / (model.counts_per_newton or 1.0)
+    ratio = min(ratio, 65535.0)
     return replace(
         device,
         release_s=model.release_s,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.layout import SkinLayout, differences
+from edge.touch.layout import SkinLayout, differences, for_device
 from tests.conftest import FOREARM
 
 ANGLES = [
@@ -127,3 +127,10 @@ def test_what_differs_from_the_models_skin_is_said(changes, sentence):
     (said, *_) = differences(model, replace(model, **changes))
     assert sentence in said
     assert differences(model, model) == []
+
+
+def test_thresholds_stay_counts_however_far_the_scales_differ():
+    device = replace(FOREARM, counts_per_newton=1e308)
+    matched = for_device(replace(FOREARM, counts_per_newton=1e-5), device)
+    assert matched.threshold_counts == 65535
+    assert matched.onset == 65535
