@@ -4,6 +4,7 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -137,15 +138,19 @@ class Keeper:
         self._make_room()
 
     def _make_room(self) -> None:
-        """Remove the oldest kept files until the rest fits."""
-        files = sorted(self._folder.glob(f"{STEM}-*.npz"))
-        sizes = [file.stat().st_size for file in files]
-        total = sum(sizes)
-        for file, size in zip(files[:-1], sizes, strict=False):
+        """Remove the oldest kept files until the rest fits, but for those that cannot
+        be removed."""
+        sizes = {}
+        for file in sorted(self._folder.glob(f"{STEM}-*.npz")):
+            with suppress(OSError):  # another program may be quicker
+                sizes[file] = file.stat().st_size
+        total = sum(sizes.values())
+        for file in list(sizes)[:-1]:
             if total <= self._most_bytes:
                 return
-            file.unlink(missing_ok=True)
-            total -= size
+            with suppress(OSError):
+                file.unlink(missing_ok=True)
+                total -= sizes[file]
 
 
 def reasons_of(decided: Sequence[Decided]) -> set[str]:

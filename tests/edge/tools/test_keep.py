@@ -82,3 +82,12 @@ def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):
     for _ in range(2):
         assert run(edge, tmp_path, "--keep-if", "all")[0] == 0
     assert len(list(tmp_path.glob("kept-*.npz"))) == 2
+
+
+def test_what_cannot_be_removed_ends_neither_the_run_nor_the_keeping(edge, tmp_path):
+    (tmp_path / "kept-20200101T000000-00000.npz").mkdir()
+    (tmp_path / "kept-20200101T000001-00000.npz").write_bytes(bytes(2_000_000))
+    status, _, err = run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)
+    assert status == 0
+    assert "Traceback" not in err
+    assert not (tmp_path / "kept-20200101T000001-00000.npz").exists()
