@@ -265,13 +265,14 @@ class Classifier:
         """
         began = time.perf_counter()
         events: list[Event] = []
-        if self._begun == 0 and self._end_s is not None:
+        if self._end_s is None:
+            return events
+        if self._begun == 0:
             contacts = self.tracker.finish()
             if self._untouched is not None and not contacts:
                 events += self._untouched.decisions(self._end_s, began)
             events += self._follow(contacts, self._end_s)
-        if self._end_s is not None:
-            events += self._decide_due(self._end_s, began, math.inf)
+        events += self._decide_due(self._end_s, began, math.inf)
         for pending in self._pending:
             pending.decision_point = self._last
             events += self._decide(pending, began, short=True)
@@ -353,12 +354,10 @@ class Classifier:
             blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
             answers = [replace(blank, task=task) for task in pending.tasks]
         else:
-            answers = self._answers(pending, blank, decisions)
-            if point == self._last and any(
-                UNKNOWN in answer.flags for answer in answers
-            ):
-                phrase = self.model.info.unusual(vector)
-                answers = [replace(answer, unusual=phrase) for answer in answers]
+            unknown = self._is_unknown(point, decisions)
+            if unknown and point == self._last:
+                blank = replace(blank, unusual=self.model.info.unusual(vector))
+            answers = self._answers(pending, blank, decisions, unknown)
         pending.decision_point += 1
         for answer in answers:
             pending.tasks.remove(answer.task)
@@ -405,17 +404,21 @@ class Classifier:
         return x, y, z
 
     def _answers(
-        self, pending: Pending, blank: Decided, decisions: Mapping[str, Decision]
+        self,
+        pending: Pending,
+        blank: Decided,
+        decisions: Mapping[str, Decision],
+        unknown: bool,
     ) -> list[Decided]:
         """The answers of the tasks that need not wait any longer."""
-        point = pending.decision_point
-        unknown = self._is_unknown(point, decisions)
         answers = []
         for task in pending.tasks:
             asked = replace(blank, task=task)
             answer: Decided | None = self._answer(asked, decisions[task], unknown)
             if answer is not None and self._policies:
-                answer = self._policies[task].answer(answer, point, pending.decided)
+                answer = self._policies[task].answer(
+                    answer, pending.decision_point, pending.decided
+                )
             if answer is not None:
                 pending.decided[task] = answer
                 answers.append(answer)

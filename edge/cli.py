@@ -109,7 +109,7 @@ def _messages(program: str, quiet: bool) -> Iterator[None]:
     handler = logging.StreamHandler()
     handler.setLevel(logging.ERROR if quiet else logging.INFO)
     handler.setFormatter(logging.Formatter(f"{program}: %(message)s"))
-    loggers = [logging.getLogger(name) for name in ("edge", "train", "export")]
+    loggers = list(map(logging.getLogger, ("edge", "train", "export")))
     for logger in loggers:
         logger.addHandler(handler)
         logger.setLevel(logging.INFO)

@@ -191,17 +191,16 @@ class ConfigTable:
         key: str,
         count: int | None = None,
         default: Any = REQUIRED,
-        low: float = -math.inf,
-        high: float = math.inf,
-        *,
-        open_low: bool = False,
+        **limits: Any,
     ) -> tuple[float, ...]:
-        """A list of numbers; with a count, of exactly that many."""
+        """A list of numbers; with a count, of exactly that many.
+
+        The limits are those of `number`.
+        """
         value = self.get(key, default)
         if not isinstance(value, list | tuple) or count not in (None, len(value)):
             numbers = "numbers" if count is None else f"{count} numbers"
             raise self.fail(key, f"a list of {numbers}")
-        limits: dict[str, Any] = {"low": low, "high": high, "open_low": open_low}
         return tuple(self.number(key, value=entry, **limits) for entry in value)
 
     def flag(self, key: str, default: Any = REQUIRED) -> bool:

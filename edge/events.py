@@ -140,7 +140,7 @@ class Aside:
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""
-        taxels = [list(place) for place in self.taxels]
+        taxels = list(map(list, self.taxels))
         return {"event": "aside", "t": round(self.t, 6), "taxels": taxels}
 
 

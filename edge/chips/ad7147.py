@@ -47,7 +47,7 @@ def stage_bank(stage: int) -> tuple[int, ...]:
     return (*connection, 0, *DETECTION)
 
 
-BANKS = sum((stage_bank(stage) for stage in range(STAGES)), ())
+BANKS = sum(map(stage_bank, range(STAGES)), ())
 """The registers of all stages, from `STAGE_BANK` on."""
 CONNECTIONS = np.array(BANKS).reshape(STAGES, STAGE_REGISTERS)[:, :3]
 """(12, 3) registers that connect inputs to each stage."""
@@ -73,7 +73,7 @@ settings."""
 
 def words(values: tuple[int, ...]) -> bytes:
     """Registers as bytes on the wire."""
-    return b"".join(v.to_bytes(2, "big") for v in values)
+    return np.array(values, ">u2").tobytes()
 
 
 class AD7147(Chip):

@@ -49,7 +49,7 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
         except PackageNotFoundError:
             yield _missing(package)
     yield from _devices(root)
-    groups = sorted(_group(number) for number in {os.getegid(), *os.getgroups()})
+    groups = sorted(map(_group, {os.getegid(), *os.getgroups()}))
     user = pwd.getpwuid(os.geteuid()).pw_name
     yield Row("user", f"{user}; groups {', '.join(groups)}")
     yield from _state()

@@ -117,7 +117,7 @@ def check_board(output: Output) -> int:
         lines.append(f"{mark} {row.name:<{width}}  {row.value}")
         if row.remedy:
             remedies.append(f"! {row.name}: {row.remedy}")
-    event = {"event": "board", "rows": [asdict(row) for row in rows]}
+    event = {"event": "board", "rows": list(map(asdict, rows))}
     output.event(event, "\n".join([*lines, *remedies]))
     return 1 if remedies else 0
 
@@ -199,7 +199,6 @@ class Wires:
             frame_rate,
         )
 
-        bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
         spent = frame_bits(file, FRAMES, overhead_us * 1e-6)
         clocks = [bus.clock_hz for bus in file.buses]
-        return cls(bits, frame_rate([total / FRAMES for total in spent], clocks))
+        return cls(frame_bits(file, FRAMES), frame_rate(spent, clocks))

@@ -27,10 +27,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_skin(parser)
 
 
-def skin_map(statuses: list[ChipStatus], invalid: NDArray[np.bool_]) -> str:
+def skin_map(served: list[int], invalid: NDArray[np.bool_]) -> str:
     """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
     marks = np.full(invalid.shape, " ")
-    served = [taxel for status in statuses for taxel in status.spec.served]
     marks.flat[served] = np.where(invalid.flat[served], ".", "#")
     return "\n".join(f"{i:3} |{''.join(row)}|" for i, row in enumerate(marks.tolist()))
 
@@ -50,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         if status.state != "running" or bad == len(status.spec.served):
             silent += 1
         _say(output, status, bad)
-    output.text(skin_map(statuses, invalid))
+    output.text(skin_map(skin.file.served, invalid))
     answer = f"{len(statuses) - silent} of {len(statuses)} chips answer"
     if invalid.any():
         answer += f"; {SILENT}: {invalid.sum()}"

@@ -303,8 +303,8 @@ def play_file(
 
 
 def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list[float]:
-    """Bits on the wire of each bus for some frames, counted while the drivers send
-    them.
+    """Bits on the wire of each bus for a frame, as a mean over some, counted while the
+    drivers send them.
 
     The software's time of each transaction counts as the bits that the wire would carry
     in it.
@@ -317,9 +317,11 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
             bus.bits = bus.transactions = 0
         for _ in range(frames):
             skin.read()
-        return [
-            bus.bits + bus.transactions * overhead_s * bus.clock_hz for bus in buses
-        ]
+        bits = []
+        for bus in buses:
+            spent = bus.transactions * overhead_s * bus.clock_hz
+            bits.append((bus.bits + spent) / frames)
+        return bits
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:

@@ -198,7 +198,7 @@ def plugged(adapter: UsbAdapter) -> Iterator[str]:
     """
     if sys.platform != "linux":
         raise InputError("--plug needs Linux; elsewhere, play a recording with --fake")
-    if not all(driver.exists() for driver in DRIVERS):
+    if not all(map(Path.exists, DRIVERS)):
         raise InputError(
             "--plug needs modules of the kernel; run "
             "`sudo modprobe --all vhci-hcd i2c-tiny-usb i2c-dev`"

@@ -111,10 +111,14 @@ class OnnxRuntime:
     def inputs(self) -> dict[str, tuple[str, list[Any]]]:
         """{input: its type and shape}; a size that is not known is no number."""
         session = self._session
-        values = [*session.get_inputs(), *session.get_overridable_initializers()]
-        return {value.name: (value.type, value.shape) for value in values}
+        return _declared(
+            [*session.get_inputs(), *session.get_overridable_initializers()]
+        )
 
     def outputs(self) -> dict[str, tuple[str, list[Any]]]:
         """{output: its type and shape}."""
-        values = self._session.get_outputs()
-        return {value.name: (value.type, value.shape) for value in values}
+        return _declared(self._session.get_outputs())
+
+
+def _declared(values: Sequence[Any]) -> dict[str, tuple[str, list[Any]]]:
+    return {value.name: (value.type, value.shape) for value in values}

@@ -153,8 +153,9 @@ def _constant(tensor: Any) -> Array:
     return values.reshape(tensor.get(1, []))
 
 
-def _declared(value: Message) -> Declared:
-    """Type and shape of a ValueInfoProto; a size that is not known is None."""
+def _declared(value: Message) -> tuple[str, Declared]:
+    """Name, and type and shape, of a ValueInfoProto; a size that is not known is
+    None."""
     kind = "another type"
     sizes: list[int | None] = []
     for declared in messages(value, 2):
@@ -163,7 +164,7 @@ def _declared(value: Message) -> Declared:
             for shape in messages(tensor, 2):
                 for dimension in messages(shape, 1):
                     sizes.append(dimension[1][-1] if 1 in dimension else None)
-    return kind, sizes
+    return text_of(value, 1), (kind, sizes)
 
 
 class Graph:
@@ -193,8 +194,8 @@ class Graph:
         """
         tensors = contents.tensors.items()
         self.constants = {name: _constant(tensor) for name, tensor in tensors}
-        self._inputs = {text_of(v, 1): _declared(v) for v in contents.inputs}
-        self._outputs = {text_of(v, 1): _declared(v) for v in contents.outputs}
+        self._inputs = dict(map(_declared, contents.inputs))
+        self._outputs = dict(map(_declared, contents.outputs))
         self.makers: dict[str, Node] = {}
         self._plans: dict[tuple[str, ...], list[Node]] = {}
         self._nodes = contents.nodes

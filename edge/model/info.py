@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
@@ -304,41 +304,39 @@ def _check_features(info: ModelInfo, name: str) -> None:
 
 def _check(info: ModelInfo, name: str) -> None:
     """Refuse metadata that contradict themselves."""
-    contradictions = [_contradiction(info)]
-    contradictions += [_contradiction_of_task(info, task) for task in info.tasks]
-    for contradiction in filter(None, contradictions):
+    for contradiction in _contradictions(info):
         raise InputError(f"{name}: {contradiction}; export it again")
 
 
-def _contradiction(info: ModelInfo) -> str:
-    """A contradiction in the whole metadata, as a sentence; "" without one."""
+def _contradictions(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the metadata, as sentences."""
     if not info.tasks:
-        return "its metadata names no task"
+        yield "its metadata names no task"
     if info.decision_points_s and not _points_fit(info):
-        return "its decision points are impossible"
+        yield "its decision points are impossible"
     if info.trials and len(info.trials) != info.rows:
-        return f"names {len(info.trials)} of {info.rows} trials"
+        yield f"names {len(info.trials)} of {info.rows} trials"
     if (info.motion_frame == "world") != (info.chain is not None):
-        return "its motion frame contradicts its arm"
-    if not all(name.isprintable() for name in (info.name, *info.tasks)):
-        return "its name and its tasks' names must be printable"
-    return ""
+        yield "its motion frame contradicts its arm"
+    if not "".join((info.name, *info.tasks)).isprintable():
+        yield "its name and its tasks' names must be printable"
+    yield from _contradictions_of_tasks(info)
 
 
-def _contradiction_of_task(info: ModelInfo, task: str) -> str:
-    """A contradiction in a task, as a sentence; "" without one."""
-    entry = info.tasks[task]
-    if entry.components > info.width:
-        return (
-            f"task {task!r} has {entry.components} components of {info.width} features"
-        )
-    if entry.factors:
+def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the tasks, as sentences."""
+    for name, task in info.tasks.items():
+        if task.components > info.width:
+            yield (
+                f"task {name!r} has {task.components} components of {info.width} "
+                "features"
+            )
+    labels = {name: task.labels for name, task in info.tasks.items()}
+    for name, factors in info.products.items():
         from edge.model.agreement import factors_fit  # few models have products
 
-        labels = {name: other.labels for name, other in info.tasks.items()}
-        if not factors_fit(entry.factors, labels, task):
-            return f"task {task!r} is not the product of its factors"
-    return ""
+        if not factors_fit(factors, labels, name):
+            yield f"task {name!r} is not the product of its factors"
 
 
 def _points_fit(info: ModelInfo) -> bool:

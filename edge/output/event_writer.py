@@ -6,7 +6,6 @@ network that is down costs lines, and those are counted.
 
 import errno
 import os
-import socket
 import sys
 import threading
 import time
@@ -15,7 +14,6 @@ from queue import SimpleQueue
 from typing import Any, TextIO
 
 from edge.events import json_line
-from edge.files import refusing
 
 MOST_LINES = 10_000
 """Lines that wait for a reader: at two contacts a second, a quarter of an hour."""
@@ -151,7 +149,11 @@ class Lines:
         Raises:
             InputError: the address is not of that form, or its host is unknown.
         """
-        self._socket = None if udp is None else _connected(udp)
+        self._socket = None
+        if udp is not None:
+            from edge.address import sender_to  # few runs send datagrams
+
+            self._socket = sender_to("--udp ", udp)
         write = _line_by_line(sys.stdout if out is None else out)
         self._out = LineWriter("stdout", write, form, patient)
         self._writers = [self._out, *more]
@@ -207,19 +209,3 @@ def _line_by_line(out: TextIO) -> Callable[[bytes], None]:
             line = line[os.write(descriptor, line) :]
 
     return write
-
-
-def _connected(address: str) -> socket.socket:
-    from edge.address import parse_address  # few runs send datagrams
-
-    host, port = parse_address(
-        "--udp ", address, "127.0.0.1:47400", ports=range(1, 65536)
-    )
-    with refusing(f"--udp {address}: cannot be reached"):
-        family, kind, protocol, _, where = socket.getaddrinfo(
-            host, port, type=socket.SOCK_DGRAM
-        )[0]
-        sender = socket.socket(family, kind, protocol)
-        sender.setblocking(False)
-        sender.connect(where)
-    return sender

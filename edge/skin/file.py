@@ -103,10 +103,14 @@ class SkinFile:
         return [chip for bus in self.buses for chip in bus.chips]
 
     @property
+    def served(self) -> list[int]:
+        """The flat indices of the taxels that have a chip."""
+        return [taxel for chip in self.chips for taxel in chip.served]
+
+    @property
     def uncovered(self) -> int:
         """Number of taxels that no chip serves."""
-        taxels = self.layout.rows * self.layout.cols
-        return taxels - len({taxel for chip in self.chips for taxel in chip.served})
+        return self.layout.rows * self.layout.cols - len(self.served)
 
 
 def load(path: str | os.PathLike[str]) -> SkinFile:

@@ -321,8 +321,8 @@ def wire_s(file: SkinFile) -> float:
     transactions."""
     from edge.fake.player import frame_bits, frame_rate  # counts the bits on a fake bus
 
-    bits = [total / WIRE_FRAMES for total in frame_bits(file, WIRE_FRAMES)]
-    return round(1.0 / frame_rate(bits, [bus.clock_hz for bus in file.buses]), 6)
+    clocks = [bus.clock_hz for bus in file.buses]
+    return round(1.0 / frame_rate(frame_bits(file, WIRE_FRAMES), clocks), 6)
 
 
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:

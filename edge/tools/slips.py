@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
 
-from edge.tools.teaching import JOINED
+from edge.tools.teaching import JOINED, label_counts
 
 RARE_SHARE = 0.1
 """A task that fewer of the recordings have is named."""
@@ -37,8 +37,8 @@ def counts_text(labels: Labels) -> list[str]:
     """A line for each task: how many recordings have each label."""
     lines = []
     for task in sorted(set().union(*labels)):
-        counts = Counter(trial[task] for trial in labels if task in trial)
-        total = sum(counts.values())
+        counts = label_counts(task, labels)
+        total = counts.total()
         parts = ", ".join(f"{label} {count}" for label, count in counts.most_common(12))
         more = f" and {len(counts) - 12} more" if len(counts) > 12 else ""
         lines.append(f"{task} ({total} of {len(labels)}): {parts}{more}")
@@ -59,8 +59,8 @@ def _rare_tasks(labels: Labels) -> list[str]:
 
 
 def _rare_labels(task: str, labels: Labels) -> list[str]:
-    counts = Counter(trial[task] for trial in labels if task in trial)
-    total = sum(counts.values())
+    counts = label_counts(task, labels)
+    total = counts.total()
     sentences = []
     for label, count in sorted(counts.items()):
         meant = _meant(label, count, counts)

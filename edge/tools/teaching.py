@@ -88,6 +88,11 @@ def joined(labels: Labels, tasks: Sequence[str] = JOINED) -> dict[str, str]:
     return {**implied, **labels}
 
 
+def label_counts(task: str, labels: Sequence[Labels]) -> Counter[str]:
+    """How many trials have each label of a task."""
+    return Counter(trial[task] for trial in labels if task in trial)
+
+
 def unknown_labels(
     info: ModelInfo, labels: Sequence[Labels]
 ) -> dict[str, dict[str, int]]:
@@ -99,12 +104,10 @@ def unknown_labels(
     """
     unknown = {}
     for task, entry in info.tasks.items():
-        counts = Counter(trial[task] for trial in labels if task in trial)
-        unknown[task] = {
-            label: count
-            for label, count in sorted(counts.items())
-            if label not in entry.labels
-        }
+        counts = label_counts(task, labels)
+        for label in entry.labels:
+            counts.pop(label, 0)
+        unknown[task] = dict(sorted(counts.items()))
     return unknown
 
 

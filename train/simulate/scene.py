@@ -221,7 +221,11 @@ def _motion(
     contact."""
     start, rate = (
         table.numbers(
-            key, chain.dof, cody if chain.dof == len(cody) else REQUIRED, -720.0, 720.0
+            key,
+            chain.dof,
+            cody if chain.dof == len(cody) else REQUIRED,
+            low=-720.0,
+            high=720.0,
         )
         for key, cody in (
             ("start_deg", CODY_START_DEG),

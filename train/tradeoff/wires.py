@@ -46,7 +46,7 @@ class Wire:
 
 def wire(chips: str, file: SkinFile) -> Wire:
     """The wiring of a skin file, with the name of its chips."""
-    bits = [total / FRAMES for total in frame_bits(file, FRAMES)]
+    bits = frame_bits(file, FRAMES)
     clocks = [bus.clock_hz for bus in file.buses]
     buses = "1 bus" if len(clocks) == 1 else f"{len(clocks)} buses"
     return Wire(
