@@ -1,6 +1,7 @@
 """The AD7147: its start sequence, its words, its bits on the wire."""
 
 import numpy as np
+import pytest
 
 from edge.chips import ad7147
 from edge.chips.ad7147 import AD7147
@@ -12,34 +13,41 @@ from tests.edge.chips.chips import parsed, sense
 SPEC = ChipSpec(AD7147, 0x2C, tuple(range(12)))
 
 
-def test_writes_all_eight_registers_of_each_stage_then_the_system_registers():
-    rows = dict(ad7147.START_ROWS)
-    written = {
-        first + i: value
-        for first, values in rows.items()
-        for i, value in enumerate(values)
-    }
-    assert [written[0x80 + i] for i in range(8)] == [
-        0xFFFE,
-        0x1FFF,
-        0,
-        0x2626,
-        *[1600] * 4,
-    ]
-    connections = {
-        s: (written[0x80 + 8 * s], written[0x81 + 8 * s]) for s in (6, 7, 11)
-    }
-    assert connections == {
-        6: (0xEFFF, 0x1FFF),
-        7: (0xFFFF, 0x1FFE),
-        11: (0xFFFF, 0x1EFF),
-    }
-    assert set(range(0x80, 0xE0)) <= written.keys()
-    assert list(rows)[-1] == 0
-    assert [written[i] for i in range(8)] == [0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400]
-    assert (
-        max(2 + 2 * len(values) for values in rows.values()) <= 61
-    )  # a CP2112's buffer
+@pytest.fixture(scope="module")
+def registers():
+    """{register: the value that the start sequence writes}."""
+    written = {}
+    for first, values in ad7147.START_ROWS:
+        written.update(enumerate(values, first))
+    return written
+
+
+def words(registers, first, count):
+    return [registers[first + i] for i in range(count)]
+
+
+def test_writes_all_eight_registers_of_each_stage(registers):
+    assert words(registers, 0x80, 8) == [0xFFFE, 0x1FFF, 0, 0x2626, *[1600] * 4]
+    assert set(range(0x80, 0xE0)) <= registers.keys()
+
+
+@pytest.mark.parametrize(
+    ("stage", "connection"),
+    [(6, [0xEFFF, 0x1FFF]), (7, [0xFFFF, 0x1FFE]), (11, [0xFFFF, 0x1EFF])],
+)
+def test_a_stage_is_connected_to_its_input(registers, stage, connection):
+    assert words(registers, 0x80 + 8 * stage, 2) == connection
+
+
+def test_writes_the_system_registers_last(registers):
+    first, _ = ad7147.START_ROWS[-1]
+    assert first == 0
+    assert words(registers, 0, 8) == [0x02B0, 0x0FFF, 0, 0, 0, 0, 0, 0x0400]
+
+
+def test_a_row_fits_the_buffer_of_a_cp2112():
+    longest = max(len(values) for _, values in ad7147.START_ROWS)
+    assert 2 + 2 * longest <= 61
 
 
 def test_parses_big_endian_words_of_which_zeros_are_not_intact():

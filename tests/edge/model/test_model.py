@@ -42,9 +42,14 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     assert list(info.tasks) == ["category", "object"]
     assert info.tasks["category"].labels == ("rigid-fixed", "soft-fixed")
     assert info.layout == forearm
+    assert info.rows == 16
+    assert len(info.data_digest) == 64
+
+
+def test_metadata_say_how_features_are_measured(model):
+    info = model.info
     assert info.window_s == 1.2
     assert info.samples == 40
-    assert info.rows == 16
     assert info.units == {
         "max_force": "newton",
         "contact_area": "taxel",
@@ -52,7 +57,10 @@ def test_metadata_says_what_the_board_needs(model, forearm):
     }
     assert info.motion_frame == "world"
     assert info.chain.dof == 5
-    assert len(info.data_digest) == 64
+
+
+def test_metadata_are_read_as_they_were_written(model):
+    info = model.info
     assert to_json(info.from_json(to_json(info), "again")) == to_json(info)
 
 
@@ -235,26 +243,39 @@ def test_a_contact_may_take_1_to_1000_frames_to_be_confirmed(frames, altered):
     assert Model(altered(meta(tracking={"debounce": frames}))).info.debounce == frames
 
 
-def test_contents_are_those_that_onnx_reads(exported):
-    data = (exported / "model.onnx").read_bytes()
-    contents = onnx_file.read(data, "model")
-    proto = onnx.load_from_string(data)
+@pytest.fixture(scope="module")
+def contents(exported):
+    return onnx_file.read((exported / "model.onnx").read_bytes(), "model")
+
+
+@pytest.fixture(scope="module")
+def proto(exported):
+    return onnx.load(exported / "model.onnx")
+
+
+def test_metadata_are_those_that_onnx_reads(contents, proto):
     assert contents.metadata == {p.key: p.value for p in proto.metadata_props}
+    assert contents.foreign == []
+
+
+def test_nodes_are_those_that_onnx_reads(contents, proto):
     assert len(contents.nodes) == len(proto.graph.node)
     for node, expected in zip(contents.nodes, proto.graph.node, strict=True):
-        attributes = {a.name: a.i for a in expected.attribute}
         assert node.operator == expected.op_type
         assert node.inputs == list(expected.input)
         assert node.outputs == list(expected.output)
-        assert node.attributes == attributes
+        assert node.attributes == {a.name: a.i for a in expected.attribute}
+
+
+def test_constants_inputs_and_outputs_are_those_that_onnx_reads(contents, proto):
     graph = Graph(contents)
     assert graph.inputs()["features"] == ("tensor(double)", [None, 120])
     assert graph.outputs()["object_label"] == ("tensor(int64)", [None])
+    assert graph.constants.keys() == {t.name for t in proto.graph.initializer}
     for tensor in proto.graph.initializer:
         np.testing.assert_array_equal(
             graph.constants[tensor.name], numpy_helper.to_array(tensor)
         )
-    assert contents.foreign == []
 
 
 RELEASED = Path(__file__).parents[2] / "golden" / "released"

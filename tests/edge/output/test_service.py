@@ -1,7 +1,6 @@
 """`edge-classify run` as a service: under a stand-in for systemd's socket, and the unit
 itself."""
 
-import json
 import os
 import shlex
 import shutil
@@ -14,7 +13,7 @@ import pytest
 
 from edge import demo
 from edge.cli import parser
-from tests.conftest import ROOT, decided, started
+from tests.conftest import ROOT, decided, lines, started
 from train.touch_map import TouchMap
 
 UNIT = ROOT / "docs" / "examples" / "service" / "edge-classify.service"
@@ -28,6 +27,13 @@ def start(manager, *arguments):
     return started("run", *given, env=environment, stdout=subprocess.PIPE)
 
 
+def said_until_stopping(manager):
+    said = {manager.recv(4096)}
+    while b"STOPPING=1" not in said:
+        said.add(manager.recv(4096))
+    return said
+
+
 def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
     manager, tmp_path
 ):
@@ -38,16 +44,14 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
             assert manager.recv(4096) == b"WATCHDOG=1"
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=60)
-        said = {manager.recv(4096)}
-        while b"STOPPING=1" not in said:
-            said.add(manager.recv(4096))
+        said = said_until_stopping(manager)
     assert said <= {b"WATCHDOG=1", b"STOPPING=1"}
     assert process.returncode == 0
     assert err == ""
     assert out.endswith("\n")
-    lines = [json.loads(line) for line in out.splitlines()]
-    assert lines[-1]["event"] == "end"
-    assert len(list(TouchMap(place))) == len(set(decided(lines, "contact")))
+    events = lines(out)
+    assert events[-1]["event"] == "end"
+    assert len(list(TouchMap(place))) == len(set(decided(events, "contact")))
 
 
 @pytest.fixture

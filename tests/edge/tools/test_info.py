@@ -27,24 +27,27 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_two_models_are_compared_by_what_differs(edge, exported, monkeypatch):
-    pair = [exported / "model.onnx", demo.MODEL]
-    status, (comparison,), _ = edge("info", *pair)
+def test_a_program_gets_what_differs_between_two_models(edge, exported):
+    status, (comparison,), _ = edge("info", exported / "model.onnx", demo.MODEL)
     changes = comparison["changes"]
+    info = Model(exported / "model.onnx").info
+    labels = [list(i.tasks["category"].labels) for i in (info, INFO)]
     assert status == 0
-    infos = [Model(path).info for path in pair]
-    assert changes["rows"] == [info.rows for info in infos]
-    assert changes["data_digest"] == [info.data_digest for info in infos]
-    assert changes["tasks.category.labels"] == [
-        list(i.tasks["category"].labels) for i in infos
-    ]
+    assert changes["rows"] == [info.rows, INFO.rows]
+    assert changes["data_digest"] == [info.data_digest, INFO.data_digest]
+    assert changes["tasks.category.labels"] == labels
     assert "window_s" not in changes
+
+
+def test_a_person_gets_what_differs_between_two_models(edge, exported, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    out = " ".join(edge("info", *pair, text=True)[1].split())
+    _, text, _ = edge("info", exported / "model.onnx", demo.MODEL, text=True)
+    out = " ".join(text.split())
+    before = Model(exported / "model.onnx").info.tasks["object"].accuracy
+    after = INFO.tasks["object"].accuracy
     assert "tasks.category.labels (2 -> 4): + rigid-movable, soft-movable" in out
-    assert f"rows: 16 -> {infos[1].rows}" in out
-    accuracies = [info.tasks["object"].accuracy for info in infos]
-    assert f"tasks.object.accuracy: {accuracies[0]:.1%} -> {accuracies[1]:.1%}" in out
+    assert f"rows: 16 -> {INFO.rows}" in out
+    assert f"tasks.object.accuracy: {before:.1%} -> {after:.1%}" in out
 
 
 def test_a_model_differs_from_itself_in_nothing(edge):

@@ -24,25 +24,43 @@ def skin(tmp_path, forearm):
     return path
 
 
-def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
+@pytest.fixture
+def rest(recordings, tmp_path):
+    """A recording in which nothing touches the skin."""
     first = load(recordings / "hard_0.npz")
-    rest = recording.Recording(first.t[:20], first.frames[:20], meta={})
-    saving.save(tmp_path / "rest.npz", rest)
+    still = recording.Recording(first.t[:20], first.frames[:20], meta={})
+    saving.save(tmp_path / "rest.npz", still)
+    return tmp_path / "rest.npz"
+
+
+def record(edge, skin, touch, trials):
+    words = ["--skin", skin, "--fake", touch, "--out", trials, "--length", 1.3]
+    for task, label in load(touch).labels.items():
+        words += ["--label", f"{task}={label}"]
+    status, (event,), _ = edge("record", *words)
+    assert status == 0
+    assert event["complete"]
+
+
+def run_and_know(edge, model, skin, touch):
+    """Run, and meet what the model was shown."""
+    status, events, _ = edge("run", "--model", model, "--skin", skin, "--fake", touch)
+    assert status == 0
+    assert decided(events, "task") == ["category", "object"]
+    assert decided(events, "label")[0] == load(touch).labels["category"]
+    assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]
+
+
+def test_record_export_run(edge, skin, rest, recordings, tmp_path, capsys):
+    fake = ("--skin", skin, "--fake", rest)
     assert edge("check", skin)[0] == 0
-    assert edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")[0] == 0
-    at_rest = ("--skin", skin, "--fake", tmp_path / "rest.npz", "--frames", 20)
-    assert edge("calibrate", *at_rest)[0] == 0
+    assert edge("scan", *fake)[0] == 0
+    assert edge("calibrate", *fake, "--frames", 20)[0] == 0
 
     trials = tmp_path / "trials"
-    shown = [f"{kind}_{seed}" for kind in ("hard", "soft") for seed in range(2)]
+    shown = ("hard_0", "hard_1", "soft_0", "soft_1")
     for name in shown:
-        touch = recordings / f"{name}.npz"
-        given = ["--skin", skin, "--fake", touch, "--out", trials, "--length", 1.3]
-        for task, label in load(touch).labels.items():
-            given += ["--label", f"{task}={label}"]
-        status, (event,), _ = edge("record", *given)
-        assert status == 0
-        assert event["complete"]
+        record(edge, skin, recordings / f"{name}.npz", trials)
     assert len(list(trials.iterdir())) == len(shown)
 
     export(tmp_path / "build", "--data", trials, *PAPER)
@@ -51,12 +69,6 @@ def test_record_export_run(edge, skin, recordings, tmp_path, capsys):
     # One file goes to the board; what it was shown it knows again, live.
     board = tmp_path / "board"
     board.mkdir()
-    shutil.copy(tmp_path / "build" / "model.onnx", board)
+    model = shutil.copy(tmp_path / "build" / "model.onnx", board)
     for name in ("hard_1", "soft_0"):
-        touch = recordings / f"{name}.npz"
-        given = ("--model", board / "model.onnx", "--skin", skin, "--fake", touch)
-        status, events, _ = edge("run", *given)
-        assert status == 0
-        assert decided(events, "task") == ["category", "object"]
-        assert decided(events, "label")[0] == load(touch).labels["category"]
-        assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]
+        run_and_know(edge, model, skin, recordings / f"{name}.npz")

@@ -64,17 +64,24 @@ def frames(count, touched_from=2, counts=500):
         yield Frame(counts=image, valid=valid, t=i * 0.05)
 
 
-def test_a_picture_has_the_skin_and_the_contact_since_onset(page, pictures):
+@pytest.fixture
+def picture(page, pictures):
+    """The last picture of a touch."""
     for frame in frames(12):
         page.push(frame)
+    return pictures[-1]
 
-    picture = pictures[-1]
+
+def test_a_picture_has_the_skin(picture):
     assert picture["rows"] == 4
     assert picture["cols"] == 6
     assert picture["dead"] == (5,)
     assert np.flatnonzero(picture["counts"]).tolist() == [8, 9]
-    assert picture["contact"]["taxels"] == [8, 9]
     assert picture["invalid"] == [18]
+
+
+def test_a_picture_has_the_contact_since_onset(picture):
+    assert picture["contact"]["taxels"] == [8, 9]
     assert set(picture["contact"]["force"]) == {0.6}
     assert set(picture["contact"]["area"]) == {2}
     assert picture["contact"]["t"][0] == 0.0

@@ -37,23 +37,32 @@ def labelled(touch, **labels):
     return replace(touch, meta={**touch.meta, "labels": labels})
 
 
-def test_a_taught_trial_is_known_again_and_the_new_files_agree(
-    teach, edge, exported, make_touch, tmp_path
-):
+@pytest.fixture
+def cup(make_touch, tmp_path):
+    """The path of a touch whose object the model does not know."""
     touch = labelled(make_touch(seed=70), category="soft-fixed", object="cup")
     save(tmp_path / "cup.npz", touch)
-    status, lines, messages = teach(tmp_path / "cup.npz")
+    return tmp_path / "cup.npz"
+
+
+def test_a_trial_is_taught_for_the_tasks_whose_label_is_known(teach, cup, tmp_path):
+    status, lines, messages = teach(cup)
     assert status == 0
     assert of_tasks(lines) == {"category": 1, "object": 0}
     left_out = "object: left out 1 trial of the new label 'cup'; --new-labels adds it\n"
     assert left_out in messages
     assert "its accuracy is not measured, and no error rate is certified" in messages
+    after = Model(tmp_path / "taught" / "model.onnx").info
+    assert after.rows == 17
+    assert after.taught == 1
+    assert after.trials[-1:] == ("cup",)
+
+
+def test_a_taught_trial_is_known_again(teach, exported, cup, tmp_path):
+    teach(cup)
     before = Model(exported / "model.onnx")
     after = Model(tmp_path / "taught" / "model.onnx")
-    assert after.info.rows == 17
-    assert after.info.taught == 1
-    assert after.info.trials[-1:] == ("cup",)
-    _, series = first_series(load(tmp_path / "cup.npz"), after)
+    _, series = first_series(load(cup), after)
     vector = after.info.vector(series)
     decisions = after.decide(vector)
     assert decisions["category"].neighbours[0] == 16
@@ -61,8 +70,13 @@ def test_a_taught_trial_is_known_again_and_the_new_files_agree(
     # No label of its object is known, so the answers about objects are what they were.
     former = before.decide(vector)["object"].distances
     assert (decisions["object"].distances == former).all()
-    golden = tmp_path / "taught" / "golden.npz"
-    assert edge("verify", "--model", after.path, "--golden", golden)[0] == 0
+
+
+def test_the_new_golden_file_agrees_with_the_taught_model(teach, edge, cup, tmp_path):
+    teach(cup)
+    taught = tmp_path / "taught"
+    files = ("--model", taught / "model.onnx", "--golden", taught / "golden.npz")
+    assert edge("verify", *files)[0] == 0
 
 
 def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path):

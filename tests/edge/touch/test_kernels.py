@@ -1,7 +1,7 @@
 """Kernels against a loop of Python's own integers."""
 
 import zlib
-from itertools import combinations
+from itertools import combinations, compress
 
 import numpy as np
 import pytest
@@ -26,43 +26,40 @@ SKIN = SkinLayout(16, 24, threshold_counts=9)
 HEAVY = list(combinations(range(9), 3))
 
 
+def moved(value, shift):
+    """A channel's value times 2^shift, cut off at 14 bits."""
+    scaled = value << shift if shift > 0 else value >> -shift
+    return min(scaled, (1 << 14) - 1)
+
+
+def result(mixed, kernel, dilation, t):
+    """The sum of a kernel's nine taps about a sample, with zeros beyond the ends."""
+    total = 0
+    for tap in range(9):
+        at = t + (tap - 4) * dilation
+        if 0 <= at < SAMPLES:
+            total += (2 if tap in HEAVY[kernel] else -1) * mixed[at]
+    return total
+
+
 def by_hand(channels, table):
     """(above, counted) of every bias, in Python's integers."""
-    moved = [
-        [
-            min(value << shift if shift > 0 else value >> -shift, (1 << 14) - 1)
-            for value in row
-        ]
-        for row, shift in zip(channels.tolist(), table.shifts, strict=True)
-    ]
-    taken = kernels._mixes(len(moved)).tolist()
-    seen = []
-    for bias, convolution in zip(
-        table.biases, convolution_of_bias(len(table.biases)).tolist(), strict=True
-    ):
+    rows = []
+    for row, shift in zip(channels.tolist(), table.shifts, strict=True):
+        rows.append([moved(value, shift) for value in row])
+    taken = kernels._mixes(len(rows)).astype(bool).tolist()
+    convolutions = convolution_of_bias(len(table.biases)).tolist()
+    counts = []
+    for bias, convolution in zip(table.biases, convolutions, strict=True):
         dilation, kernel = divmod(convolution, 84)
-        dilation += 1
-        mixed = [
-            sum(
-                row[t]
-                for row, take in zip(moved, taken[convolution], strict=True)
-                if take
-            )
-            for t in range(SAMPLES)
-        ]
-        padded = (dilation - 1 + kernel) % 2 == 0
-        reach = 0 if padded else 4 * dilation
+        mixed = list(map(sum, zip(*compress(rows, taken[convolution]), strict=True)))
+        padded = (dilation + kernel) % 2 == 0
+        reach = 0 if padded else 4 * (dilation + 1)
         above = 0
         for t in range(reach, SAMPLES - reach):
-            at = [t + (tap - 4) * dilation for tap in range(9)]
-            inside = [mixed[i] if 0 <= i < SAMPLES else 0 for i in at]
-            total = sum(
-                (2 if tap in HEAVY[kernel] else -1) * value
-                for tap, value in enumerate(inside)
-            )
-            above += total > bias
-        seen.append((above, SAMPLES - 2 * reach))
-    return seen
+            above += result(mixed, kernel, dilation + 1, t) > bias
+        counts.append((above, SAMPLES - 2 * reach))
+    return counts
 
 
 @pytest.mark.parametrize(("biases", "channels"), [(1008, 1), (504, 5), (504, 32)])
