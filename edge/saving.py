@@ -64,8 +64,10 @@ def save(
         still = shear.doubt(recording.shear)
         if still is not None:
             LOG.warning(f"{name}: {still}")
-    arrays = {key: getattr(recording, key) for key in KEYS[:-1]}
-    arrays = {key: array for key, array in arrays.items() if array is not None}
+    arrays = {}
+    for key in KEYS[:-1]:
+        if getattr(recording, key) is not None:
+            arrays[key] = getattr(recording, key)
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)
 
 

@@ -81,8 +81,11 @@ def _named_after(
 ) -> bool:
     """Whether names stand for their pairs of labels, where they are made of these, as
     `rigid-fixed` is. Other names stand for any pair."""
-    forward = [f"{first[a]}-{second[b]}" for a, b in pairs]
-    backward = [f"{second[b]}-{first[a]}" for a, b in pairs]
+    forward = []
+    backward = []
+    for a, b in pairs:
+        forward.append(f"{first[a]}-{second[b]}")
+        backward.append(f"{second[b]}-{first[a]}")
     return all(
         tuple(made) == names or set(made) != set(names) for made in (forward, backward)
     )

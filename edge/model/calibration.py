@@ -76,15 +76,15 @@ class Novelty:
             raise table.fail(
                 "limits", f"{points} rows of a number for each of the rates"
             )
-        lines = [
-            ConfigTable({"limits": row}, table.where, table.prefix) for row in rows
-        ]
-        limits = tuple(line.numbers("limits", len(rates)) for line in lines)
         if not _rise((0.0, *rates[::-1], 1.0), strictly=True):
             raise table.fail("rates", "numbers between 0 and 1 that fall")
-        if not all(_rise((0.0, *line)) for line in limits):
-            raise table.fail("limits", "rows of numbers from 0 on that rise")
-        return cls(table.text("task"), rates, limits)
+        limits = []
+        for row in rows:
+            line = ConfigTable({"limits": row}, table.where, table.prefix)
+            limits.append(line.numbers("limits", len(rates)))
+            if not _rise((0.0, *limits[-1])):
+                raise table.fail("limits", "rows of numbers from 0 on that rise")
+        return cls(table.text("task"), rates, tuple(limits))
 
 
 def _rise(numbers: Sequence[float], *, strictly: bool = False) -> bool:

@@ -1,7 +1,6 @@
 """The metadata of a model as a file holds it."""
 
 import json
-from dataclasses import asdict
 
 from edge.model.info import FORMAT, ModelInfo
 
@@ -15,16 +14,14 @@ def to_json(info: ModelInfo) -> str:
     """The metadata as JSON text, which `ModelInfo.from_json` reads."""
     entries = vars(info) | {
         "format": FORMAT,
-        "tasks": {name: vars(task) for name, task in info.tasks.items()},
         "skin": info.layout.to_dict(),
         "tracking": {"debounce": info.debounce},
         "arm": None if info.chain is None else info.chain.to_dict(),
-        "stopping": {task: asdict(rules) for task, rules in info.stopping.items()},
-        "novelty": info.novelty and asdict(info.novelty),
-        "kernels": {name: vars(table) for name, table in info.kernels.items()},
     }
     del entries["layout"], entries["chain"], entries["debounce"]
     for key in OPTIONAL:
         if not entries[key]:
             del entries[key]
-    return json.dumps(entries, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    return json.dumps(
+        entries, default=vars, sort_keys=True, allow_nan=False, ensure_ascii=False
+    )

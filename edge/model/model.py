@@ -226,11 +226,13 @@ class Model:
             )
         outputs = self.run(x[None], decision_point)
         answers = {name: value[0] for name, value in outputs.items()}
-        tasks = self.info.tasks
-        labels: dict[str, Any] = {task: answers[f"{task}_label"] for task in tasks}
+        labels: dict[str, Any] = {}
+        distances: dict[str, Any] = {}
+        for task in self.info.tasks:
+            labels[task] = answers[f"{task}_label"]
+            distances[task] = answers.get(f"{task}_label_distances")
         if min(labels.values()) < 0:
             raise self._refusal(x)
-        distances = {task: answers.get(f"{task}_label_distances") for task in tasks}
         if self.info.products:
             self._agree(labels, distances)
         last = len(self.decision_points_s) - 1

@@ -26,7 +26,7 @@ that computes in float32 gives others.
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise, starmap
 from typing import Any
 
 import numpy as np
@@ -111,11 +111,10 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     ):
         SkinLayout.from_dict(meta["skin"], where=name)
         bounds = {str(key): float(bound) for key, bound in meta["bounds"].items()}
-        lines = [
-            *_path(model, arrays, meta, bounds),
-            *_graph(model, name, arrays, bounds),
-        ]
-        checks = [compared(*line) for line in lines]
+        lines = chain(
+            _path(model, arrays, meta, bounds), _graph(model, name, arrays, bounds)
+        )
+        checks = list(starmap(compared, lines))
     second = second_opinion(model, arrays)
     return checks if second is None else [*checks, second]
 
@@ -190,7 +189,7 @@ def _path(
         vectors.append([info.vector(contact[1], window_s) for window_s in windows])
     trials = len(onsets)
     at_windows = np.array(vectors).swapaxes(0, 1)
-    lengths = np.array([len(series) for series in integers])
+    lengths = np.array(list(map(len, integers)))
     yield "series length", lengths, np.diff(arrays["series_start"]), 0.0
     yield "series counts", np.concatenate(integers), arrays["series_counts"], 0.0
     yield "onset", np.array(onsets), arrays["onset_s"], bounds["time_s"]
@@ -208,8 +207,7 @@ def _graph(
         if key in arrays and arrays[key].shape[-1:] != (model.info.width,):
             raise InputError(
                 f"{name}: {key} has the shape {arrays[key].shape}, but {model.path} "
-                "takes "
-                f"{model.info.width} features; export both together"
+                f"takes {model.info.width} features; export both together"
             )
     for key, answer in _comparable(model, arrays).items():
         bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
@@ -323,13 +321,12 @@ def compared(
     share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(
         len(seen), -1
     )
-    row, column = (int(i) for i in np.unravel_index(int(np.argmax(share)), share.shape))
+    row, column = divmod(int(share.argmax()), share.shape[1])
     worst = float(share[row, column])
     if worst == 0.0:
         return Check(name, len(seen), 0.0, None)
-    at_row = (values.reshape(share.shape)[row] for values in (seen, expected))
-    texts = [
-        str(values) if bound == 0.0 else repr(float(values[column]))
-        for values in at_row
-    ]
+    texts = []
+    for values in (seen, expected):
+        at_row = values.reshape(share.shape)[row]
+        texts.append(str(at_row) if bound == 0.0 else repr(float(at_row[column])))
     return Check(name, len(seen), worst, row, *texts)

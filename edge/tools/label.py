@@ -105,12 +105,12 @@ def _chosen(
     """The recordings that are of all kinds, after interrupted changes are finished."""
     for folder in sorted({path.parent for path in paths}):
         finish_interrupted(folder)
-    loaded = [(path, load(path)) for path in paths]
-    return [
-        (path, recording)
-        for path, recording in loaded
-        if review.selected(recording.meta, kinds)
-    ]
+    chosen = []
+    for path in paths:
+        recording = load(path)
+        if review.selected(recording.meta, kinds):
+            chosen.append((path, recording))
+    return chosen
 
 
 def _relabel(

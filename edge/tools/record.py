@@ -144,16 +144,20 @@ class Trials:
 def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     """A recording of the frames, with NaN for joint angles that were not known."""
     # A skin's frames always say which taxels are valid.
-    valid = np.array([frame.valid for frame in frames])
-    shear = [frame.shear for frame in frames if frame.shear is not None]
+    valid = _stacked(frames, "valid")
     return Recording(
-        t=np.array([frame.t - frames[0].t for frame in frames]),
-        frames=np.array([frame.counts for frame in frames]),
+        t=_stacked(frames, "t") - frames[0].t,
+        frames=_stacked(frames, "counts"),
         joints=_angles(frames),
         valid=None if valid.all() else valid,
         meta=meta,
-        shear=np.array(shear) if shear else None,
+        shear=None if frames[0].shear is None else _stacked(frames, "shear"),
     )
+
+
+def _stacked(frames: list[Frame], field: str) -> NDArray[Any]:
+    """A field of all frames, along the first axis."""
+    return np.array([getattr(frame, field) for frame in frames])
 
 
 def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:

@@ -142,12 +142,14 @@ def compared(name: str, first: Summary, other_name: str, other: Summary) -> str:
     lines = [f"{other_name} compared with {name}:"]
     for task in first.hits.keys() & other.hits.keys():
         shared = first.hits[task].keys() & other.hits[task].keys()
-        pairs = [(first.hits[task][path], other.hits[task][path]) for path in shared]
-        if not pairs:
+        if not shared:
             continue
-        gained = sum(b and not a for a, b in pairs)
-        lost = sum(a and not b for a, b in pairs)
-        n = len(pairs)
+        changes = Counter(
+            other.hits[task][path] - first.hits[task][path] for path in shared
+        )
+        gained = changes[1]
+        lost = changes[-1]
+        n = len(shared)
         change = (gained - lost) / n
         spread = math.sqrt(max(gained + lost - n * change**2, 0.0)) / n
         low = 100.0 * (change - 1.96 * spread)
@@ -180,14 +182,14 @@ class Summary:
     ) -> None:
         """Take in the events of one recording and its labels."""
         self.recordings += 1
-        decisions = [event for event in events if event["event"] == "decision"]
-        self.as_trained += any(
-            AS_TRAINED in decision["flags"] for decision in decisions
-        )
         # Of several decisions for a task, the first one stays.
-        first = {
-            d["task"]: printable(d["label"] or UNDECIDED) for d in reversed(decisions)
-        }
+        first: dict[str, str] = {}
+        as_trained = False
+        for event in events:
+            if event["event"] == "decision":
+                as_trained = as_trained or AS_TRAINED in event["flags"]
+                first.setdefault(event["task"], printable(event["label"] or UNDECIDED))
+        self.as_trained += as_trained
         for task in self._pairs.keys() & labels:
             truth = printable(labels[task])
             decided = first.get(task, UNDECIDED)

@@ -116,9 +116,8 @@ def spelled_like(label: str, labels: Sequence[str]) -> str:
     any."""
     from difflib import get_close_matches  # rarely needed, and slow to load
 
-    return "".join(
-        f"; did you mean {near!r}?" for near in get_close_matches(label, labels, 1, 0.8)
-    )
+    near = get_close_matches(label, labels, 1, 0.8)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def with_labels(info: ModelInfo, unknown: Mapping[str, Mapping[str, int]]) -> ModelInfo:

@@ -169,16 +169,13 @@ class Chain:
     def to_dict(self) -> dict[str, Any]:
         """The chain as a JSON object, which keeps every number exactly."""
         joints = []
-        for j in self.joints:
-            optional = {key: getattr(j, key) for key in (*STEPS, "limits")}
-            fields = {
-                k: list(value)
-                for k, value in optional.items()
-                if value not in (ZERO, None)
-            }
-            joints.append(
-                {"name": j.name, "axis": list(j.axis), "type": j.kind, **fields}
-            )
+        for joint in self.joints:
+            entry = {"name": joint.name, "axis": list(joint.axis), "type": joint.kind}
+            for key in (*STEPS, "limits"):
+                value = getattr(joint, key)
+                if value not in (ZERO, None):
+                    entry[key] = list(value)
+            joints.append(entry)
         return {"base": self.base, "tip": self.tip, "joint": joints}
 
     @classmethod
@@ -237,8 +234,7 @@ def _check_joint(joint: Joint) -> None:
     if joint.limits is not None and not joint.limits[0] <= joint.limits[1]:
         raise InputError(
             f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its "
-            "upper limit "
-            f"{joint.limits[1]:g}"
+            f"upper limit {joint.limits[1]:g}"
         )
 
 

@@ -143,14 +143,12 @@ class SkinLayout:
 
     def to_dict(self) -> dict[str, Any]:
         """The layout as the `skin` object of a recording's or a model's metadata."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        given = {
-            name: value for name, value in values.items() if value not in (None, ())
-        }
-        return {
-            k: list(value) if isinstance(value, tuple) else value
-            for k, value in given.items()
-        }
+        skin = {}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value not in (None, ()):
+                skin[field.name] = list(value) if isinstance(value, tuple) else value
+        return skin
 
     @classmethod
     def from_dict(cls, skin: Mapping[str, Any], where: str = "skin") -> Self:

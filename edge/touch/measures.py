@@ -79,8 +79,9 @@ def names(quantities: Sequence[str] = QUANTITIES) -> list[str]:
         quantities: of the zones; with those of `SHEAR` for a skin of three axes.
     """
     zones = [f"{zone}_{quantity}" for zone in ZONES for quantity in quantities]
-    names = [name for name in (*ALONE, *zones) if name not in PAPER]
-    return [*PAPER, *(name for name in names if name != "contact_max_force")]
+    unique = dict.fromkeys((*PAPER, *ALONE, *zones))
+    unique.pop("contact_max_force", None)
+    return list(unique)
 
 
 @lru_cache(maxsize=1024)

@@ -114,9 +114,7 @@ def _joint(
         ):
             child = element.find(tag)
             if child is not None and attribute in child.attrib:
-                joint[key] = [
-                    float(number) for number in child.attrib[attribute].split()
-                ]
+                joint[key] = list(map(float, child.attrib[attribute].split()))
         limits = _limits(path, element)
     if limits is not None and kind in ("revolute", "prismatic"):
         joint["limits"] = limits
@@ -130,7 +128,8 @@ def _limits(
     limit = element.find("limit")
     if limit is None:
         return None
-    low, high = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    low = float(limit.get("lower", "0"))
+    high = float(limit.get("upper", "0"))
     if low <= high:
         return [low, high]
     LOG.warning(
