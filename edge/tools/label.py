@@ -327,12 +327,21 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
 def _check_names(
     name: str, labels: Mapping[str, str], names: Mapping[str, str]
 ) -> None:
-    """Refuse a task's new name that another label of the recording has."""
+    """Refuse a task's new name that another label of the recording has or takes."""
+    former: dict[str, str] = {}
     for old, new in names.items():
-        if old in labels and new in labels:
+        if old not in labels:
+            continue
+        if new in labels:
             raise InputError(
                 f"{name}: has a label for {new} already; {old} cannot take its name"
             )
+        if new in former:
+            raise InputError(
+                f"{name}: has labels for both {former[new]} and {old}; only one of them "
+                f"can become {new}"
+            )
+        former[new] = old
 
 
 def changed(

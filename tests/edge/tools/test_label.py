@@ -75,6 +75,11 @@ def test_a_task_is_renamed_or_its_label_taken_away(folder, edge, change, labels)
     ("change", "sentence"),
     [
         (("--rename", "object=category"), "a.npz: has a label for category already"),
+        (
+            ("--rename", "object=thing", "--rename", "category=thing"),
+            "a.npz: has labels for both object and category; only one of them can "
+            "become thing",
+        ),
         (("--set", "object=x"), "b.npz: its contacts have labels of their own"),
     ],
 )
