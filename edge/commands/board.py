@@ -50,8 +50,7 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
             yield _missing(package)
     yield from _devices(root)
     groups = sorted(map(_group, {os.getegid(), *os.getgroups()}))
-    user = pwd.getpwuid(os.geteuid()).pw_name
-    yield Row("user", f"{user}; groups {', '.join(groups)}")
+    yield Row("user", f"{_user(os.geteuid())}; groups {', '.join(groups)}")
     yield from _state()
 
 
@@ -103,6 +102,14 @@ def _device(root: Path, device: Path, group: str) -> Row:
             f"may not be opened; run `sudo usermod -aG {group} $USER`, and log in again"
         )
     return Row(f"/dev/{device.name}", owner, remedy)
+
+
+def _user(number: int) -> str:
+    """The name of a user; the number where it has none, as in many containers."""
+    try:
+        return pwd.getpwuid(number).pw_name
+    except KeyError:
+        return str(number)
 
 
 def _group(number: int) -> str:
