@@ -227,7 +227,13 @@ class Graph:
                 for node in self._plan(tuple(names)):
                     self._compute(node, values)
             return [values[name] for name in names]
-        except (KeyError, IndexError, TypeError, ValueError, MemoryError) as error:
+        except (
+            ArithmeticError,
+            LookupError,
+            MemoryError,
+            TypeError,
+            ValueError,
+        ) as error:
             reason = f"{type(error).__name__}: {error}"
             raise InputError(f"the graph cannot be computed ({reason})") from None
 
