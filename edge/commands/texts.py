@@ -29,6 +29,15 @@ def wrapped(text: str, indent: str = "") -> list[str]:
     return textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent)
 
 
+def labels_text(labels: Mapping[str, str], between: str = ", ") -> str:
+    """The labels of a trial.
+
+    >>> labels_text({"object": "box", "mobility": "fixed"})
+    'object=box, mobility=fixed'
+    """
+    return between.join(f"{task}={label}" for task, label in labels.items())
+
+
 def event_text(line: Line) -> str:
     """An event as text for a person.
 
@@ -113,7 +122,7 @@ def _end(line: Line) -> str:
 
 
 def _saved(line: Line) -> str:
-    labels = ", ".join(f"{task}={label}" for task, label in line["labels"].items())
+    labels = labels_text(line["labels"])
     text = f"{line['seconds']:g} s, {line['frames']} frames, {labels}"
     if not line["complete"]:
         text += "; incomplete: reading stopped before the contact's end"

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from edge.commands.output import LOG, Output, counted
+from edge.commands.texts import labels_text
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import parsing, read_text, refusing
@@ -284,8 +285,7 @@ def _agreed(arguments: argparse.Namespace, output: Output, count: int) -> bool:
 
 
 def _text(labels: Mapping[str, str]) -> str:
-    parts = (f"{task}={label}" for task, label in labels.items())
-    return " ".join(parts) or "no label"
+    return labels_text(labels, " ") or "no label"
 
 
 def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
+from edge.commands.texts import labels_text
 from edge.errors import InputError
 from edge.files import refusing
 from edge.output.event_writer import Lines
@@ -378,8 +379,7 @@ class Recorder:
         if key in DIGITS[: len(self.choices)]:
             task, label = self.choices[DIGITS.index(key)]
             self.labels = {**self.labels, task: label}
-            texts = [f"{task}={label}" for task, label in self.labels.items()]
-            LOG.info(f"next: {', '.join(texts)}")
+            LOG.info(f"next: {labels_text(self.labels)}")
         elif key in ("d", "D") and self.paths:
             path = self.paths.pop()
             path.unlink(missing_ok=True)
