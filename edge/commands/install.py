@@ -15,7 +15,7 @@ from pathlib import Path
 
 from edge.commands.output import LOG, Output
 from edge.errors import EdgeError, InputError
-from edge.files import read_bytes
+from edge.files import read_bytes, refusing
 from edge.model.model import LARGEST_BYTES, Model
 from edge.model.verify import verify
 from edge.skin.file import load
@@ -143,13 +143,13 @@ def restart(service: str | None) -> None:
     """Restart a service, where there is one.
 
     Raises:
-        EdgeError: systemctl refuses.
+        EdgeError: systemctl refuses, or is not there.
     """
     if service is None:
         return
-    done = subprocess.run(
-        ["systemctl", "restart", service], capture_output=True, text=True, check=False
-    )
+    command = ["systemctl", "restart", service]
+    with refusing(f"{service} cannot be restarted with systemctl"):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         reason = done.stderr.strip() or f"exit status {done.returncode}"
         raise EdgeError(f"{service} cannot be restarted: {reason}")

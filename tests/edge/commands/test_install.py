@@ -83,6 +83,13 @@ def test_a_service_that_does_not_run_with_the_new_model_gets_the_former_one(
     assert restarted == ["robot", "robot"]
 
 
+def test_a_machine_without_systemd_is_told_so(edge, new, running, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    status, _, err = edge("install", new, "--to", running, "--service", "robot")
+    assert status == 2
+    assert "robot cannot be restarted with systemctl: No such file or directory" in err
+
+
 def test_a_service_is_watched_for_a_minute():
     looks = iter([True] * 29 + [False])
     slept = []
