@@ -157,10 +157,9 @@ class Classifier:
 
             self._policies = policies(model, error)
         self.tracker = model.info.tracker(
-            layout or model.info.layout,
-            max_contacts=max_contacts,
-            motion_on_skin=motion_on_skin,
+            layout or model.info.layout, max_contacts=max_contacts
         )
+        self.tracker.motion_on_skin = motion_on_skin
         self.layout = self.tracker.layout
         self._pending: list[Pending] = []
         self._numbers: dict[Contact, int] = {}

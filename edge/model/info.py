@@ -151,12 +151,8 @@ class ModelInfo:
         none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
-    def tracker(
-        self, layout: SkinLayout, *, max_contacts: int = 1, motion_on_skin: bool = False
-    ) -> WatchfulTracker:
+    def tracker(self, layout: SkinLayout, *, max_contacts: int = 1) -> WatchfulTracker:
         """A new tracker for a skin, with the model's rules and features.
-
-        The last two arguments are those of `ContactTracker`.
 
         Raises:
             InputError: the skin is not the one that the model was made for.
@@ -169,7 +165,6 @@ class ModelInfo:
             features=self.features,
             joints=self.joints,
             max_contacts=max_contacts,
-            motion_on_skin=motion_on_skin,
         )
 
     @classmethod

@@ -158,14 +158,17 @@ class SkinLayout:
             InputError: a value is missing or impossible; `where` names the file.
         """
         table = ConfigTable(skin, where, "skin.")
+        lines = range(1, MOST_LINES + 1)
         values: dict[str, Any] = {
-            name: table.whole(name, allowed=range(1, MOST_LINES + 1))
-            for name in ("rows", "cols")
+            "rows": table.whole("rows", allowed=lines),
+            "cols": table.whole("cols", allowed=lines),
+            "wraps": table.flag("wraps", False),
+            "row0_z_m": table.number("row0_z_m", 0.0, -LONGEST_M, LONGEST_M),
+            "dead": table.wholes("dead", ()),
         }
         for name in ("threshold_counts", "onset_counts"):
             if table.has(name):
                 values[name] = table.whole(name, allowed=range(65536))
-        values["wraps"] = table.flag("wraps", False)
         highest = {
             "radius_m": LONGEST_M,
             "counts_per_newton": math.inf,
@@ -174,9 +177,6 @@ class SkinLayout:
         for name, high in highest.items():
             if table.has(name):
                 values[name] = table.number(name, low=0.0, high=high, open_low=True)
-        values["row0_z_m"] = table.number(
-            "row0_z_m", 0.0, low=-LONGEST_M, high=LONGEST_M
-        )
         if table.has("pitch_m"):
             values["pitch_m"] = _pitch(table)
         if table.has("axes") and table.whole("axes", allowed=(1, 3)) == 3:
@@ -185,7 +185,6 @@ class SkinLayout:
             values["column_angles_deg"] = table.numbers(
                 "column_angles_deg", values["cols"]
             )
-        values["dead"] = table.wholes("dead", ())
         with about(where):
             layout = cls(**values)
         return layout

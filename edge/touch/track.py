@@ -69,10 +69,13 @@ class ContactTracker:
     Attributes:
         layout: the skin, with its thresholds.
         horizon_s: seconds from onset after which a contact's series takes in no more.
+        motion_on_skin: measure motion on the skin for a contact whose first frame has
+            no joint angles, where this is set; else its motion is unknown in frames
+            without them.
         region: the last frame's largest region.
     """
 
-    def __init__(  # noqa: PLR0913 - independent options, most with defaults
+    def __init__(
         self,
         layout: SkinLayout,
         debounce: int = DEBOUNCE,
@@ -82,7 +85,6 @@ class ContactTracker:
         features: Sequence[str] = PAPER,
         joints: int = 0,
         max_contacts: int = 1,
-        motion_on_skin: bool = False,
     ) -> None:
         """Follow contacts on a skin.
 
@@ -98,8 +100,6 @@ class ContactTracker:
                 `edge.touch.measures`); nothing else is measured.
             joints: joint angles of a frame, where a feature is made of them.
             max_contacts: how many are followed at once, the largest first.
-            motion_on_skin: measure motion on the skin for a contact whose first frame
-                has no joint angles; else its motion is unknown in frames without them.
 
         Raises:
             InputError: a feature does not exist, or `max_contacts` is below 1.
@@ -108,10 +108,10 @@ class ContactTracker:
             raise InputError(f"max_contacts must be at least 1, not {max_contacts!r}")
         self.layout = layout
         self.horizon_s = horizon_s
+        self.motion_on_skin = False
         self.region: Region | None = None
         self._debounce = debounce
         self._chain = chain
-        self._motion_on_skin = motion_on_skin
         self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
         self._contacts: list[Contact] = []
@@ -189,7 +189,7 @@ class ContactTracker:
         return room and region.peak > self.layout.onset
 
     def _begin(self, frame: Frame, region: Region) -> Contact:
-        on_skin = self._motion_on_skin and frame.joints is None
+        on_skin = self.motion_on_skin and frame.joints is None
         chain = None if on_skin else self._chain
         return Contact(region_time(frame, region), region, self._measurer, chain)
 
