@@ -134,13 +134,13 @@ class Builder:
         **attributes: Any,
     ) -> list[str]:
         """Add an operator, as `node`; returns the names of its outputs."""
-        taken = self._names(inputs)
+        input_names = self._names(inputs)
         names = [
             o or self._scope.get_unique_variable_name(operator.lower()) for o in outputs
         ]
         label = self._scope.get_unique_operator_name(operator)
         self._container.add_node(
-            operator, taken, names, op_version=OPSET, name=label, **attributes
+            operator, input_names, names, op_version=OPSET, name=label, **attributes
         )
         return names
 
@@ -219,8 +219,8 @@ def project(
     parts = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
         part = build if len(starts) == 1 else build.among(range(start, end), count)
-        taken = build.taken(x, columns[start], width)
-        parts.append(product(part, taken, decision_points[start:end], components))
+        selected = build.taken(x, columns[start], width)
+        parts.append(product(part, selected, decision_points[start:end], components))
     rounded, far = parts[0]
     for start, (later, later_far) in zip(starts[1:], parts[1:], strict=True):
         is_earlier = build.by_decision_point([point < start for point in range(count)])

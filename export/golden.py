@@ -44,8 +44,10 @@ def trimmed(recording: Recording, onset_s: float, model: Model) -> Recording:
     times = (onset_s - 0.25, onset_s + model.info.window_s)
     first, last = np.searchsorted(recording.t, times)
     valid = np.array(True) if recording.valid is None else recording.valid
-    whole = replace(recording, valid=np.broadcast_to(valid, recording.frames.shape))
-    return part(whole, slice(first, last + 2))
+    with_valid = replace(
+        recording, valid=np.broadcast_to(valid, recording.frames.shape)
+    )
+    return part(with_valid, slice(first, last + 2))
 
 
 def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:

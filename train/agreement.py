@@ -29,9 +29,9 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
 
 def _determines(a: Strings, b: Strings) -> bool:
     """Whether the labels b follow from the labels a."""
-    both = (a != "") & (b != "")
-    names = a[both].tolist()
-    pairs = set(zip(names, b[both].tolist(), strict=True))
+    labelled = (a != "") & (b != "")
+    names = a[labelled].tolist()
+    pairs = set(zip(names, b[labelled].tolist(), strict=True))
     return len(pairs) == len(set(names))
 
 
@@ -45,8 +45,8 @@ def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
     used_tasks: set[str] = set()
     for task, factors in products(y).items():
         tasks = (task, *factors)
-        met = set(zip(*(y[t].tolist() for t in tasks), strict=True))
-        pairs = sorted(filter(all, met))
+        rows = set(zip(*(y[t].tolist() for t in tasks), strict=True))
+        pairs = sorted(filter(all, rows))
         names = [sorted({*y[factor].tolist()} - {""}) for factor in factors]
         complete = 0 < len(pairs) == len(names[0]) * len(names[1])
         if complete and used_tasks.isdisjoint(tasks):

@@ -38,16 +38,16 @@ def arm_of(
     return chain
 
 
-def joint_angles(kept: Sequence[tuple[Recording, Path]]) -> int:
+def joint_angles(files: Sequence[tuple[Recording, Path]]) -> int:
     """The number of joint angles, the same for every recording."""
-    counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in kept]
-    for count, (_, path) in zip(counts, kept, strict=True):
+    counts = [0 if r.joints is None else r.joints.shape[1] for r, _ in files]
+    for count, (_, path) in zip(counts, files, strict=True):
         if count == 0:
             raise InputError(
                 f"{path}: has no joint angles; leave out the features made of them"
             )
         if count != counts[0]:
             raise InputError(
-                f"{path}: has {count} joint angles, {kept[0][1]} has {counts[0]}"
+                f"{path}: has {count} joint angles, {files[0][1]} has {counts[0]}"
             )
     return counts[0]

@@ -320,9 +320,9 @@ class Choosing:
             places = groups.by_other_fold(task, trials.folds, rule)
         choices = table.choices[task]
         without = [choices[place] for place in places]
-        picked = [trials.choices[task].index(choice) for choice in without]
+        trial_places = [trials.choices[task].index(choice) for choice in without]
         untouched = self._dataset.untouched_labels(task)
-        of_trials = promised(trials.answered(task, picked), untouched)
+        of_trials = promised(trials.answered(task, trial_places), untouched)
         promise = partial(promised, untouched=untouched, groups=count)
         candidates = self._candidate_rules(task, table)
         chosen = Chosen(

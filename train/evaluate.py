@@ -177,13 +177,13 @@ class _Fit:
         self,
         task: str,
         grid: SearchGrid,
-        near: Integers,
+        neighbours: Integers,
         members: Integers,
     ) -> Booleans:
         """(candidates, test) whether a grid's candidates are right, by the neighbours
         among some of the trials."""
         labels = self.classes[task]
-        right = votes_right(near, labels[members], labels[self.test])
+        right = votes_right(neighbours, labels[members], labels[self.test])
         places = [min(k, right.shape[-1]) - 1 for k in grid.neighbours]
         # One row for each candidate: for each projection, each k.
         rows = right[..., places].transpose(0, 2, 1)
@@ -203,11 +203,13 @@ def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, Booleans]:
                 if decomposed != scaled:
                     decomposed = scaled
                     decomposition = fit.decomposition(grid, counts)
-                near = None
+                neighbours = None
                 for task in tasks:
-                    if near is None or (grid.projection == "lda" and not grid.targets):
-                        near = decomposition.neighbours(grid, task)
-                    answers[task].append(fit.right(task, grid, near, members))
+                    if neighbours is None or (
+                        grid.projection == "lda" and not grid.targets
+                    ):
+                        neighbours = decomposition.neighbours(grid, task)
+                    answers[task].append(fit.right(task, grid, neighbours, members))
     return {task: np.concatenate(right) for task, right in answers.items()}
 
 
@@ -338,15 +340,15 @@ class AnswerTable:
         takes."""
         return self.answered(task, self.by_fold(task, rule))
 
-    def answered(self, task: str, picked: Sequence[int]) -> Result:
-        """The accuracy where the candidate `picked` for a fold answers the trials of
+    def answered(self, task: str, candidates: Sequence[int]) -> Result:
+        """The accuracy where the candidate `candidates` for a fold answers the trials of
         that fold."""
         hits = np.zeros(len(self.folds), dtype=bool)
-        for fold, candidate in enumerate(picked):
+        for fold, candidate in enumerate(candidates):
             in_fold = self.folds == fold
             hits[in_fold] = self.right[task][fold][candidate, in_fold]
         hits = hits[self.tested.get(task, self.folds >= 0)]
-        usual = self.choices[task][int(np.bincount(picked).argmax())]
+        usual = self.choices[task][int(np.bincount(candidates).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
 
 

@@ -212,8 +212,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     fixed = FitOptions(**options)
     loaded = load(data, fixed)
     y = _labels(loaded.dataset, fixed.tasks)
-    felt = [trial.labels for trial in loaded.dataset.trials]
-    doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(felt)]
+    labels = [trial.labels for trial in loaded.dataset.trials]
+    doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
     _check_size(len(loaded.dataset.trials), fixed.k)
     settings = choose(loaded, y, fixed)
     if loaded.dataset.is_own is not None:
@@ -326,8 +326,8 @@ def _with_thresholds(
     def accuracy(trials: DataSet) -> float:
         hasty = replace(options, quick=True, progress=False)
         y = _labels(trials, options.tasks)
-        few = hasty.choosing(trials, y, drawn=_are_drawn(trials))
-        return few.accuracy(windows[0])
+        choosing = hasty.choosing(trials, y, drawn=_are_drawn(trials))
+        return choosing.accuracy(windows[0])
 
     if options.threshold is not None or options.onset is not None:
         return by(options.threshold, options.onset)
@@ -548,11 +548,11 @@ def _leaks(dataset: DataSet, y: Mapping[str, Strings]) -> list[str]:
     squares = cdist(X[untouched], X[untouched], "sqeuclidean")
     np.fill_diagonal(squares, np.inf)
     notes = []
-    for task, every in y.items():
-        labelled = np.flatnonzero(every[untouched])
+    for task, all_labels in y.items():
+        labelled = np.flatnonzero(all_labels[untouched])
         if len(labelled) < 2:
             continue
-        labels = every[untouched][labelled]
+        labels = all_labels[untouched][labelled]
         nearest = squares[np.ix_(labelled, labelled)].argmin(axis=1)
         share = float((labels[nearest] == labels).mean())
         _, counts = np.unique(labels, return_counts=True)
@@ -573,8 +573,8 @@ def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
     proposal = thresholds.proposed(recordings)
     low = proposal.threshold
     high = proposal.onset
-    felt, _ = thresholds.count_contacts(recordings, low, high)
-    if felt >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
+    with_contact, _ = thresholds.count_contacts(recordings, low, high)
+    if with_contact >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
         mend += f", or take --threshold {low} --onset {high}, by which it begins later"
     return (
         f"warning: {share:.0%} of the touches begin with their recording, so their "

@@ -73,11 +73,11 @@ def _holds(triple: tuple[str, ...], trials: Sequence[Mapping[str, str]]) -> bool
     """Whether the first task's labels are those of the two others in every trial that
     has all three; where none has, whether the triple is `JOINED`."""
     product, *factors = triple
-    whole = [labels for labels in trials if labels.keys() >= set(triple)]
-    names = ["-".join(labels[factor] for factor in factors) for labels in whole]
-    if names != [labels[product] for labels in whole]:
+    complete = [labels for labels in trials if labels.keys() >= set(triple)]
+    names = ["-".join(labels[factor] for factor in factors) for labels in complete]
+    if names != [labels[product] for labels in complete]:
         return False
-    return bool(whole) or triple == JOINED
+    return bool(complete) or triple == JOINED
 
 
 def shared_tasks(

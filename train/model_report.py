@@ -101,9 +101,9 @@ def _left_out(
     space = _space(model, task, index[train])
     form = vectors.features, vectors.columns
 
-    def numbered(near: Any) -> Any:
+    def numbered(neighbour: Any) -> Any:
         """The training trial under its number among all trials; None stays None."""
-        return near and near._replace(row=int(train[near.row]))
+        return neighbour and neighbour._replace(row=int(train[neighbour.row]))
 
     explained = {}
     for place, (trial, answer) in enumerate(
@@ -293,16 +293,16 @@ def _picture(
     measured = fitted.measured
     why = answer.explained[trial]
     wrong = str(answer.answers[-1][trial])
-    near = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
+    neighbours = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
     entries = []
-    for n in near:
+    for n in neighbours:
         label = answer.classes[n.label]
         series = measured.trials[n.row].series
         entries.append(
             (f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong)
         )
     title = f"{trials[trial]}: classified as {wrong}, labelled {answer.truth[trial]}"
-    rival = answer.classes[near[-1].label]
+    rival = answer.classes[neighbours[-1].label]
     case = Case(title, measured.trials[trial].series, entries, why.pulls, rival)
 
     def draw(canvas: Any, phone: bool) -> None:

@@ -109,8 +109,8 @@ class NoveltySpace:
         shift = _shift(axes, STORED_BITS)
         weights = np.rint(np.ldexp(axes, shift))
         points = []
-        for scale, whole in zip(scales, steps, strict=True):
-            z = _product(whole, weights, shift)
+        for scale, of_point in zip(scales, steps, strict=True):
+            z = _product(of_point, weights, shift)
             points.append(_point(*scale, z, labels))
         return cls(weights, shift, tuple(points))
 
@@ -190,8 +190,8 @@ def _shift(values: Floats, bits: int) -> int:
 
 def _coordinates(z: Floats, point: NoveltyPoint) -> Floats:
     """Whole coordinates (m, components) of components."""
-    whole = _product(z, point.whitening, point.shift)
-    return np.asarray(np.clip(whole, -FARTHEST, FARTHEST))
+    integers = _product(z, point.whitening, point.shift)
+    return np.asarray(np.clip(integers, -FARTHEST, FARTHEST))
 
 
 def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoint:
@@ -208,10 +208,10 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     values, axes = np.linalg.eigh(covariance)
     whitening = axes / np.sqrt(values)
     fine = _shift(whitening, WHITENING_BITS)
-    whole = np.rint(np.ldexp(whitening, fine))
+    integers = np.rint(np.ldexp(whitening, fine))
     digits = _shift(z @ whitening, STORED_BITS - 1)
     unit = 2.0 ** -(digits + STEP_BITS)
-    point = NoveltyPoint(mean, gain, whole, fine - digits, z, unit)
+    point = NoveltyPoint(mean, gain, integers, fine - digits, z, unit)
     return replace(point, rows=_coordinates(z, point))
 
 

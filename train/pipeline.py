@@ -153,8 +153,8 @@ def how_often(
     """(n,) how often each trial counts; see `Choice.counts`."""
     if is_own is None:
         return labelled.astype(np.int64)
-    simulated, own = weights
-    return np.where(labelled, np.where(is_own, own, simulated), 0)
+    simulated, of_owner = weights
+    return np.where(labelled, np.where(is_own, of_owner, simulated), 0)
 
 
 def fittable(
@@ -250,10 +250,10 @@ class ContactClassifier:
         self._fit_spaces(X, y, counts)
         self._set_labels(y)
         if complete:
-            used = {}
+            counting = {}
             for task, space in self.spaces_.items():
-                used[task] = np.where(counts[space] > 0, y[task], "")
-            self.products_ = factors_of(used)
+                counting[task] = np.where(counts[space] > 0, y[task], "")
+            self.products_ = factors_of(counting)
             vectors = Vectors(X, y, self.features, self.widths, is_own)
             self.slopes_ = self._slopes(vectors)
         return self
@@ -338,10 +338,10 @@ class ContactClassifier:
             model = ContactClassifier.of(choices, others, complete=False)
             for task, classes in model.classes_.items():
                 labels = vectors.y[task]
-                used = self.choices[task].counts(labels, vectors.is_own) > 0
-                met = new & used & np.isin(labels, classes)
+                counting = self.choices[task].counts(labels, vectors.is_own) > 0
+                tested = new & counting & np.isin(labels, classes)
                 if len(classes) > 1:
-                    gaps[task] += model._gaps(task, vectors.X[met], labels[met])
+                    gaps[task] += model._gaps(task, vectors.X[tested], labels[tested])
         return {task: slope(np.array(task_gaps)) for task, task_gaps in gaps.items()}
 
     def _gaps(self, task: str, X: Floats, labels: Strings) -> list[float]:

@@ -89,14 +89,14 @@ class Course:
     def under(self, rule: StoppingRule) -> tuple[Integers, Booleans]:
         """(n,) the decision point at which a rule decides, and whether the answer is
         wrong."""
-        every = np.arange(self.unknown.shape[1])
+        trials = np.arange(self.unknown.shape[1])
         at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
         last = np.max(at, axis=0)
         by_part = [
-            wrong[part, every] for wrong, part in zip(self.wrong, at, strict=True)
+            wrong[part, trials] for wrong, part in zip(self.wrong, at, strict=True)
         ]
         return last, np.any(
-            [*by_part, self.unknown[last, every] & self.withheld], axis=0
+            [*by_part, self.unknown[last, trials] & self.withheld], axis=0
         )
 
 
@@ -137,15 +137,15 @@ def certify(
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
     passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))
-    kept: list[StoppingRule] = []
+    best: list[StoppingRule] = []
     for rule in passed:
-        if rule.error < 1.0 and (not kept or rule.mean_s < kept[-1].mean_s - 1e-9):
-            kept.append(rule)
-    return kept or [passed[0]]
+        if rule.error < 1.0 and (not best or rule.mean_s < best[-1].mean_s - 1e-9):
+            best.append(rule)
+    return best or [passed[0]]
 
 
 def following(
-    own: Sequence[StoppingRule],
+    factor: Sequence[StoppingRule],
     product: Sequence[StoppingRule],
     course: Course,
     seconds: Floats,
@@ -155,7 +155,7 @@ def following(
 
     A factor is wrong only where its product is, so it may follow the product's rules.
     """
-    stricter = [rule for rule in own if rule.error < product[0].error]
+    stricter = [rule for rule in factor if rule.error < product[0].error]
     followed = [
         replace(rule, mean_s=float(seconds[course.under(rule)[0]].mean()))
         for rule in product

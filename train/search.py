@@ -78,23 +78,25 @@ class SearchGrid:
         ]
 
 
-def _nearest(known: Floats, tested: Floats, k: int) -> Integers:
-    """(m, k) rows of `known` (n, c) nearest to each of `tested` (m, c), equal ones in
+def _nearest(training: Floats, tested: Floats, k: int) -> Integers:
+    """(m, k) rows of `training` (n, c) nearest to each of `tested` (m, c), equal ones in
     their order.
 
     Which of several equal ones is the last of the k is left open. The coordinates are
     whole numbers, whose squared distances are exact. scikit-learn never holds all (m,
     n) of them and is fast for many, but it checks its input for longer than a few take.
     """
-    if not known.shape[1]:
+    if not training.shape[1]:
         return np.tile(np.arange(k), (len(tested), 1))
-    if len(known) * len(tested) > MANY:
+    if len(training) * len(tested) > MANY:
         search = NearestNeighbors(
             n_neighbors=k, algorithm="brute", metric="sqeuclidean"
-        ).fit(known)
+        ).fit(training)
         squares, rows = search.kneighbors(tested)
     else:
-        squares = np.einsum("ij,ij->i", known, known) - 2.0 * (tested @ known.T)
+        squares = np.einsum("ij,ij->i", training, training) - 2.0 * (
+            tested @ training.T
+        )
         rows = np.argpartition(squares, k - 1, axis=1)[:, :k]
         squares = np.take_along_axis(squares, rows, axis=1)
     order = np.lexsort((rows, squares), axis=1)
@@ -152,11 +154,11 @@ class Decomposition:
         k = min(grid.neighbours[-1], len(self._first))
         if grid.projection == "pca":
             axes = self._spectrum.leading(grid.components[-1]).T
-            known, tested = _rounded(
+            training, tested = _rounded(
                 self._spectrum.rows[self._first] @ axes, self._new @ axes
             )
             return np.stack(
-                [_nearest(known[:, :c], tested[:, :c], k) for c in grid.components]
+                [_nearest(training[:, :c], tested[:, :c], k) for c in grid.components]
             )
         places = []
         for shrinkage in grid.shrinkages:
@@ -165,8 +167,8 @@ class Decomposition:
                 for target in grid.targets or (task,)
             ]
             coordinates = (
-                np.hstack(some)[:, : grid.most_directions]
-                for some in zip(*parts, strict=True)
+                np.hstack(pair)[:, : grid.most_directions]
+                for pair in zip(*parts, strict=True)
             )
             places.append(_nearest(*_rounded(*coordinates), k))
         return np.stack(places)

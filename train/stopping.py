@@ -388,9 +388,9 @@ class SequentialClassifier:
     def _fit_points(self, vectors: Vectors) -> Vectors:
         """Fit the classifier of each decision point; the vectors that these take."""
         choices = [choice for at in self.choices_at for choice in at.values()]
-        taken = _taken(choices, self.features)
-        self.columns_ = columns_of(taken, self.features, vectors.columns)
-        names, widths = types_of(taken, self.features, vectors.columns)
+        features = _taken(choices, self.features)
+        self.columns_ = columns_of(features, self.features, vectors.columns)
+        names, widths = types_of(features, self.features, vectors.columns)
         self.n_features_in_ = len(self.columns_)
         X = np.ascontiguousarray(vectors.X[..., self.columns_])
         vectors = replace(vectors, X=X, features=names, widths=widths)

@@ -65,20 +65,20 @@ def test_each_candidate_has_a_price(fitted):
 
 def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     fitted = train.fit(str(recordings), features=["paper", "contact"], jobs=1, k=1)
-    own = {task: chosen.choice for task, chosen in fitted.chosen.items()}
-    own["category"] = replace(own["category"], features=("log_max_force@5",))
+    choices = {task: chosen.choice for task, chosen in fitted.chosen.items()}
+    choices["category"] = replace(choices["category"], features=("log_max_force@5",))
     names = fitted.dataset.names
     widths = fitted.dataset.widths(fitted.samples)
-    classifier = train.fitting.ContactClassifier(own, names, widths)
-    y = {task: fitted.dataset.labels(task) for task in own}
+    classifier = train.fitting.ContactClassifier(choices, names, widths)
+    y = {task: fitted.dataset.labels(task) for task in choices}
     classifier.fit(fitted.X, y)
     path = tmp_path / "model.onnx"
     export.save(path, replace(fitted, classifier=classifier, sequential=None))
     queries = 1.01 * fitted.X
-    seen = Model(path).run(queries)
-    for task in own:
+    answers = Model(path).run(queries)
+    for task in choices:
         _, rows = classifier.neighbours(task, queries)
-        assert (seen[f"{task}_neighbours"] == rows).all()
+        assert (answers[f"{task}_neighbours"] == rows).all()
 
 
 def test_recordings_of_no_contact_are_decided_as_such(recordings, make_touch, tmp_path):
@@ -88,6 +88,6 @@ def test_recordings_of_no_contact_are_decided_as_such(recordings, make_touch, tm
     fitted = train.fit(paths, features=["paper"], projection="pca", jobs=1)
     assert not any("no contact" in line for line in warnings(fitted))
     export.save(tmp_path / "model.onnx", fitted)
-    (said,) = Classifier(Model(tmp_path / "model.onnx")).classify(still)
-    assert said.task == "category"
-    assert said.label == "none"
+    (decision,) = Classifier(Model(tmp_path / "model.onnx")).classify(still)
+    assert decision.task == "category"
+    assert decision.label == "none"

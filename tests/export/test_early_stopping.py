@@ -88,12 +88,14 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
     for point, fitted in enumerate(sequential.decision_points_):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
-            own = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
-            assert own.shape[1] == size
-            nearest = np.sort(own, axis=1)[:, :count]
-            given = model.run(queries, point)["t_label_distances"][:, label]
+            squares = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
+            assert squares.shape[1] == size
+            nearest = np.sort(squares, axis=1)[:, :count]
+            distances = model.run(queries, point)["t_label_distances"][:, label]
             expected = [mean_of_roots(row, fitted.unit("t")) for row in nearest]
-            assert given.tolist() == [fitted.slopes_["t"] * mean for mean in expected]
+            assert distances.tolist() == [
+                fitted.slopes_["t"] * mean for mean in expected
+            ]
 
 
 @pytest.fixture(scope="module")

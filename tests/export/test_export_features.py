@@ -16,8 +16,8 @@ SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate
 
 @pytest.fixture(scope="module")
 def six(recordings, tmp_path_factory):
-    given = "--samples 20 --scaling IV --projection pca --features".split()
-    return export(tmp_path_factory.mktemp("six"), "--data", recordings, *given, *SIX)
+    words = "--samples 20 --scaling IV --projection pca --features".split()
+    return export(tmp_path_factory.mktemp("six"), "--data", recordings, *words, *SIX)
 
 
 def test_the_model_says_what_it_measures_and_in_which_units(six):
@@ -35,8 +35,8 @@ def test_the_model_says_what_it_measures_and_in_which_units(six):
 def test_a_value_that_is_not_finite_is_named_by_its_feature_and_place(six, value):
     vector = np.zeros(110)
     vector[105] = value
-    said = "value 105 .*, of contact_area_rate@10, is not finite"
-    with pytest.raises(InputError, match=said):
+    sentence = "value 105 .*, of contact_area_rate@10, is not finite"
+    with pytest.raises(InputError, match=sentence):
         Model(six / "model.onnx").decide(vector)
 
 
@@ -52,8 +52,8 @@ def test_its_golden_file_holds(six, edge):
 def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
     recordings, tmp_path, edge
 ):
-    given = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
-    export(tmp_path, "--data", recordings, *given)
+    words = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
+    export(tmp_path, "--data", recordings, *words)
     model = Model(tmp_path / "model.onnx")
     biases = [len(table.biases) for table in model.info.kernels.values()]
     assert sum(biases) == model.info.width
@@ -63,5 +63,5 @@ def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
     dataset = load_trials([recordings], Measurement(model.info.features)).with_kernels(
         1.2
     )
-    own = [model.info.vector(trial.series) for trial in dataset.trials]
-    assert (np.stack(own) == dataset.features(1.2)).all()
+    vectors = [model.info.vector(trial.series) for trial in dataset.trials]
+    assert (np.stack(vectors) == dataset.features(1.2)).all()

@@ -18,11 +18,11 @@ def data(recordings):
 
 @pytest.mark.parametrize("count", [1, 4, 16, 100])
 def test_the_trials_spread_over_the_labels_of_the_finest_task(data, count):
-    chosen = trials_of(data, count)
-    assert chosen == sorted(set(chosen))
-    assert len(chosen) == min(count, 16)
+    trials = trials_of(data, count)
+    assert trials == sorted(set(trials))
+    assert len(trials) == min(count, 16)
     if count >= 4:
-        assert {data.labels("object")[i] for i in chosen} == set(data.labels("object"))
+        assert {data.labels("object")[i] for i in trials} == set(data.labels("object"))
 
 
 def test_trimming_keeps_every_frame_that_the_window_uses(exported, data):

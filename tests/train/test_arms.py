@@ -15,8 +15,8 @@ def test_an_arm_is_the_recordings_own_or_the_one_given_or_codys(make_touch):
     first_joint = replace(touch, joints=touch.joints[:, :1])
     assert arm_of(touch, "a").names == Chain.cody().names
     assert arm_of(first_joint, "a", swing) is swing
-    own = replace(first_joint, meta={**first_joint.meta, "arm": swing.to_dict()})
-    assert arm_of(own, "a").to_dict() == swing.to_dict()
+    with_arm = replace(first_joint, meta={**first_joint.meta, "arm": swing.to_dict()})
+    assert arm_of(with_arm, "a").to_dict() == swing.to_dict()
     assert (
         arm_of(replace(first_joint, meta={**first_joint.meta, "arm": None}), "a", swing)
         is None

@@ -30,8 +30,8 @@ SKIN = SkinLayout(
 )
 
 
-def series_of(frames, wanted, joints=0):
-    return followed(SKIN, frames, features=wanted, joints=joints).series()
+def series_of(frames, features, joints=0):
+    return followed(SKIN, frames, features=features, joints=joints).series()
 
 
 def touch(peaks, step=0.25, joints=None):
@@ -46,8 +46,10 @@ def touch(peaks, step=0.25, joints=None):
     return frames
 
 
-def vector_of(frames, *wanted, samples=5, window=1.0, **options):
-    return feature_vector(series_of(frames, wanted, **options), window, samples, wanted)
+def vector_of(frames, *features, samples=5, window=1.0, **options):
+    return feature_vector(
+        series_of(frames, features, **options), window, samples, features
+    )
 
 
 PEAKS = (100, 300, 200, 400, 400)
@@ -82,8 +84,8 @@ def test_units_are_those_of_the_skin():
 
 
 def test_sets_and_features_expand_to_features_in_their_order_each_once():
-    given = ["contact_area", "paper", "skin_force"]
-    assert expand(given) == (
+    names = ["contact_area", "paper", "skin_force"]
+    assert expand(names) == (
         "contact_area",
         "max_force",
         "contact_motion",
@@ -94,34 +96,34 @@ def test_sets_and_features_expand_to_features_in_their_order_each_once():
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
 @pytest.mark.parametrize("samples", [2, 10, 40])
 def test_a_vector_has_the_widths_that_are_told(name, samples):
-    wanted = SETS[name]
+    features = SETS[name]
     frames = touch(PEAKS, joints=np.zeros((5, 3)))
-    vector = vector_of(frames, *wanted, samples=samples, joints=3)
-    column_counts = widths(wanted, samples, SKIN, joints=3)
-    assert len(column_counts) == len(wanted)
+    vector = vector_of(frames, *features, samples=samples, joints=3)
+    column_counts = widths(features, samples, SKIN, joints=3)
+    assert len(column_counts) == len(features)
     assert len(vector) == sum(column_counts)
     assert np.isfinite(vector).all()
 
 
 def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
-    wanted = [
+    features = [
         "max_force",
         "max_force_mean",
         "taxel_force@10",
         "sqrt_taxel_force_deviation",
     ]
-    assert widths(wanted, 40, SKIN) == (40, 1, 230, 23)
-    wanted = ["joint_change", "joint_angle_mean@9", "taxel_force", "max_force_rate@3"]
-    assert widths(wanted, 4, SKIN, 7) == (28, 7, 92, 3)
+    assert widths(features, 40, SKIN) == (40, 1, 230, 23)
+    features = ["joint_change", "joint_angle_mean@9", "taxel_force", "max_force_rate@3"]
+    assert widths(features, 4, SKIN, 7) == (28, 7, 92, 3)
 
 
 def test_a_name_says_its_own_number_of_times():
-    few = vector_of(
+    vector = vector_of(
         touch(PEAKS), "max_force@3", "max_force", "taxel_force_mean@2", samples=5
     )
-    assert few[:3].tolist() == [1.0, 2.0, 4.0]
-    assert few[3:8].tolist() == [p / 100 for p in PEAKS]
-    assert few[8 + 6] == (1.0 + 4.0) / 2
+    assert vector[:3].tolist() == [1.0, 2.0, 4.0]
+    assert vector[3:8].tolist() == [p / 100 for p in PEAKS]
+    assert vector[8 + 6] == (1.0 + 4.0) / 2
     assert vector_of(touch(PEAKS), "max_force_rate@3").tolist() == [2.0, 3.0, 4.0]
 
 
@@ -147,31 +149,31 @@ def test_summaries_are_one_number_of_the_transformed_samples():
     mean = math.fsum(roots) / 5
     deviation = math.sqrt(math.fsum((r - mean) ** 2 for r in roots) / 5)
     steps = [abs(b - a) for a, b in pairwise(roots)]
-    seen = vector_of(
+    vector = vector_of(
         touch(PEAKS),
         "sqrt_max_force_mean",
         "sqrt_max_force_deviation",
         "sqrt_max_force_roughness",
     )
-    assert seen == pytest.approx(
+    assert vector == pytest.approx(
         [mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15
     )
 
 
 def test_the_floor_of_a_logarithm_is_the_least_that_is_in_contact():
     frames = touch([100, 100, 0, 0, 0])
-    seen = vector_of(
+    vector = vector_of(
         frames,
         "log_max_force",
         "log_contact_area",
         "log_force_motion",
         "log_taxel_force_mean",
     )
-    assert seen[4] == math.log(0.1)  # a threshold of 9 counts, 100 counts a newton
-    assert seen[9] == math.log(1.0)
-    assert seen[14] == pytest.approx(math.log(0.002))  # a tenth of 20 mm
-    assert seen[15] == pytest.approx(math.log(0.1))  # a taxel that was never touched
-    assert seen[0] == math.log(1.0 + 0.1)
+    assert vector[4] == math.log(0.1)  # a threshold of 9 counts, 100 counts a newton
+    assert vector[9] == math.log(1.0)
+    assert vector[14] == pytest.approx(math.log(0.002))  # a tenth of 20 mm
+    assert vector[15] == pytest.approx(math.log(0.1))  # a taxel that was never touched
+    assert vector[0] == math.log(1.0 + 0.1)
 
 
 def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
@@ -182,32 +184,32 @@ def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
         frames, "skin_pressure", "left_pressure", window=0.5, samples=3
     )
     assert pressure == pytest.approx([0.75, 3.5 / 3, 0.0, 0.75, 0.75, 0.0])
-    wanted = ["stiffness", "skin_force", "force_motion"]
+    features = ["stiffness", "skin_force", "force_motion"]
     stiffness, force, motion = vector_of(
-        frames, *wanted, window=0.5, samples=3
+        frames, *features, window=0.5, samples=3
     ).reshape(3, 3)
     assert stiffness[:2] == pytest.approx((force[:2] + 0.1) / (motion[:2] + 0.002))
     assert stiffness[0] == pytest.approx(1.6 / 0.002)
 
 
 def test_cells_follow_in_their_places_and_have_one_largest_value():
-    seen = vector_of(touch(PEAKS), "relative_taxel_force", samples=5).reshape(23, 5)
+    vector = vector_of(touch(PEAKS), "relative_taxel_force", samples=5).reshape(23, 5)
     # Row 1, column 1 is cell 6, as the cell before it is dead.
-    assert seen[6].tolist() == [0.25, 0.75, 0.5, 1.0, 1.0]
-    assert seen[7].tolist() == [0.125, 0.375, 0.25, 0.5, 0.5]
-    assert np.count_nonzero(seen.any(axis=1)) == 2
+    assert vector[6].tolist() == [0.25, 0.75, 0.5, 1.0, 1.0]
+    assert vector[7].tolist() == [0.125, 0.375, 0.25, 0.5, 0.5]
+    assert np.count_nonzero(vector.any(axis=1)) == 2
 
 
 def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
     angles = np.array([[1.0, -2.0], [1.5, -2.0], [2.0, -2.5], [2.0, -3.0], [2.0, -3.0]])
-    seen = vector_of(
+    vector = vector_of(
         touch(PEAKS, joints=angles),
         "joint_change",
         "joint_angle",
         "joint_change_rate",
         joints=2,
     )
-    change, angle, rate = seen.reshape(3, 2, 5)
+    change, angle, rate = vector.reshape(3, 2, 5)
     assert change.tolist() == (angles - angles[0]).T.tolist()
     assert angle.tolist() == angles.T.tolist()
     assert rate.tolist() == np.gradient(angles.T, 0.25, axis=1).tolist()
@@ -258,10 +260,10 @@ def exactly(transform, forces):
     transform=st.sampled_from(TRANSFORMS),
 )
 def test_transforms_are_within_four_roundings_of_exact_arithmetic(peaks, transform):
-    seen = vector_of(touch(peaks), f"{transform}_skin_force")
+    vector = vector_of(touch(peaks), f"{transform}_skin_force")
     halves = [peak // 2 if peak // 2 > SKIN.threshold_counts else 0 for peak in peaks]
     forces = [Fraction(p + half, 100) for p, half in zip(peaks, halves, strict=True)]
     roundings = 4 * 2.0**-53
     # A logarithm near 0 keeps the rounding of its argument.
     rest = roundings if transform == "log" else 0
-    assert seen == pytest.approx(exactly(transform, forces), rel=roundings, abs=rest)
+    assert vector == pytest.approx(exactly(transform, forces), rel=roundings, abs=rest)

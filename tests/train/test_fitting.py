@@ -24,10 +24,10 @@ def fitted(recordings):
 
 def test_each_task_has_its_own_choice_and_the_model_measures_what_they_take(fitted):
     assert set(fitted.chosen) == {"category", "object"}
-    taken = {
+    features = {
         name for settings in fitted.chosen.values() for name in settings.choice.features
     }
-    assert set(fitted.dataset.names) == taken
+    assert set(fitted.dataset.names) == features
     assert fitted.X.shape == (16, sum(fitted.dataset.widths(fitted.samples)))
     assert len(fitted.measured.names) > len(fitted.dataset.names)
 
@@ -41,17 +41,17 @@ def test_the_number_that_is_told_is_that_of_the_whole_choice(fitted):
 
 def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
     data = load_trials([recordings], Measurement(["max_force", "contact_area"]))
-    given = {
+    fixed = {
         "features": ["max_force", "contact_area"],
         "projection": "pca",
         "scaling": "IV",
     }
-    fitted = train.fit(data, **given, leave_out="trial", decision_points_s=(), jobs=1)
+    fitted = train.fit(data, **fixed, leave_out="trial", decision_points_s=(), jobs=1)
     assert fitted.chosen["category"].left_out == "trial"
     assert fitted.sequential is None
-    said = fitted.classifier.decide(fitted.X)["category"].labels
+    labels = fitted.classifier.decide(fitted.X)["category"].labels
     assert (
-        fitted.classifier.classes_["category"][said] == data.labels("category")
+        fitted.classifier.classes_["category"][labels] == data.labels("category")
     ).all()
 
 
@@ -123,9 +123,9 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     alone = train.fit(
         paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1
     )
-    seen, before = (f.chosen["category"].accuracy for f in (both, alone))
-    assert seen.right == before.right + 1
-    assert seen.total == before.total + 2
+    after, before = (f.chosen["category"].accuracy for f in (both, alone))
+    assert after.right == before.right + 1
+    assert after.total == before.total + 2
 
 
 @pytest.fixture

@@ -25,14 +25,14 @@ def test_biases_are_quantiles_of_the_results_of_training(biases):
     results = np.concatenate(
         [convolved(shifted(t, table.shifts)) for t in TOUCHES], axis=1
     )
-    own = results[convolution_of_bias(biases)]
+    of_bias = results[convolution_of_bias(biases)]
     assert all(
-        bias in row for bias, row in zip(table.biases, own.tolist(), strict=True)
+        bias in row for bias, row in zip(table.biases, of_bias.tolist(), strict=True)
     )
     limits = np.array(table.biases)[:, None]
     shares = np.arange(1, biases + 1) * (np.sqrt(5) + 1) / 2 % 1
-    assert ((own < limits).mean(axis=1) <= shares).all()
-    assert (shares < (own <= limits).mean(axis=1)).all()
+    assert ((of_bias < limits).mean(axis=1) <= shares).all()
+    assert (shares < (of_bias <= limits).mean(axis=1)).all()
 
 
 def test_the_same_touches_give_the_same_table():

@@ -17,12 +17,12 @@ SIMULATED = {
 
 def test_softness_and_mobility_follow_from_the_category_and_the_reverse():
     halves = {"softness": "soft", "mobility": "fixed"}
-    own = completed(
+    labels = completed(
         [SIMULATED, {"category": "soft-fixed"}, halves, {"mobility": "movable"}]
     )
-    assert own[0] == SIMULATED
-    assert own[1] == own[2] == {"category": "soft-fixed", **halves}
-    assert own[3] == {"mobility": "movable"}
+    assert labels[0] == SIMULATED
+    assert labels[1] == labels[2] == {"category": "soft-fixed", **halves}
+    assert labels[3] == {"mobility": "movable"}
 
 
 def test_labels_of_other_tasks_follow_where_all_trials_that_have_them_agree():

@@ -12,13 +12,13 @@ from train.parts import part
 def test_every_array_of_frames_is_taken_and_other_fields_stay(make_touch, frames):
     touch = make_touch()
     valid = np.ones(touch.frames.shape, bool)
-    taken = part(replace(touch, valid=valid), frames, meta={"labels": {}})
-    assert taken.t.tolist() == touch.t[frames].tolist()
-    assert (taken.frames == touch.frames[frames]).all()
-    assert (taken.joints == touch.joints[frames]).all()
-    assert taken.valid.shape == taken.frames.shape
-    assert taken.shear is None
-    assert taken.meta == {"labels": {}}
+    shorter = part(replace(touch, valid=valid), frames, meta={"labels": {}})
+    assert shorter.t.tolist() == touch.t[frames].tolist()
+    assert (shorter.frames == touch.frames[frames]).all()
+    assert (shorter.joints == touch.joints[frames]).all()
+    assert shorter.valid.shape == shorter.frames.shape
+    assert shorter.shear is None
+    assert shorter.meta == {"labels": {}}
 
 
 def test_taxels_that_can_never_be_read_stay(make_touch, forearm):

@@ -76,7 +76,8 @@ def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
     choices = dict.fromkeys(y, Choice("none", 1, 1, "lda", 1e-3, weights=(0, 1)))
     model = ContactClassifier(choices, ["max_force"], [200]).fit(X, y)
     gaps = {
-        task: np.ptp(each.distances, axis=1) for task, each in model.decide(X).items()
+        task: np.ptp(decision.distances, axis=1)
+        for task, decision in model.decide(X).items()
     }
     assert gaps["random"].max() < 2.0 < gaps["real"].min()
     # Simulated trials that count for nothing say nothing either, though here they are

@@ -22,10 +22,10 @@ class TestStops:
     CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
 
     def stop(self, unknown=(), **rule):
-        given = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
+        usual = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
         waits = np.zeros((3, 3), dtype=bool)
         waits[tuple(np.array(unknown, dtype=int).reshape(-1, 2).T)] = True
-        return stops(self.CONFIDENCE, StoppingRule(**{**given, **rule}), waits).tolist()
+        return stops(self.CONFIDENCE, StoppingRule(**{**usual, **rule}), waits).tolist()
 
     def test_at_the_first_decision_point_that_is_sure(self):
         assert self.stop() == [0, 1, 0]
@@ -120,8 +120,8 @@ class TestProduct:
         self,
     ):
         rules = [StoppingRule(0.2, 1.2, NEVER, 2), StoppingRule(0.3, 1.0, 0.7, 2)]
-        own = [StoppingRule(0.1, 0.8, 0.9, 2), StoppingRule(0.25, 0.5, 0.6, 2)]
-        given = following(own, rules, course(self.FAST, self.WRONG), SECONDS)
-        assert [rule.error for rule in given] == [0.1, 0.2, 0.3]
-        assert [rule.mean_s for rule in given] == [0.8, 1.2, 0.4]
-        assert given[2].confidence == rules[1].confidence
+        of_factor = [StoppingRule(0.1, 0.8, 0.9, 2), StoppingRule(0.25, 0.5, 0.6, 2)]
+        followed = following(of_factor, rules, course(self.FAST, self.WRONG), SECONDS)
+        assert [rule.error for rule in followed] == [0.1, 0.2, 0.3]
+        assert [rule.mean_s for rule in followed] == [0.8, 1.2, 0.4]
+        assert followed[2].confidence == rules[1].confidence

@@ -41,10 +41,10 @@ def test_a_trial_that_counts_twice_is_found_once():
 @pytest.mark.parametrize("n", [20, MANY // 30 + 1])
 def test_few_and_many_trials_have_the_neighbours_of_a_sort(n):
     rng = np.random.default_rng(0)
-    known = rng.permutation(10 * n)[: 2 * n].reshape(n, 2)
+    training = rng.permutation(10 * n)[: 2 * n].reshape(n, 2)
     tested = rng.integers(0, n, (30, 2))
-    squares = ((tested[:, None] - known) ** 2).sum(axis=2)
-    near = _nearest(known.astype(float), tested.astype(float), 4)
+    squares = ((tested[:, None] - training) ** 2).sum(axis=2)
+    near = _nearest(training.astype(float), tested.astype(float), 4)
     nearest = np.take_along_axis(squares, near, axis=1)
     np.testing.assert_array_equal(nearest, np.sort(squares, axis=1)[:, :4])
     ties = nearest[:, 1:] == nearest[:, :-1]

@@ -152,9 +152,9 @@ def test_a_held_out_trial_is_never_its_own_neighbour():
 
 def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothing():
     X, labels = touches(200)
-    each = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
+    things = np.char.add(labels, np.where(X[1, :, 1] > 0, "+", "-"))
     choices = {"kind": Choice("none", 12, 1), "thing": Choice("none", 12, 1)}
-    model = calibrated(choices, X, {"kind": labels, "thing": each})
+    model = calibrated(choices, X, {"kind": labels, "thing": things})
     assert model.novelty_.task == "thing"
     unknown = model.unknown_[-1]
     right = {task: answers[-1] for task, answers in model.right_.items()}
