@@ -127,14 +127,11 @@ class Choosing:
         """Whether entire groups are left out for a task."""
         return self._groups is not None and task in self._groups.tasks
 
-    def _features(self, window_s: float) -> Floats:
-        """(n, p) of every candidate."""
-        return self._dataset.with_kernels(window_s).features(window_s, self._samples)
-
-    def _vectors(self, X: Floats) -> Vectors:
-        """The trials, with the features (n, p) of every candidate."""
-        widths = tuple(self._widths.values())
-        return Vectors(X, self._y, self._dataset.names, widths)
+    def _vectors(self, dataset: DataSet, window_s: float) -> Vectors:
+        """The trials, with the features of a data set at a window."""
+        X = dataset.features(window_s, self._samples)
+        widths = tuple(dataset.widths(self._samples))
+        return Vectors(X, self._y, dataset.names, widths)
 
     def _tables(
         self,
@@ -177,7 +174,7 @@ class Choosing:
     def _right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
-        vectors = self._vectors(self._features(window_s))
+        vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
         what = f"{window_s:g} s"
         trials, groups = self._tables(vectors, self.tried, what, nested=False)
         right: dict[str, Floats] = {}
@@ -233,7 +230,7 @@ class Choosing:
             {task: its settings}, the fold of each trial, and
             [fold]{task: the choice made without the fold's trials}.
         """
-        vectors = self._vectors(self._features(window_s))
+        vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
         trials, groups = self._tables(vectors, self.tried, "choosing", nested=True)
         chosen = {}
         of_task = {}
@@ -273,9 +270,7 @@ class Choosing:
         """The answers of the candidates for early decision points at one of them."""
         tried = self._tried_early
         dataset = self._dataset.of(features_of(tried))
-        X = dataset.features(window_s, self._samples)
-        widths = tuple(dataset.widths(self._samples))
-        vectors = Vectors(X, self._y, dataset.names, widths)
+        vectors = self._vectors(dataset, window_s)
         what = f"{window_s:g} s"
         return self._tables(vectors, tried, what, nested=False, repeated=False)
 
