@@ -1,6 +1,7 @@
 """Novelty: a score in whole numbers, and limits that held-out trials set."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -29,33 +30,27 @@ def trials(n, seed=0, points=2):
     return X * np.repeat([1.0, 1e-4], WIDTHS), labels
 
 
+def integers(values):
+    """Whole numbers as Python's integers, which never overflow."""
+    return values.astype(np.int64).astype(object)
+
+
 def nearest_by_hand(space, x):
     """The score of a vector at the first decision point, in integers."""
     point = space.points[0]
     most = int(CLIP * 2**STEP_BITS)
-    steps = []
-    for value, mean, gain in zip(x, point.mean, point.gain, strict=True):
-        steps.append(min(max(round((value - mean) * gain), -most), most))
-    weights = space.weights.astype(int).T.tolist()
-    z = []
-    for column in weights:
-        total = sum(s * w for s, w in zip(steps, column, strict=True))
-        z.append(round_half_even(total, space.shift))
-    outside = max(sum(s * s for s in steps) - sum(c * c for c in z), 1)
-    y = []
-    for column in point.whitening.astype(int).T.tolist():
-        total = sum(c * w for c, w in zip(z, column, strict=True))
-        y.append(round_half_even(total, point.shift))
-    squares = []
-    for row in point.rows.astype(int).tolist():
-        squares.append(sum((a - b) ** 2 for a, b in zip(y, row, strict=True)))
-    return math.sqrt(outside) * math.sqrt(min(squares)) * point.unit
+    deviations = map(round, ((x - point.mean) * point.gain).tolist())
+    steps = np.array([min(max(d, -most), most) for d in deviations], dtype=object)
+    z = shifted(steps @ integers(space.weights), space.shift)
+    y = shifted(z @ integers(point.whitening), point.shift)
+    outside = max((steps**2).sum() - (z**2).sum(), 1)
+    squares = ((integers(point.rows) - y) ** 2).sum(axis=1)
+    return math.sqrt(outside) * math.sqrt(squares.min()) * point.unit
 
 
-def round_half_even(total, shift):
-    whole, rest = divmod(total, 1 << shift)
-    half = 1 << (shift - 1)
-    return whole + (rest > half or (rest == half and whole % 2 == 1))
+def shifted(totals, shift):
+    """Integers divided by 2^shift, and rounded half to even."""
+    return np.array([round(Fraction(total, 1 << shift)) for total in totals], object)
 
 
 def test_the_score_is_that_of_integers():

@@ -92,6 +92,11 @@ class TestCurve:
 SECONDS = np.array([0.4, 0.8, 1.2])
 
 
+def of_neighbours(k):
+    """The settings of a task with k neighbours."""
+    return {"t": Choice("none", 3, k)}
+
+
 def calibrated(choices, X, y):
     """A model whose settings serve every fold too."""
     folds = stratified_folds(next(iter(y.values())))
@@ -112,7 +117,7 @@ def touches(n, seed=0):
 
 def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
     X, labels = touches(120)
-    model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
+    model = calibrated(of_neighbours(3), X, {"t": labels})
     assert model.stopping_["t"].rule(0.1).mean_s <= 0.83
     new, truth = touches(300, seed=1)
     named, _ = answers(model.decision_points_, new)["t"]
@@ -121,7 +126,7 @@ def test_what_is_plain_from_the_second_decision_point_on_is_decided_there():
 
 def test_rules_ask_for_the_same_margin_at_every_decision_point():
     X, labels = touches(60)
-    model = calibrated({"t": Choice("none", 3, 3)}, X, {"t": labels})
+    model = calibrated(of_neighbours(3), X, {"t": labels})
     _, margins = answers(model.decision_points_, X)["t"]
     excess = excess_of(model.novelty_, model.space_.scores(X))
     *_, courses = model.judged(X, {"t": labels})
@@ -134,7 +139,7 @@ def test_rules_ask_for_the_same_margin_at_every_decision_point():
 def test_each_fold_is_answered_by_what_was_chosen_without_it():
     X, labels = touches(60)
     folds = stratified_folds(labels)
-    choices = {"t": Choice("none", 3, 3)}
+    choices = of_neighbours(3)
     bad = {"t": Choice("none", 1, 59 - int((folds == 0).sum()))}
     without = [bad, *[choices] * 9]
     model = SequentialClassifier(choices, SECONDS, ("max_force",))
@@ -145,7 +150,7 @@ def test_each_fold_is_answered_by_what_was_chosen_without_it():
 
 def test_a_held_out_trial_is_never_its_own_neighbour():
     X, labels = touches(60)
-    model = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
+    model = calibrated(of_neighbours(1), X, {"t": labels})
     assert (np.array(model.novelty_.limits) > 0.0).all()
     assert (model.space_.scores(X) == 0.0).all()
 
@@ -165,7 +170,7 @@ def test_a_touch_unlike_all_others_is_an_error_of_the_task_that_then_names_nothi
 
 def test_a_touch_is_unknown_beyond_the_limit_of_its_decision_point():
     X, labels = touches(60)
-    novelty = calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels}).novelty_
+    novelty = calibrated(of_neighbours(1), X, {"t": labels}).novelty_
     distances = np.array([row[-2] for row in novelty.limits])[:, None] + [0.0, 1e-9]
     assert novelty.rates[-2] == NOVELTY_RATE
     assert unlike(novelty, distances).tolist() == [[False, True]] * 3
@@ -193,4 +198,4 @@ def test_too_few_trials_are_refused():
     with pytest.raises(
         InputError, match="calibration needs at least 20 trials, not 19"
     ):
-        calibrated({"t": Choice("none", 3, 1)}, X, {"t": labels})
+        calibrated(of_neighbours(1), X, {"t": labels})
