@@ -235,16 +235,6 @@ def upper_xml(thing):
     return f'<geom class="face" {shape} {place} mass="{thing.mass_kg * 0.2}"/>', ""
 
 
-def pressing(touch):
-    """The words of `touch.xml` that tell how pads and thing press on each other."""
-    words = {"pad_n_m": touch.pad_n_m, "pad_kg": PAD_KG}
-    if touch.thing.layered:
-        words["pad_loss"] = 2.0 * math.sqrt(touch.pad_n_m * PAD_KG)
-        return words | {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
-    words["pad_loss"] = PAD_LOSS_S * touch.pad_n_m
-    return words | {"contact": RIGID, "dimensions": 3, "foot_x": HALF_M}
-
-
 def meeting(touch):
     """The arm's pose (4, 4) as it meets the thing, the point where it does (3,), and the
     heading of that point in radians."""
@@ -261,6 +251,7 @@ def model_of(touch):
     # It warns, and writes a file, of each face that only a layer's knots hold.
     mujoco.set_mju_user_warning(lambda text: None)
     thing = touch.thing
+    k = touch.pad_n_m
     pose, point, heading = meeting(touch)
     ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
     across = pose[:3, :3].T @ ahead
@@ -276,7 +267,12 @@ def model_of(touch):
     gravity = *(G_M_S2 * math.sin(slope) * ahead[:2]), -G_M_S2 * math.cos(slope)
     words = {
         **vars(thing),
-        **pressing(touch),
+        "pad_n_m": k,
+        "pad_kg": PAD_KG,
+        "pad_loss": PAD_LOSS_S * k,
+        "contact": RIGID,
+        "dimensions": 3,
+        "foot_x": HALF_M,
         "x": x,
         "y": y,
         "floor_m": z - ABOVE_FLOOR_M,
@@ -291,6 +287,9 @@ def model_of(touch):
     }
     if touch.fixed:
         words["joint"] = ""
+    if thing.layered:
+        words |= {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
+        words["pad_loss"] = 2.0 * math.sqrt(k * PAD_KG)
     return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), where
 
 

@@ -155,13 +155,13 @@ def certificates(task, stopping, course):
     requests |= {f"{error:g}": error for error in ERRORS}
     for name, error in requests.items():
         row = {"task": task, "asked": name, "error": error}
-        row |= dict.fromkeys(("wrong", "promised", "realised"), np.nan)
+        row |= dict.fromkeys(("wrong", "promised, s", "realised, s"), np.nan)
         rule = stopping.rule(error)
         if rule is not None:
             at, wrong = course.under(rule)
             row["wrong"] = wrong.mean()
-            row["promised"] = rule.mean_s
-            row["realised"] = np.take(POINTS_S, at).mean()
+            row["promised, s"] = rule.mean_s
+            row["realised, s"] = np.take(POINTS_S, at).mean()
         yield row
 
 
@@ -239,11 +239,10 @@ def certificate(rows):
     able = rows.dropna()
     row = {"sets": len(rows), "certified": len(able)}
     row["above"] = int((able["wrong"] > able["error"]).sum())
-    forms = {"wrong": ".1%", "promised": ".2f", "realised": ".2f"}
+    forms = {"wrong": ".1%", "promised, s": ".2f", "realised, s": ".2f"}
     for name, form in forms.items():
-        column = name if name == "wrong" else f"{name}, s"
-        row[column] = format(able[name].mean(), form) if len(able) else ""
-    row["late"] = int((able["realised"] > able["promised"] + LATE_S).sum())
+        row[name] = format(able[name].mean(), form) if len(able) else ""
+    row["late"] = int((able["realised, s"] > able["promised, s"] + LATE_S).sum())
     return row
 
 

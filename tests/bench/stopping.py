@@ -264,25 +264,27 @@ def judge(data, quick, jobs, is_first):
 def measure(data, quick, jobs):
     """Measure; print and write the tables."""
     sets = [judge(folder, quick, jobs, folder == data[0]) for folder in data]
-    rows = {"at each time": [], "at its own time": [], "certified": []}
+    at_each_time = []
+    at_own_time = []
+    certified = []
     for task, first in sets[0].items():
         judged = [of_set[task] for of_set in sets]
         for seconds in DECISION_POINTS_S:
             row = {"task": task, "mean time, s": f"{seconds:.1f}"}
-            rows["at each time"].append(row | compare(judged, seconds))
+            at_each_time.append(row | compare(judged, seconds))
         for name, (seconds, wrong) in first.aeon.items():
             row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
             row["wrong, %"] = cell(100 * wrong)
             row["when sure, at that time"] = cell(at([first.sure], seconds))
-            rows["at its own time"].append(row)
+            at_own_time.append(row)
         for rule in first.ours.certified:
             row = {"task": task, "at most wrong": f"{rule.asked:g}"}
             row["certified in folds"] = f"{rule.folds} of {FOLDS}"
             row["wrong"] = f"{rule.wrong:.1%}"
             row["unknown"] = f"{rule.unknown:.1%}"
             row["mean time, s"] = f"{rule.mean_s:.2f}"
-            rows["certified"].append(row)
-    tables.write("stopping", rows.values())
+            certified.append(row)
+    tables.write("stopping", [at_each_time, at_own_time, certified])
 
 
 def compare(judged, seconds):

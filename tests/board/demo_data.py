@@ -48,13 +48,12 @@ def main(folder):
         contact = first_series(recording, model)
         assert contact is not None, f"{touch} touches nothing"
         short = golden.trimmed(replace(recording, valid=None), contact[0], model)
-        frames = slice(
-            (len(short.t) - 1) % EVERY, None, EVERY
-        )  # the last is past the window
+        # The last one is past the window.
+        fourths = slice((len(short.t) - 1) % EVERY, None, EVERY)
         arrays = {
-            "t": short.t[frames] - short.t[frames][0],
-            "frames": short.frames[frames] // COUNT_STEP * COUNT_STEP,
-            "joints": np.rint(short.joints[frames] * ENCODER_STEPS) / ENCODER_STEPS,
+            "t": short.t[fourths] - short.t[fourths][0],
+            "frames": short.frames[fourths] // COUNT_STEP * COUNT_STEP,
+            "joints": np.rint(short.joints[fourths] * ENCODER_STEPS) / ENCODER_STEPS,
         }
         meta = {key: short.meta[key] for key in META}
         save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
