@@ -2,9 +2,8 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from train.report.work import Workers
 from train.tradeoff import shear
 from train.tradeoff.choices import Points, chosen, followed
 from train.tradeoff.measured import Measured
-from train.tradeoff.wires import Wire, wires
+from train.tradeoff.wires import fits, microcontroller, spread, wire, wires
 
 WAITS_S = (0.8, 0.6, 0.4)
 EVERY = (2, 4)
@@ -87,7 +86,7 @@ def _fewer_frames(
     """Every n-th frame, and the wire that then suffices."""
     for n in EVERY:
         price = f"1/{n} of the bits on the wire"
-        carried = [wire.name for wire in wires(layout) if wire.every(rate_hz) == n]
+        carried = [w.name for w in wires(layout) if w.every(rate_hz) == n]
         if carried:
             price = f"{carried[0]} are enough"
         parts = [part(r, slice(None, None, n)) for r in raw.recordings]
@@ -96,11 +95,19 @@ def _fewer_frames(
 
 
 def _fewer_taxels(raw: Recordings, layout: SkinLayout) -> Iterator[Change]:
-    """Larger taxels, and the shorter frames that they have."""
-    full = _slowest(wires(layout))
+    """Larger taxels, and the shorter frames that they have on one bus of AD7147, or
+    on a microcontroller where that serves too few taxels."""
+    one_bus = fits(layout, 1)
+    place = "1 bus of AD7147" if one_bus else "a microcontroller"
+
+    def frame_s(skin: SkinLayout) -> float:
+        plain = replace(skin, axes=None)
+        wiring = wire("", spread(plain, 1)) if one_bus else microcontroller(plain)
+        return wiring.frame_s
+
     for skin, recordings in coarser(layout, raw.recordings):
-        saved = 1e3 * (full.frame_s - _slowest(wires(skin)).frame_s)
-        price = f"a frame is {saved:.1f} ms shorter on 1 bus of AD7147"
+        saved = 1e3 * (frame_s(layout) - frame_s(skin))
+        price = f"a frame is {saved:.1f} ms shorter on {place}"
         name = counted(skin.rows * skin.cols, "taxel")
         yield Change(name, price, replace(raw, recordings=tuple(recordings)))
 
@@ -115,12 +122,6 @@ def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
         if left >= FEWEST:
             price = f"{counted(count - left, 'recording')} fewer"
             yield Change(f"{left} of {count} trials", price, kept, fewer=True)
-
-
-def _slowest(choices: Sequence[Wire]) -> Wire:
-    """The slowest wiring of AD7147, which has the fewest buses."""
-    chips = [wire for wire in choices if wire.name.startswith("AD7147")]
-    return max(chips, key=attrgetter("frame_s"))
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:

@@ -80,6 +80,12 @@ def spread(layout: SkinLayout, buses: int) -> SkinFile:
     return SkinFile("spread", layout, tuple(specs))
 
 
+def fits(layout: SkinLayout, buses: int) -> bool:
+    """Whether so many buses of AD7147 serve a skin, and each has a chip."""
+    chips = -(-layout.rows * layout.cols // STAGES)
+    return buses <= chips <= buses * CHANNELS * CHIPS
+
+
 def wires(layout: SkinLayout) -> list[Wire]:
     """The wirings to compare for a skin, with the fastest chips last.
 
@@ -90,11 +96,9 @@ def wires(layout: SkinLayout) -> list[Wire]:
     """
     last = microcontroller(layout)
     layout = replace(layout, axes=None)
-    taxels = layout.rows * layout.cols
-    chips = -(-taxels // STAGES)
     choices = []
     for buses in (1, 2, 3):
-        if buses <= chips and chips <= buses * CHANNELS * CHIPS:
+        if fits(layout, buses):
             choices.append(wire("AD7147", spread(layout, buses)))
     shipped = skinfile.load(skinfile.shipped("mpr121"))
     if shipped.layout.shape == layout.shape:

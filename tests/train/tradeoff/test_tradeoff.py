@@ -21,7 +21,7 @@ from tests import browser
 from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured
 from train.commands.tradeoff import cost
-from train.dataset import read
+from train.dataset import Recordings, read
 from train.rules import Course
 from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff import run as running
@@ -161,6 +161,17 @@ class TestCosts:
         assert (
             cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
         )
+
+    @pytest.mark.parametrize(
+        ("side", "place"), [(16, "1 bus of AD7147"), (40, "a microcontroller")]
+    )
+    def test_a_skin_of_any_size_tells_by_how_much_larger_taxels_shorten_a_frame(
+        self, side, place
+    ):
+        raw = Recordings((), (), "")
+        first, *_ = costs._fewer_taxels(raw, SkinLayout(rows=side, cols=side))
+        assert first.name == f"{side**2 // 4} taxels"
+        assert first.price.endswith(f"ms shorter on {place}")
 
 
 def test_prices_are_two_numbers():
