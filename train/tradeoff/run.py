@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from edge.errors import InputError
+from edge.recording import Recording
 from edge.writing import write_whole
 from train.dataset import DataSet, read
 from train.groups import LEAVE_OUT
@@ -107,7 +108,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     choose = partial(chosen, quick=quick)
     results = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
     points = dict(zip(ready.windows, results, strict=True))
-    rate = float(np.median([1.0 / np.median(np.diff(r.t)) for r in raw.recordings]))
+    rate = _rate_hz(raw.recordings)
     comparisons = early.compare_stopping(
         dataset, WINDOWS_S, quick=quick, jobs=options.jobs
     )
@@ -140,6 +141,12 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
     return report
+
+
+def _rate_hz(recordings: Sequence[Recording]) -> float:
+    """Frames a second, as a median over the recordings whose time goes on."""
+    steps_s = [np.median(np.diff(r.t)) for r in recordings if len(r.t) > 1]
+    return float(np.median([1.0 / step_s for step_s in steps_s if step_s > 0.0]))
 
 
 def _sheared(

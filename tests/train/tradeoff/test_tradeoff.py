@@ -12,6 +12,7 @@ import pytest
 from edge.errors import InputError
 from edge.model.calibration import StoppingRule
 from edge.model.model import Model
+from edge.recording import load
 from edge.saving import save
 from edge.skin import file as skinfile
 from edge.statistics import wilson
@@ -22,6 +23,7 @@ from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured
 from train.commands.tradeoff import cost
 from train.dataset import Recordings, read
+from train.parts import part
 from train.rules import Course
 from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff import run as running
@@ -366,6 +368,8 @@ def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
     data = str(save_touches(folder / "data", 14, rate=50.0))
+    single = part(load(folder / "data" / "hard_00.npz"), slice(1))
+    save(folder / "data" / "single_frame.npz", single)
     digest = read([data]).digest
     path = board_file(folder / "board.json", digest)
     options = Options(scene=str(SCENE), quick=True)
