@@ -17,12 +17,18 @@ class Commands:
         out: folder of the report.
         scene: the scene that the recordings were simulated from, or None.
         quick: whether the report's choices are quick ones.
+        board: the board file; by default the one that make writes.
+        formats: the file of number formats, or None.
+        task: of front.json, where it was named.
     """
 
     data: tuple[str, ...]
     out: Path
     scene: str | None = None
     quick: bool = False
+    board: Path | None = None
+    formats: Path | None = None
+    task: str | None = None
 
     def export(self, *options: str) -> str:
         """The command that exports a model of these recordings."""
@@ -41,12 +47,28 @@ class Commands:
 
     def tradeoff(self, options: str) -> str:
         """The command that makes this report with other options."""
-        words = f"--quick {options}" if self.quick else options
+        words = ["--quick"] if self.quick else []
+        if self.task is not None:
+            words += ["--task", self.task]
+        board = self.board or self.out / "board.json"
         if not self._by_make:
-            data = shlex.join(self.data)
-            out = shlex.quote(str(self.out))
-            return f"python -m train tradeoff --data {data} --out {out} {words}"
-        return f'make tradeoff{self._facts} TRADEOFF="{words}"'
+            files = {
+                "--board": board,
+                "--out": self.out,
+                "--scene": self.scene,
+                "--formats": self.formats,
+            }
+            for option, file in files.items():
+                words += [] if file is None else [option, str(file)]
+            program = ["python", "-m", "train", "tradeoff", "--data", *self.data]
+            return f"{shlex.join([*program, *words])} {options}"
+        facts = self._facts
+        if board != self.out / "board.json":
+            facts += f" BOARD={board}"
+        # make measures the formats where it measures the board.
+        if self.formats not in (None, self.out / "formats.json"):
+            words += ["--formats", str(self.formats)]
+        return f'make tradeoff{facts} TRADEOFF="{" ".join([*words, options])}"'
 
     @property
     def _models(self) -> Path:
@@ -62,7 +84,8 @@ class Commands:
     @property
     def _by_make(self) -> bool:
         """Whether make can say it: it takes no name that a shell must have quoted."""
-        names = [*self.data, str(self.out), self.scene or "-"]
+        files = (self.out, self.scene, self.board, self.formats, self.task)
+        names = [*self.data, *map(str, filter(None, files))]
         plain = all(shlex.quote(name) == name for name in names)
         return self.out.name == "tradeoff" and plain
 

@@ -132,7 +132,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         second=options.second,
         formats=formats,
         shear=sheared,
-        commands=Commands(tuple(map(str, data)), out, options.scene, quick),
+        commands=_commands(data, out, board_path, options),
         notes=notes,
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
@@ -141,6 +141,19 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     with write_whole(out / "front.json") as file:
         file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
     return report
+
+
+def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> Commands:
+    """The commands that make these models, and this report again."""
+    return Commands(
+        data=tuple(map(str, data)),
+        out=out,
+        scene=options.scene,
+        quick=options.quick,
+        board=Path(board),
+        formats=None if options.formats is None else Path(options.formats),
+        task=options.task,
+    )
 
 
 def _rate_hz(recordings: Sequence[Recording]) -> float:

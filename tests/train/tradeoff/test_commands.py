@@ -61,14 +61,35 @@ def test_a_point_of_the_front():
     )
 
 
+COST = "--cost wrong=10,second=1"
+
+
 def test_the_report_again():
-    options = "--cost wrong=10,second=1"
-    assert Commands(("mine",), BUILD, quick=True).tradeoff(options) == (
-        'make tradeoff DATA=mine TRADEOFF="--quick --cost wrong=10,second=1"'
+    assert Commands(("mine",), BUILD, quick=True).tradeoff(COST) == (
+        f'make tradeoff DATA=mine TRADEOFF="--quick {COST}"'
     )
-    assert Commands(("my touches",), BUILD).tradeoff(options) == (
-        "python -m train tradeoff --data 'my touches' --out build/tradeoff "
-        "--cost wrong=10,second=1"
+
+
+def test_the_report_again_with_the_board_and_the_other_options_that_it_was_made_with():
+    board = Path("pi.json")
+    assert Commands(("mine",), BUILD, board=board, task="object").tradeoff(COST) == (
+        f'make tradeoff DATA=mine BOARD=pi.json TRADEOFF="--task object {COST}"'
+    )
+
+
+def test_the_report_again_without_make_names_every_file():
+    assert Commands(("my touches",), BUILD, "a.toml").tradeoff(COST) == (
+        "python -m train tradeoff --data 'my touches' --board build/tradeoff/board.json "
+        f"--out build/tradeoff --scene a.toml {COST}"
+    )
+
+
+def test_the_report_again_with_number_formats():
+    own = Commands(("mine",), BUILD, formats=BUILD / "formats.json")
+    assert own.tradeoff(COST) == f'make tradeoff DATA=mine TRADEOFF="{COST}"'
+    others = Commands(("mine",), BUILD, formats=Path("pi.json"))
+    assert others.tradeoff(COST) == (
+        f'make tradeoff DATA=mine TRADEOFF="--formats pi.json {COST}"'
     )
 
 
