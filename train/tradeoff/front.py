@@ -35,6 +35,13 @@ class OperatingPoint:
     low: float
     high: float
 
+    def check(self) -> None:
+        """Raise ValueError for a time or a share that no decision has."""
+        shares = (self.accuracy, self.low, self.high)
+        possible = all(0.0 <= share <= 1.0 for share in shares)
+        if not (possible and 0.0 < self.window_s <= 60.0 and self.milliseconds > 0.0):
+            raise ValueError("a point of an impossible time or accuracy")
+
 
 @dataclass(frozen=True)
 class ParetoFront:
@@ -104,10 +111,10 @@ class ParetoFront:
             task = str(content["task"])
             measured = str(content["data_digest"])
             quick = bool(content["quick"])
-            if not points or not all(
-                0.0 < p.window_s <= 60.0 and p.milliseconds for p in points
-            ):
-                raise ValueError("no point, or one of no time")
+            if not points:
+                raise ValueError("no point")
+            for point in points:
+                point.check()
         if measured != digest:
             raise InputError(
                 f"{path}: was measured on other recordings (digest {measured[:12]}, "
