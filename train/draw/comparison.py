@@ -20,6 +20,7 @@ from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import WINDOW_S
+from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.arms import arm_of
@@ -77,6 +78,8 @@ def _draw(
     horizon = WINDOW_S if model is None else model.info.window_s
     touches = [_Touch.of(*recording, horizon) for recording in recordings]
     layout = touches[0].recording.layout
+    for touch in touches:
+        _require_units(touch, layout)
     figure = Figure(figsize=(2.6 * len(touches) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
         4, len(touches), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
@@ -160,6 +163,21 @@ class _Touch:
         kind = self.recording.labels.get("category", "").replace("-", ", ")
         words = (kind, self.recording.labels.get("object"))
         return "\n".join(filter(None, words)) or "touch"
+
+
+def _require_units(touch: _Touch, layout: SkinLayout) -> None:
+    """Refuse a touch in other units than those of a skin.
+
+    Raises:
+        InputError: the sentence names the touch.
+    """
+    theirs = units(touch.recording.layout)
+    for feature, unit in units(layout).items():
+        if theirs[feature] != unit:
+            raise InputError(
+                f"{touch.name}: {feature} is in {theirs[feature]}, that of the first "
+                f"recording in {unit}; draw recordings of one skin"
+            )
 
 
 def _decided(touch: _Touch, model: Model) -> Decided | None:

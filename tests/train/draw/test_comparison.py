@@ -1,5 +1,7 @@
 """Touches side by side: a column each, with its decision."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib import image
@@ -56,6 +58,16 @@ def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
         comparison.draw(
             [("quiet.npz", quiet)], tmp_path / "a.png", model=Model(demo.MODEL)
         )
+
+
+def test_touches_in_other_units_do_not_share_an_axis(make_touch, tmp_path):
+    touch = make_touch()
+    counts = {**touch.meta["skin"], "counts_per_newton": None}
+    other = replace(touch, meta={**touch.meta, "skin": counts})
+    sentence = "b: max_force is in counts, that of the first recording in N"
+    with pytest.raises(InputError, match=sentence):
+        comparison.draw([("a", touch), ("b", other)], tmp_path / "a.png")
+    assert not (tmp_path / "a.png").exists()
 
 
 @pytest.mark.parametrize(
