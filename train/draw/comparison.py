@@ -116,8 +116,8 @@ def contact_of(
     if chain is not None:
         recording = recording.for_joints(chain.names, name)
     touches = contacts(recording, ContactTracker(recording.layout, chain=chain))
-    if len(touches) < number:
-        which = f" {number}" if number > 1 else ""
+    if not 0 < number <= len(touches):
+        which = "" if number == 1 else f" {number}"
         raise InputError(f"{name}: holds no contact{which}")
     return touches[number - 1]
 
