@@ -49,8 +49,10 @@ def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
     x, y, z = map(float, entry["place"])
     onset_s = float(entry["onset_s"])
     confidence = float(entry["confidence"] or 0.0)
-    if not all(map(math.isfinite, (x, y, z, onset_s, confidence))):
+    if not all(map(math.isfinite, (x, y, z, onset_s))):
         raise ValueError("not finite")
+    if not 0.0 <= confidence <= 1.0:
+        raise ValueError(f"a confidence of {confidence:g}")
     task = str(entry["task"])
     label = None if entry["label"] is None else str(entry["label"])
     contact = int(entry["contact"])

@@ -37,6 +37,10 @@ def test_a_contact_comes_once_all_of_its_tasks_are_decided(tmp_path):
             "line 2: not of a map",
         ),
         (
+            HEAD + PLACED + '"task": "a", "label": "b", "confidence": 2}\n',
+            "line 2: not of a map: a confidence of 2; ",
+        ),
+        (
             '{"event": "map", "frame": "a", "unit": "metre", "tasks": []}\n'
             '{"event": "map", "frame": "b", "unit": "metre", "tasks": []}\n',
             "line 2 begins a run in the frame b",
