@@ -6,6 +6,7 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
+from edge.errors import InputError
 from train.progress import bar
 from train.threads import single_thread
 
@@ -24,6 +25,15 @@ class Workers:
     jobs: int = 1
     cluster: str | None = None
     progress: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse a number of processes that cannot work.
+
+        Raises:
+            InputError: it is below 1.
+        """
+        if self.jobs < 1:
+            raise InputError(f"--jobs must be at least 1, not {self.jobs}")
 
     def map(
         self,

@@ -82,12 +82,11 @@ def study(
     Raises:
         InputError: the data set cannot be used, or there is no scheduler.
     """
-    for option, value in (("--seeds", seeds), ("--jobs", jobs)):
-        if value < 1:
-            raise InputError(f"{option} must be at least 1, not {value}")
+    if seeds < 1:
+        raise InputError(f"--seeds must be at least 1, not {seeds}")
+    workers = Workers(jobs, None if address is None else "dask")
     source = None if scene is None else scenes.load(scene)
     dataset = _studied(data)
-    workers = Workers(jobs, None if address is None else "dask")
     context = Context(dataset, source, workers)
     constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:

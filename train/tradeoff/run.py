@@ -94,6 +94,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         InputError: the data cannot be used, or a file is of another kind or of other
             recordings.
     """
+    workers = Workers(options.jobs)
     board = boards.read(board_path)
     formats = [] if options.formats is None else boards.read_formats(options.formats)
     scene = None if options.scene is None else scenes.load(options.scene)
@@ -104,7 +105,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     dataset = ready.dataset
     require_enough(len(dataset.trials))
     main = _main_task(dataset, options.task)
-    workers = Workers(options.jobs)
     choose = partial(chosen, quick=quick)
     results = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
     points = dict(zip(ready.windows, results, strict=True))

@@ -384,6 +384,12 @@ def written(tmp_path_factory):
     return Written(report, digest)
 
 
+def test_no_process_is_one_sentence(tmp_path, refusal):
+    words = "--data", tmp_path, "--board", tmp_path / "board.json", "--jobs", 0
+    said = refusal("tradeoff", *words, "--out", tmp_path / "out")
+    assert said.endswith("--jobs must be at least 1, not 0")
+
+
 def test_the_report_needs_no_other_page(written):
     assert "http" not in written.text
     assert not browser.available() or browser.faults(written.report) == []
