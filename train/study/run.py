@@ -96,7 +96,7 @@ def study(
         )
     with nullcontext() if address is None else on_cluster(address):
         sections = _analysed(context, seeds)
-    name = Path(data[0]).name if source is None else source.name
+    name = Path(data[0]).absolute().name if source is None else source.name
     title = f"The paper's analyses, repeated on {name}"
     return write(out, title, _lead(context, constant), sections)
 

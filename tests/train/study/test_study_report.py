@@ -125,8 +125,9 @@ def studied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
     save_touches(folder, 12, seconds=1.3, rate=25.0)
     out = tmp_path_factory.mktemp("study")
-    words = ["--data", str(folder), "--out", str(out), "--jobs", "1"]
+    words = ["--data", ".", "--out", str(out), "--jobs", "1"]
     with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
         patch.setattr(methods, "TREES", 10)
         assert main(["study", *words]) == 0
     return out
@@ -149,6 +150,10 @@ def test_equal_scalings_are_equal(studied):
     assert list(scaled.index) == ["category", "object"]
     assert (scaled["I"] == scaled["II"]).all()
     assert (scaled["none"] == scaled["III"]).all()
+
+
+def test_the_title_names_the_folder_also_of_a_dot(studied):
+    assert "repeated on touches0</title>" in (studied / "report.html").read_text()
 
 
 def test_the_findings_come_first(studied):
