@@ -265,10 +265,11 @@ def posture_accuracy(dataset: DataSet, task: str) -> float:
         finite = joints[np.isfinite(joints).all(axis=1)]
         at_onset.append(finite[0] if len(finite) else np.zeros(joints.shape[1]))
     labels = dataset.labels(task)
-    told = labels != ""
-    neighbours = NearestNeighbors(n_neighbors=1).fit(np.array(at_onset)[told])
+    angles = np.array(at_onset)[labels != ""]
+    labels = labels[labels != ""]
+    neighbours = NearestNeighbors(n_neighbors=1).fit(angles)
     nearest = neighbours.kneighbors(return_distance=False)[:, 0]
-    return float((labels[told][nearest] == labels[told]).mean())
+    return float((labels[nearest] == labels).mean())
 
 
 def names(dataset: DataSet) -> tuple[str, tuple[str, ...]]:

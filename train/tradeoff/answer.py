@@ -47,7 +47,7 @@ def section(measured: Measured) -> Section:
         tables=[
             Table(f"answer_{t}", t, answers(measured, t), narrow=6) for t in measured.y
         ],
-        figures=[drawn(measured)],
+        figures=[picture_of(measured)],
         widget=slider(measured),
     )
 
@@ -72,9 +72,10 @@ def early(measured: Measured) -> Section:
         for task, compared in measured.comparisons.items()
         for rule in compared.certified
     ]
-    gaps = (
-        f"{t} {100 * c.calibration_error:.1f}" for t, c in measured.comparisons.items()
-    )
+    gaps = [
+        f"{task} {100 * compared.calibration_error:.1f}"
+        for task, compared in measured.comparisons.items()
+    ]
     return Section(
         "Early decisions",
         [
@@ -103,10 +104,9 @@ def prices(measured: Measured) -> Section:
     for task in measured.y:
         best = cheapest(measured, task)
         low, high = best.result.interval
-        least, mean, most = (
-            round(best.price(accuracy, measured), 2)
-            for accuracy in (high, best.result.accuracy, low)
-        )
+        mean = round(best.price(best.result.accuracy, measured), 2)
+        least = round(best.price(high, measured), 2)
+        most = round(best.price(low, measured), 2)
         row: Row = {"task": task, "best use": best.name, "mean price": mean}
         row["95 % interval"] = f"{least:g} to {most:g}"
         row["command"] = f"`{', then '.join(best.commands)}`"
@@ -165,39 +165,48 @@ def reasons(measured: Measured) -> Section:
 
 
 GLOSSARY = {
-    "accuracy": "The share of held-out contacts that get the right label. A held-out contact takes "
-    "no part in fitting the model, nor in choosing its features, projection and number "
-    "of "
-    "neighbours (nested cross-validation).",
-    "from, to": "The 95 % interval for the exported model's accuracy on other contacts. It is "
-    "Wilson's binomial interval for two fifths of the contacts, because the exported "
-    "model differs "
-    "from those that were tested. `make risk` counts how often it holds. For early "
-    "decisions, only "
-    "the contacts of the folds that certified the error rate count.",
-    "points": "The percentage of decisions that become right less the percentage that become "
-    "wrong, on the same held-out contacts. The brackets hold the 95 % interval of this "
-    "paired "
-    "difference.",
-    "objects never met": "The accuracy if all trials of an object are held out together.",
+    "accuracy": (
+        "The share of held-out contacts that get the right label. A held-out contact "
+        "takes no part in fitting the model, nor in choosing its features, projection "
+        "and number of neighbours (nested cross-validation)."
+    ),
+    "from, to": (
+        "The 95 % interval for the exported model's accuracy on other contacts. It is "
+        "Wilson's binomial interval for two fifths of the contacts, because the "
+        "exported model differs from those that were tested. `make risk` counts how "
+        "often it holds. For early decisions, only the contacts of the folds that "
+        "certified the error rate count."
+    ),
+    "points": (
+        "The percentage of decisions that become right less the percentage that become "
+        "wrong, on the same held-out contacts. The brackets hold the 95 % interval of "
+        "this paired difference."
+    ),
+    "objects never met": (
+        "The accuracy if all trials of an object are held out together."
+    ),
     "confidence": "The calibrated probability that the label is right.",
-    "certified": "An error rate is certified if an exact binomial test on calibration trials "
-    "shows, with 90 % confidence, that decisions on contacts like the trained ones are "
-    "wrong at "
-    "most this often (learn-then-test).",
+    "certified": (
+        "An error rate is certified if an exact binomial test on calibration trials "
+        "shows, with 90 % confidence, that decisions on contacts like the trained ones "
+        "are wrong at most this often (learn-then-test)."
+    ),
     "onset": "The first frame of a contact.",
     "window": "The time from onset that a decision is based on.",
-    "wire": "The time until the last frame has been read: on average half a frame's period until "
-    "it begins, and its time on I2C.",
-    "arithmetic": "The time to track the last frame, compute the features, and decide.",
+    "wire": (
+        "The time until the last frame has been read: on average half a frame's period "
+        "until it begins, and its time on I2C."
+    ),
+    "arithmetic": (
+        "The time to track the last frame, compute the features, and decide."
+    ),
 }
 
 
-def drawn(measured: Measured) -> Figure:
-    """The picture: accuracy against time in a panel for each task, and the parts of the
-    time."""
+def picture_of(measured: Measured) -> Figure:
+    """Accuracy against time in a panel for each task, and the parts of the time."""
     compared = measured.comparisons
-    m = len(measured.comparisons)
+    m = len(compared)
     wide = m if m <= ACROSS else -(-m // 2)
     heights = 3.0 * -(-m // wide) + 2.2, 2.6 * m + 2.2
 
@@ -219,7 +228,10 @@ def drawn(measured: Measured) -> Figure:
         legend(upper, fullest, 2 if phone else 3)
         _split(lower, measured)
 
-    title = "Accuracy against the time of the decision, for each task; below, the parts of the time"
+    title = (
+        "Accuracy against the time of the decision, for each task; below, the parts of "
+        "the time"
+    )
     return picture("tradeoff", title, draw, heights, max(PHONE * wide, PHONE + 2.0))
 
 
@@ -271,31 +283,26 @@ def _split(figure: Any, measured: Measured) -> None:
         wire_ms = 1e3 * measured.wire_s
         stages.append((f"wire {wire_ms:.0f} ms", wire_ms))
     stages.append((f"arithmetic {arithmetic_ms:.1f} ms", arithmetic_ms))
-    rows = figure.subplots(2, 1)
-    start = 1e3 * window - 0.25 * after_ms
-    ends = (0.0, 1e3 * window + after_ms), (start, 1e3 * window + 1.02 * after_ms)
-    for axes, limits in zip(rows, ends, strict=True):
+    whole, magnified = figure.subplots(2, 1)
+    for axes in (whole, magnified):
         left = 0.0
-        for (name, length), (colour, *_), hatch in zip(
-            stages, STROKES, HATCHES, strict=False
-        ):
-            axes.barh(
-                0,
-                length,
-                left=left,
-                color=colour,
-                hatch=hatch,
-                ec="white",
-                lw=0,
-                label=name,
-            )
+        for i, (name, length) in enumerate(stages):
+            style = {
+                "color": STROKES[i][0],
+                "hatch": HATCHES[i],
+                "ec": "white",
+                "lw": 0,
+            }
+            axes.barh(0, length, left=left, **style, label=name)
             left += length
-        axes.set(xlim=limits, yticks=[])
+        axes.set_yticks([])
         axes.grid(visible=False)
         axes.spines["left"].set_visible(False)
         axes.locator_params("x", nbins=7)
-    rows[0].axvline(start, color="0.2", lw=0.8)
-    rows[1].set_xlabel(
-        f"milliseconds; below, the last {ends[1][1] - start:.0f} magnified"
-    )
-    legend(figure, rows[0], 3)
+    start = 1e3 * window - 0.25 * after_ms
+    end = 1e3 * window + 1.02 * after_ms
+    whole.set_xlim(0.0, 1e3 * window + after_ms)
+    whole.axvline(start, color="0.2", lw=0.8)
+    magnified.set_xlim(start, end)
+    magnified.set_xlabel(f"milliseconds; below, the last {end - start:.0f} magnified")
+    legend(figure, whole, 3)

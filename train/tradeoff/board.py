@@ -44,8 +44,8 @@ def read(path: str | os.PathLike[str]) -> Board:
         InputError: it is missing or has other contents; the sentence names it.
     """
     name = os.fspath(path)
-    mend = f"make one with `edge-classify bench --out {name}`"
-    with json_file(name, "a board file", mend) as content:
+    remedy = f"make one with `edge-classify bench --out {name}`"
+    with json_file(name, "a board file", remedy) as content:
         board = Board(
             name=f"{content['machine']['kind']} ({content['machine']['name']})",
             digest=str(content["model"]["data_digest"]),
@@ -81,8 +81,8 @@ def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
         InputError: the file is missing or has other contents; the sentence names it.
     """
     name = os.fspath(path)
-    mend = f"make one with `python -m export.arithmetic --out {name}`"
-    with json_file(name, "a file of number formats", mend) as content:
+    remedy = f"make one with `python -m export.arithmetic --out {name}`"
+    with json_file(name, "a file of number formats", remedy) as content:
         return [
             {
                 "format": str(row["format"]),

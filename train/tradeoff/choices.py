@@ -82,18 +82,12 @@ def followed(
 
 
 def chosen(
-    dataset: DataSet, window_s: float = WINDOW_S, **given: Any
+    dataset: DataSet, window_s: float = WINDOW_S, **options: Any
 ) -> dict[str, Chosen]:
-    """Each task's choice, as `python -m export --window` makes it with options
-    `given`; by default a quick one."""
-    form = {
-        "window_s": window_s,
-        "quick": True,
-        "decision_points_s": (),
-        "jobs": 1,
-        **given,
-    }
-    return fit(dataset, **form).chosen
+    """Each task's choice, as `python -m export --window` makes it with options; by
+    default a quick one."""
+    usual = {"quick": True, "decision_points_s": (), "jobs": 1}
+    return fit(dataset, window_s=window_s, **{**usual, **options}).chosen
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -46,7 +46,7 @@ class Change:
         name: the change.
         price: its saving, or its cost other than accuracy.
         source: the trials, or recordings to follow again.
-        given: options of the choice.
+        options: of the choice.
         fewer: whether trials are left out on purpose; otherwise a contact that is no
             longer noticed counts as wrong.
     """
@@ -54,7 +54,7 @@ class Change:
     name: str
     price: str
     source: DataSet | Recordings
-    given: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
     fewer: bool = False
 
 
@@ -68,12 +68,12 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         rate_hz: frames a second.
     """
     # The longest first: it runs beside the others.
-    cases = [Change(ALL, "longer training", raw, given={"quick": False})]
+    cases = [Change(ALL, "longer training", raw, options={"quick": False})]
     cases += _fewer_frames(raw, dataset.layout, rate_hz)
     cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
-    cases.append(Change(name, "only 3 features", dataset, given=paper))
+    cases.append(Change(name, "only 3 features", dataset, options=paper))
     if dataset.layout.axes:
         cases.append(Change("no shear", shear.price(dataset), shear.without(dataset)))
     cases += _fewer_trials(dataset)
@@ -149,9 +149,9 @@ def answered(change: Change, like: SkinLayout) -> tuple[dict[str, Hits], float]:
     began = time.process_time()
     dataset = change.source
     if not isinstance(dataset, DataSet):
-        quick = change.given.get("quick", True)
+        quick = change.options.get("quick", True)
         dataset = followed(dataset, quick=quick, like=like)
-    result = hits(dataset, chosen(dataset, **change.given))
+    result = hits(dataset, chosen(dataset, **change.options))
     return result, time.process_time() - began
 
 

@@ -100,8 +100,8 @@ class ParetoFront:
             InputError: the file cannot be read, is not a front.json, or belongs to
                 other recordings.
         """
-        mend = "make one with `make tradeoff`"
-        with json_file(path, "a front.json", mend) as content:
+        remedy = "make one with `make tradeoff`"
+        with json_file(path, "a front.json", remedy) as content:
             points = [
                 OperatingPoint(
                     *(float(point[key.name]) for key in fields(OperatingPoint))
@@ -118,7 +118,7 @@ class ParetoFront:
         if measured != digest:
             raise InputError(
                 f"{path}: was measured on other recordings (digest {measured[:12]}, "
-                f"these have {digest[:12]}); {mend} DATA=... of these"
+                f"these have {digest[:12]}); {remedy} DATA=... of these"
             )
         fastest_first = sorted(points, key=lambda point: point.milliseconds)
         return cls(task, tuple(fastest_first), quick)

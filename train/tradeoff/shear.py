@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -106,43 +107,29 @@ def right(choice: Chosen, kind: str) -> NDArray[np.bool_] | None:
 def reached_s(shares: Mapping[float, float | None], level: float) -> float | None:
     """The first window from which on an accuracy is kept; None if there is none."""
     first = None
-    for window, accuracy in shares.items():
+    for window, accuracy in reversed(list(shares.items())):
         if accuracy is None or accuracy < level:
-            first = None
-        elif first is None:
-            first = window
+            break
+        first = window
     return first
 
 
 def times(compared: Compared) -> list[Row]:
     """The time at which each task reaches each level, with shear and without."""
     sides = {"without s": compared.plain, "with s": compared.sheared}
+    cases = product(compared.sheared.tasks, LEVELS, ("fixed", "early"), (KNOWN, UNMET))
     rows = []
-    for task in compared.sheared.tasks:
-        for level in LEVELS:
-            for kind in (KNOWN, UNMET):
-                seconds = {
-                    name: reached_s(side.shares(task, kind), level)
-                    for name, side in sides.items()
-                }
-                rows.append(_time_row(task, level, f"fixed, {kind}", seconds))
-            for kind in (KNOWN, UNMET):
-                seconds = {
-                    name: side.early_s(task, kind, level)
-                    for name, side in sides.items()
-                }
-                rows.append(_time_row(task, level, f"early, {kind}", seconds))
+    for task, level, way, kind in cases:
+        row: Row = {"task": task, "right": f"{level:.0%}"}
+        row["decision"] = f"{way}, {kind}"
+        for name, side in sides.items():
+            if way == "fixed":
+                seconds = reached_s(side.shares(task, kind), level)
+            else:
+                seconds = side.early_s(task, kind, level)
+            row[name] = "-" if seconds is None else f"{seconds:.2f}"
+        rows.append(row)
     return rows
-
-
-def _time_row(
-    task: str, level: float, decision: str, seconds: Mapping[str, float | None]
-) -> Row:
-    """The row of {column: seconds}; a dash where the level is never reached."""
-    row: Row = {"task": task, "right": f"{level:.0%}", "decision": decision}
-    for name, value in seconds.items():
-        row[name] = "-" if value is None else f"{value:.2f}"
-    return row
 
 
 def gains(compared: Compared) -> list[Row]:
@@ -190,11 +177,11 @@ def section(compared: Compared) -> Section:
                 "shear", "Accuracy with shear and without", gains(compared), narrow=5
             ),
         ],
-        [drawn(compared)],
+        [picture_of(compared)],
     )
 
 
-def drawn(compared: Compared) -> Figure:
+def picture_of(compared: Compared) -> Figure:
     """The picture: accuracy against time, with shear and without."""
     tasks = compared.sheared.tasks
     heights = 2.9, 2.4 * len(tasks) + 0.8
