@@ -76,10 +76,9 @@ def test_the_page_holds_its_pictures_and_no_table_without_rows(tmp_path):
     tables = [table(), Table("empty", "Nothing", [])]
     figures = [Figure("plot", "A plot", b"\x89PNG", b"")]
     section = Section("One", figures=figures, tables=tables)
-    report = write(tmp_path, "Title", [], [section])
+    text = write(tmp_path, "Title", [], [section]).read_text()
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"plot.png", "report.html", "speed.csv"}
-    text = report.read_text()
     assert 'src="data:image/png;base64,iVBORw=="' in text
     assert "http" not in text
     assert "Nothing" not in text
@@ -102,6 +101,9 @@ def test_words_are_explained_and_code_is_set_as_code():
     text = page("Title", ["take `make <x>`"], [Section("Words", terms={"k": "a & b"})])
     assert "<code>make &lt;x&gt;</code>" in text
     assert "<dt>k</dt><dd>a &amp; b</dd>" in text
+
+
+def test_a_count_has_its_noun():
     assert counted(1, "trial") == "1 trial"
     assert counted(1120, "trial") == "1,120 trials"
 

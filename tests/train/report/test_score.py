@@ -63,23 +63,39 @@ def test_nested_accuracy_of_clear_classes_is_one():
     X, y = clear()
     options = {"grid": SearchGrid("IV"), "features": ONE}
     result = nested(X, {"t": y}, stratified_folds(y), **options)["t"]
-    assert result.right == 60
-    assert result.total == 60
-    assert result.components == 1
-    assert result.k == 1
+    assert result == Result(60, 60, components=1, k=1)
 
 
 def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
-    searched = score(Result(10, 20, components=3, k=2))
-    plain = score(Result(10, 20))
     columns = ["accuracy %", "from %", "to %", "k", "components"]
-    assert list(searched) == list(plain) == columns
-    assert searched["from %"] < 50.0 < searched["to %"]
-    assert searched["k"] == 2
-    assert plain["k"] == ""
+    assert list(score(Result(10, 20, components=3, k=2))) == columns
+    assert list(score(Result(10, 20))) == columns
+
+
+def test_a_score_lies_in_its_interval():
+    columns = score(Result(10, 20))
+    assert columns["accuracy %"] == 50.0
+    assert columns["from %"] < 50.0 < columns["to %"]
+
+
+def test_a_score_without_a_search_has_empty_settings():
+    assert score(Result(10, 20, components=3, k=2))["k"] == 2
+    assert score(Result(10, 20))["k"] == ""
+
+
+def test_an_interval_is_in_whole_percent():
     assert interval(Result(10, 20)) == "30 to 70"
+
+
+def test_a_percent_has_two_places():
     assert percent(2 / 3) == 66.67
+
+
+def test_points_are_whole_and_have_a_sign():
     assert points((-0.4, -7.5, 3.2)) == "+0 (-8 to +3)"
+
+
+def test_guessing_names_the_most_frequent_label():
     assert majority(np.array(["a", "b", "b"])) == Result(2, 3)
 
 
