@@ -11,7 +11,6 @@ from cycler import cycler
 from matplotlib import style
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from edge.classifier import Classifier
 from edge.errors import InputError, about
@@ -26,6 +25,7 @@ from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import contacts
 from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
+from train.vectors import Floats
 
 MOST = 6
 """More columns would not be readable at the width of a page."""
@@ -140,7 +140,7 @@ class _Touch:
     recording: Recording
     series: FeatureSeries
     strongest_s: float
-    force: NDArray[np.float64]
+    force: Floats
 
     @classmethod
     def of(cls, name: str, recording: Recording, window_s: float) -> Self:

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import parsing
@@ -108,7 +109,7 @@ def units(layout: SkinLayout) -> dict[str, str]:
     }
 
 
-def curves(series: FeatureSeries) -> dict[str, np.ndarray]:
+def curves(series: FeatureSeries) -> dict[str, NDArray[Any]]:
     """{feature: (n,) values} of the paper's three features in each frame."""
     return {
         "max_force": series.peak / (series.layout.counts_per_newton or 1.0),

@@ -13,6 +13,7 @@ from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
+from train.vectors import Floats
 
 DEPTH_M = 0.12
 STANDS_M = 0.15
@@ -47,12 +48,12 @@ class Place(NamedTuple):
     """Position (3,) of a contact, the skin's outward normal there (3,), and metres
     along the skin to its first row."""
 
-    position: np.ndarray
-    normal: np.ndarray
+    position: Floats
+    normal: Floats
     row0_m: float
 
 
-def link_positions(chain: Chain, q: Any) -> np.ndarray:
+def link_positions(chain: Chain, q: Any) -> Floats:
     """(links, 3) positions of the chain's joints and its tip, in metres."""
     chains = [Chain(chain.joints[: i + 1]) for i in range(len(chain.joints))]
     return np.vstack(
@@ -97,7 +98,7 @@ def draw_side(
 
 
 def _arm(
-    axis: Any, chain: Chain, q: np.ndarray, layout: SkinLayout, moment: Moment
+    axis: Any, chain: Chain, q: Floats, layout: SkinLayout, moment: Moment
 ) -> None:
     """Draw the arm at joint angles q, with the skin of a cylinder around it."""
     style = {"color": moment.colour, "label": moment.name, "markersize": 4}
@@ -116,7 +117,7 @@ def _title(simulation: Mapping[str, Any], motion: str) -> str:
     return f"seen from the side: {simulation['family']}{weight}{motion}\n{effects}"
 
 
-def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
+def skin_outline(pose: Floats, layout: SkinLayout) -> Floats:
     """(4, 2) x and z of the corners of a cylinder's skin, seen from the side."""
     first_m = layout.row0_z_m
     length_m = layout.pitch[0] * (layout.rows - 1)
@@ -129,7 +130,7 @@ def skin_outline(pose: np.ndarray, layout: SkinLayout) -> np.ndarray:
 
 
 def _last_contact(
-    recording: Recording, joints: np.ndarray, chain: Chain, layout: SkinLayout, k: int
+    recording: Recording, joints: Floats, chain: Chain, layout: SkinLayout, k: int
 ) -> tuple[float, Place] | None:
     """Seconds from the last contact to frame k, and the place of that contact."""
     for i in range(k, -1, -1):
@@ -152,7 +153,7 @@ def _object(
     axis: Any,
     simulation: dict[str, Any],
     first: Place,
-    now: np.ndarray,
+    now: Floats,
     since: float,
     **style: Any,
 ) -> str:
@@ -230,7 +231,7 @@ class _Body:
         friction = self.values.get("friction_static") or 0.0
         return "tipping" in self.effects and friction > self.depth / (2.0 * self.height)
 
-    def outline(self) -> np.ndarray:
+    def outline(self) -> Floats:
         """(points, 2) its outline where it stood at onset."""
         z = np.linspace(self.floor, self.top, 33)
         radius = self.values.get("radius_m") or math.inf
@@ -238,7 +239,7 @@ class _Body:
         back = [[self.depth, self.top], [self.depth, self.floor]]
         return np.vstack([np.column_stack([face, z]), back])
 
-    def stems(self, way: float, slid: float) -> Iterator[np.ndarray]:
+    def stems(self, way: float, slid: float) -> Iterator[Floats]:
         """The foot and the end of each stem, along the push."""
         count = min(int(self.values.get("stem_count") or 12), STEMS)
         spread = self.values.get("stem_spread_m") or 0.06
@@ -249,7 +250,7 @@ class _Body:
             bent = pressed * (self.top - self.floor) / -self.floor
             yield slid + behind + np.array([0.0, bent])
 
-    def leaning(self, slid: float, *, fallen: bool) -> tuple[np.ndarray, str]:
+    def leaning(self, slid: float, *, fallen: bool) -> tuple[Floats, str]:
         """Its outline as it leans over its far edge, and its motion in words."""
         lean = 0.5 * math.pi if fallen else min(slid / self.height, 0.5 * math.pi)
         edge = np.array([self.depth, self.floor])

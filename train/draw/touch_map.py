@@ -15,13 +15,14 @@ from train.draw.recording import PLAIN_TEXT, UNITS
 from train.draw.sketch import link_positions
 from train.report.section import counted
 from train.touch_map import Touch, TouchMap
+from train.vectors import Floats
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"
 UNKNOWN = "no label"
 
 
-def outline(info: ModelInfo) -> tuple[str, list[np.ndarray]]:
+def outline(info: ModelInfo) -> tuple[str, list[Floats]]:
     """The name of the arm or skin behind the contacts, and its lines (points, 3).
 
     In the map's frame: the skin's edges, or the arm with each joint in the middle of

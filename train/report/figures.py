@@ -8,11 +8,11 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Canvas
-from numpy.typing import NDArray
 from sklearn.metrics import confusion_matrix
 
 from train.evaluate import Result
 from train.report.section import Figure
+from train.vectors import Floats, Integers, Strings
 
 STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#1f5fa8", "o", "-"),
@@ -88,7 +88,7 @@ def legend(canvas: Any, axes: Any, columns: int) -> None:
 
 def spread(
     results: Sequence[Result],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """(n,) accuracies in percent, and (2, n) their distances to the ends of the
     intervals."""
     values = np.array([100 * result.accuracy for result in results])
@@ -107,9 +107,7 @@ def curve(
     axes.plot(x, y, color=colour, marker=marker, ls=dashes, ms=4, label=label)
 
 
-def confusion(
-    name: str, title: str, truth: NDArray[np.str_], answers: NDArray[np.str_]
-) -> Figure:
+def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure:
     """A confusion matrix, with a row for each label and a column for each answer.
 
     Args:
@@ -138,7 +136,7 @@ def confusion(
     return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
 
 
-def _draw_matrix(axes: Any, counts: NDArray[np.int64], fontsize: int | None) -> None:
+def _draw_matrix(axes: Any, counts: Integers, fontsize: int | None) -> None:
     """Draw the counts of a confusion matrix, darker with their share of a row."""
     n = len(counts)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)

@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, accuracies, neighbours
 from train.evaluate import Result, evaluate
 from train.pipeline import vote
 from train.search import SearchGrid
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
 
 
 def percent(share: float) -> float:
@@ -47,9 +46,9 @@ def score(result: Result) -> dict[str, Any]:
 
 
 def nested(
-    X: NDArray[np.float64],
+    X: Floats,
     y: Labels,
-    folds: NDArray[np.int64],
+    folds: Integers,
     *,
     grid: SearchGrid,
     features: Sequence[str],
@@ -69,9 +68,7 @@ def nested(
     return {task: table.nested(task) for task in y}
 
 
-def voted(
-    rows: NDArray[np.int64], y: NDArray[np.str_], components: int, k: int
-) -> Result:
+def voted(rows: Integers, y: Strings, components: int, k: int) -> Result:
     """The accuracy of a vote among each trial's nearest neighbours.
 
     Args:
@@ -86,7 +83,7 @@ def voted(
 
 
 def grid_search(
-    X: NDArray[np.float64],
+    X: Floats,
     y: Labels,
     scaling: str = "none",
     features: Sequence[str] = FEATURES,
@@ -111,10 +108,10 @@ def grid_search(
 
 
 def transfer(
-    X: NDArray[np.float64],
+    X: Floats,
     y: Labels,
     chosen: Mapping[str, Result],
-    changed: NDArray[np.float64],
+    changed: Floats,
 ) -> dict[str, Result]:
     """Each task's accuracy when a classifier is trained on trials and tested on changed
     ones.
@@ -136,15 +133,13 @@ def transfer(
     }
 
 
-def majority(y: NDArray[np.str_]) -> Result:
+def majority(y: Strings) -> Result:
     """The accuracy of always naming the most frequent label."""
     _, counts = np.unique(y, return_counts=True)
     return Result(int(counts.max()), len(y))
 
 
-def paired(
-    before: NDArray[np.bool_], after: NDArray[np.bool_]
-) -> tuple[float, float, float]:
+def paired(before: Booleans, after: Booleans) -> tuple[float, float, float]:
     """The change of accuracy on the same trials in percentage points, and its 95 %
     interval.
 

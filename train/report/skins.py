@@ -14,6 +14,7 @@ from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker, first_contact
+from train.vectors import Floats
 
 
 def follow(
@@ -31,7 +32,7 @@ def follow(
     return contacts
 
 
-def vectors(series: Sequence[FeatureSeries | None]) -> NDArray[np.float64]:
+def vectors(series: Sequence[FeatureSeries | None]) -> Floats:
     """(n, width) vectors of the paper's features; zeros for trials without contact."""
     nothing = np.zeros(len(FEATURES) * SAMPLES)
     return np.stack(

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.neighbors import NearestNeighbors
 
 from edge.errors import printable
@@ -21,6 +20,7 @@ from train.pipeline import Choice, squared_distances
 from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
 from train.report.score import interval
 from train.report.section import Row, Table, counted
+from train.vectors import Floats, Integers
 
 MISSING_SHARE = 0.02
 """Share of recordings without a contact above which the thresholds get a warning."""
@@ -227,7 +227,7 @@ def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
         )
 
 
-def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
+def tied_across_labels(rows: Floats, labels: Integers) -> int:
     """The number of rows (n, c) that equal a row with another label (n,)."""
     _, group = np.unique(rows, axis=0, return_inverse=True)
     labels_of = np.zeros((len(rows), int(labels.max()) + 1), dtype=bool)
@@ -235,7 +235,7 @@ def tied_across_labels(rows: NDArray[np.float64], labels: NDArray[np.int64]) -> 
     return int((labels_of.sum(axis=1) > 1)[group.ravel()].sum())
 
 
-def coarseness(rows: NDArray[np.float64], unit: float) -> float:
+def coarseness(rows: Floats, unit: float) -> float:
     """The coarseness of a model's grid for its trials, judged by at most a thousand of
     them.
 

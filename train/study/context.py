@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
-from train.vectors import Labels
+from train.vectors import Floats, Labels
 
 
 @dataclass(frozen=True)
@@ -35,6 +32,6 @@ class Context:
 
     def vectors(
         self, window_s: float = WINDOW_S, names: Sequence[str] = FEATURES
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """The trials' feature vectors."""
         return self.dataset.features(window_s, SAMPLES, names)

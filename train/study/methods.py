@@ -6,7 +6,6 @@ from functools import partial
 from operator import call
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
@@ -20,7 +19,7 @@ from train.report.section import Row, Section, Table
 from train.search import SearchGrid
 from train.study.context import Context
 from train.study.sweeps import by_task
-from train.vectors import Labels
+from train.vectors import Floats, Integers, Labels
 
 PAPER = "the paper's method"
 SEARCHED = "the paper's method, best of its grid"
@@ -40,7 +39,7 @@ Answers = Mapping[str, Result]
 """{task: result}."""
 
 
-def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> Answers:
+def extra_trees(X: Floats, y: Labels, folds: Integers) -> Answers:
     """The accuracy of extra trees, a widely used method, on X (n, taxels over time)."""
     trees = ExtraTreesClassifier(TREES, random_state=0)
     split = PredefinedSplit(folds)
@@ -51,7 +50,7 @@ def extra_trees(X: NDArray[np.float64], y: Labels, folds: NDArray[np.int64]) -> 
     return answers
 
 
-def taxels(context: Context) -> NDArray[np.float64]:
+def taxels(context: Context) -> Floats:
     """(n, times * taxels) counts at evenly spaced times; the last frame stays until the
     end."""
     times = np.linspace(0.0, WINDOW_S, TIMES)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.model.calibration import Stopping, StoppingRule
 from train.dataset import DataSet
@@ -15,6 +14,7 @@ from train.groups import TRIAL, groupable
 from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates
+from train.vectors import Booleans, Floats, Integers
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5
@@ -38,8 +38,8 @@ class Certified:
 
     asked: float
     folds: int
-    right: NDArray[np.bool_]
-    waited: NDArray[np.bool_]
+    right: Booleans
+    waited: Booleans
     unknown: float
     early: float
     mean_s: float
@@ -75,8 +75,8 @@ class StoppingComparison:
     """
 
     decision_points_s: tuple[float, ...]
-    right: NDArray[np.bool_]
-    confidence: NDArray[np.float64]
+    right: Booleans
+    confidence: Floats
     course: Course
     certified: list[Certified]
 
@@ -134,9 +134,7 @@ def compare_stopping(
     return {task: _compared(task, held_out, decision_points_s) for task in tasks}
 
 
-def _folds(
-    dataset: DataSet, leave_out: str
-) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+def _folds(dataset: DataSet, leave_out: str) -> tuple[tuple[str, ...], Integers]:
     """The tasks that can be tested with single trials or groups left out, and each
     trial's fold."""
     y = {task: dataset.labels(task) for task in dataset.tasks}
@@ -159,16 +157,14 @@ class _HeldOut:
         courses: {task: of the fold's trials}.
     """
 
-    test: NDArray[np.bool_]
+    test: Booleans
     stopping: Mapping[str, Stopping]
-    right: Mapping[str, NDArray[np.bool_]]
-    confidence: Mapping[str, NDArray[np.float64]]
+    right: Mapping[str, Booleans]
+    confidence: Mapping[str, Floats]
     courses: Mapping[str, Course]
 
 
-def _held_out(
-    dataset: DataSet, test: NDArray[np.bool_], options: Mapping[str, Any]
-) -> _HeldOut:
+def _held_out(dataset: DataSet, test: Booleans, options: Mapping[str, Any]) -> _HeldOut:
     """A fold's trials, decided by a model that was fitted without them (`judged`)."""
     fitted = fit(dataset.part(~test), **options)
     model = fitted.sequential

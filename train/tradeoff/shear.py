@@ -7,7 +7,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.touch.measures import SHEAR, feature
 from train.choose import Chosen
@@ -20,6 +19,7 @@ from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S, Points, chosen, unseen
 from train.tradeoff.early import StoppingComparison, compare_stopping, soonest_s
 from train.tradeoff.wires import microcontroller
+from train.vectors import Booleans
 
 LEVELS = (0.8, 0.9, 0.95)
 """Accuracies for which the time is told."""
@@ -98,7 +98,7 @@ def compared(
     return Compared(sheared, plain)
 
 
-def right(choice: Chosen, kind: str) -> NDArray[np.bool_] | None:
+def right(choice: Chosen, kind: str) -> Booleans | None:
     """(n,) whether each trial is answered rightly; None if no group was left out."""
     result = choice.by_trial if kind == KNOWN else unseen(choice)
     return None if result is None else np.asarray(result.hits)
