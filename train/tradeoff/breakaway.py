@@ -4,9 +4,8 @@ decision."""
 import numpy as np
 
 from train.simulate.arm import Kinematics
+from train.simulate.contact import GRAVITY
 from train.simulate.scene_model import Scene
-
-G = 9.80665
 
 
 def breakaway_times(scene: Scene) -> dict[str, float]:
@@ -29,12 +28,13 @@ def breakaway_times(scene: Scene) -> dict[str, float]:
     stiffness = 1.0 / float((pull**2 / np.array(scene.stiffness)).sum())
     times = {}
     for thing in scene.objects:
-        if "movable" in thing.conditions and "mass_kg" in thing.values:
-            values = {key: value.middle for key, value in thing.values.items()}
+        values = {key: value.middle for key, value in thing.values.items()}
+        if "movable" in thing.conditions and "mass_kg" in values:
             ratio = values["friction_static"]
-            if values.get("base_m", 0.0) > 0.0 and values.get("height_m", 0.0) > 0.0:
-                ratio = min(
-                    ratio, values["base_m"] / (2.0 * values["height_m"])
-                )  # it tips
-            times[thing.name] = ratio * values["mass_kg"] * G / (stiffness * speed)
+            base_m = values.get("base_m", 0.0)
+            height_m = values.get("height_m", 0.0)
+            if base_m > 0.0 and height_m > 0.0:
+                ratio = min(ratio, base_m / (2.0 * height_m))
+            holds_n = ratio * values["mass_kg"] * GRAVITY
+            times[thing.name] = holds_n / (stiffness * speed)
     return times

@@ -56,7 +56,6 @@ def followed(
     features: Sequence[str] = (),
     *,
     quick: bool = True,
-    progress: bool = False,
     like: SkinLayout | None = None,
 ) -> DataSet:
     """The trials of recordings, with the features of all candidates and further ones by
@@ -66,7 +65,6 @@ def followed(
         raw: the recordings.
         features: names of further ones.
         quick: the candidates of a quick choice.
-        progress: show progress bars on stderr.
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
     drawn = kinds_of(raw.recordings) is not None
@@ -78,7 +76,7 @@ def followed(
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,
     )
-    return load_trials(raw, measurement, progress=progress)
+    return load_trials(raw, measurement)
 
 
 def chosen(
