@@ -32,9 +32,10 @@ def clear():
 
 
 def test_the_best_cell_is_reported_with_its_answers():
-    X, y = trials(26)
-    best = grid_search(X, {"t": y})["t"]
-    table = accuracies(neighbours(X, features=ONE), y)
+    vectors = trials(26)
+    y = vectors.y["t"]
+    best = grid_search(vectors.X, vectors.y)["t"]
+    table = accuracies(neighbours(vectors.X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
     assert best.right == int((best.said == y).sum())
 
