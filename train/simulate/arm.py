@@ -143,7 +143,9 @@ def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
         out[first] = a * cosine + b * sine
         out[second] = b * cosine - a * sine
         return out
-    (x, y, z), (a, b, c), versine = link.axis.tolist(), rotation, 1.0 - cosine
+    x, y, z = link.axis.tolist()
+    a, b, c = rotation
+    versine = 1.0 - cosine
     # Each row of the rotation times K, and that times K again.
     u = b * z - c * y
     v = c * x - a * z

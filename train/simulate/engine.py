@@ -61,12 +61,13 @@ def values_of(scene: Scene, specs: tuple[TrialSpec, ...]) -> dict[str, Array]:
     A value that an object does not have, such as the mass of a fixed one, is NaN and
     never read.
     """
-    streamed = [(trial.key, trial.attempt) for trial in specs]
+    groups: dict[tuple[str, int], list[int]] = {}
+    for i, trial in enumerate(specs):
+        groups.setdefault((trial.key, trial.attempt), []).append(i)
     out: dict[str, Array] = {}
-    for group in dict.fromkeys(streamed):
-        members = [i for i, stream in enumerate(streamed) if stream == group]
-        for name, numbers in _values(scene, [specs[i] for i in members]).items():
-            out.setdefault(name, np.full(len(specs), np.nan))[members] = numbers
+    for places in groups.values():
+        for name, numbers in _values(scene, [specs[i] for i in places]).items():
+            out.setdefault(name, np.full(len(specs), np.nan))[places] = numbers
     return out
 
 

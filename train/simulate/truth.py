@@ -97,12 +97,9 @@ def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
     ended = f"ended {ends_s - onset_s:.2f} s after the touch"
     if ends_s < stroke_s:
         return f", and the trial {ended}", "give trials.after_s more, or "
-    short = stroke_s < scene.travel_s
-    remedy = (
-        "start_deg more room before the joint's limit"
-        if short
-        else "travel_s more time"
-    )
+    remedy = "travel_s more time"
+    if stroke_s < scene.travel_s:
+        remedy = "start_deg more room before the joint's limit"
     return f", as the arm's stroke {ended}", f"give motion.{remedy}, or "
 
 

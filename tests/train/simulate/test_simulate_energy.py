@@ -86,14 +86,10 @@ class Ledger:
         """Book the work of this step, for the trials that took it."""
         t = active.batch
         if self.q is None:
-            self.q, self.slide = (
-                t.everyone.equilibrium(0.0) - t.joints.lag,
-                np.zeros(t.n),
-            )
-            self.v, self.speed = (
-                np.broadcast_to(t.joints.rate, t.arm.q.shape),
-                np.zeros(t.n),
-            )
+            self.q = t.everyone.equilibrium(0.0) - t.joints.lag
+            self.slide = np.zeros(t.n)
+            self.v = np.broadcast_to(t.joints.rate, t.arm.q.shape)
+            self.speed = np.zeros(t.n)
         if self.meddle:
             self.meddle(t)
         moved = np.zeros(t.n, dtype=bool)

@@ -32,10 +32,8 @@ GOOD = {
 def changed(path, value):
     """The good scene with another value, at a path like `object.0.name`."""
     table = copy.deepcopy(GOOD)
-    place, (*keys, last) = (
-        table,
-        [int(key) if key.isdigit() else key for key in path.split(".")],
-    )
+    *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+    place = table
     for key in keys:
         place = place[key]
     place[last] = value
