@@ -314,7 +314,7 @@ def main(argv=None):
         "--only", default="", help="commands whose name holds this text"
     )
     arguments = parser.parse_args(argv)
-    names = [name for name in VICTIMS if arguments.only in name]
+    names = list(filter(lambda name: arguments.only in name, VICTIMS))
     if not names:
         parser.error(f"no command's name holds {arguments.only!r}: {[*VICTIMS]}")
     rows = []

@@ -66,6 +66,20 @@ def _escaped(row):
     return {name: text.replace("|", "\\|") for name, text in row.items()}
 
 
+def printed(case):
+    """Whether a case is within its bound, and its entry, which is printed."""
+    began = time.perf_counter()
+    worst = case.worst()
+    within = worst.error <= case.bound
+    entry = Entry.of(case, worst)
+    took = time.perf_counter() - began
+    print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
+    for name, text in {**entry.judge, **entry.answer}.items():
+        if text != case.key:
+            print(textwrap.fill(f"{name}: {text}", 96, **INDENT))
+    return within, entry
+
+
 def main(argv=None):
     """Print the cases; 1 if one exceeds its bound. All of them renew the page's table."""
     parser = argparse.ArgumentParser(prog="hard_cases", description=__doc__)
@@ -77,17 +91,9 @@ def main(argv=None):
     entries = []
     beyond = 0
     for case in cases:
-        began = time.perf_counter()
-        worst = case.worst()
-        within = worst.error <= case.bound
+        within, entry = printed(case)
         beyond += not within
-        entry = Entry.of(case, worst)
         entries.append(entry)
-        took = time.perf_counter() - began
-        print(f"{'ok  ' if within else 'FAIL'} {case.key}  [{took:.1f} s]")
-        for name, text in {**entry.judge, **entry.answer}.items():
-            if text != case.key:
-                print(textwrap.fill(f"{name}: {text}", 96, **INDENT))
     print(f"{len(entries)} cases, {beyond} beyond their bound")
     if cases == CASES:
         answers = [entry.answer for entry in entries]
