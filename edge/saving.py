@@ -97,7 +97,7 @@ def find(paths: list[str]) -> list[Path]:
     too).
 
     Raises:
-        InputError: a path does not exist, or a folder holds no recording.
+        InputError: a folder holds no recording.
     """
     files: list[Path] = []
     for path in map(Path, paths):

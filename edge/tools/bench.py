@@ -27,6 +27,7 @@ import numpy as np
 from edge import __version__
 from edge.classifier import Classifier
 from edge.commands.output import LOG, Output
+from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.frame import Frame
@@ -160,7 +161,11 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     layout = info.layout
     frames = touch(model, info.window_s)
     contact = first_contact(frames, info.tracker(layout))
-    assert contact is not None
+    if contact is None:
+        raise InputError(
+            f"{model.path}: a contact begins above {layout.onset} counts, which no taxel "
+            "reaches"
+        )
     series = contact[1]
     counts = [frame.counts for frame in frames[INSIDE]]
     due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)

@@ -268,7 +268,7 @@ def measure(data, quick, jobs):
     at_own_time = []
     certified = []
     for task, first in sets[0].items():
-        judged = [of_set[task] for of_set in sets]
+        judged = [of_set[task] for of_set in sets if task in of_set]
         for seconds in DECISION_POINTS_S:
             row = {"task": task, "mean time, s": f"{seconds:.1f}"}
             at_each_time.append(row | compare(judged, seconds))

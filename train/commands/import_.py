@@ -26,6 +26,7 @@ from edge.recording import Recording
 from edge.saving import save
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
+from train import former_recordings
 from train.importers import names
 from train.progress import bar, say
 from train.thresholds import count_felt, proposed
@@ -127,6 +128,8 @@ def write(
     report = [set_thresholds(without_threshold)] if without_threshold else []
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
     warn_of_copies(list(frames.values()))
+    for warning in former_recordings.warnings(arguments.out, paths):
+        say(warning)
     skipped = getattr(arguments, "skipped", [])
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from train import former_recordings
+
 if TYPE_CHECKING:
     from train.simulate.run import Written
     from train.simulate.scene_model import Scene
@@ -66,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def remarks(scene: "Scene", written: "Written") -> Iterator[str]:
     """What a user should know of recordings that were written."""
+    yield from former_recordings.warnings(written.paths[0].parent, written.paths)
     if written.redrawn:
         yield f"drawn again until they fitted their labels: {written.redrawn}"
     if written.unfelt:

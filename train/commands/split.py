@@ -16,10 +16,11 @@ from edge.recording import Recording
 from edge.saving import save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
+from train import former_recordings
 from train.dataset import read
 from train.labels import labels_of
 from train.parts import part
-from train.progress import bar
+from train.progress import bar, say
 
 LEAD_S = 0.25
 """Seconds kept before a contact, or fewer where another contact ends in them."""
@@ -50,6 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     for path, contact in contacts.items():
         save(path, contact)
     print(f"recordings written to {arguments.out}: {len(contacts)}")
+    for warning in former_recordings.warnings(arguments.out, contacts):
+        say(warning)
     return 0
 
 

@@ -188,6 +188,12 @@ def _by_letters(table: Table) -> pd.DataFrame:
     for name in table.names:
         if parts := lettered(name):
             letter, taxel = parts
+            former = columns[taxel].get(letter)
+            if former is not None:
+                raise InputError(
+                    f"{table.path}: {former} and {name} are both {letter} of {taxel}; "
+                    "rename one of them"
+                )
             columns[taxel][letter] = name
     return pd.DataFrame(columns, index=LETTERS).T
 

@@ -217,7 +217,7 @@ def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
     members = classifier.members_[space]
     _, different = np.unique(fitted.X[members], axis=0, return_index=True)
     steps = coarseness(rows[different], classifier.projections_[space].grid_.unit)
-    if steps < FEWEST_UNITS:
+    if rows.any() and steps < FEWEST_UNITS:
         farthest = members[(rows**2).sum(axis=1).argmax()]
         yield (
             f"warning: {task}: half of the trials lie within {steps:.0f} of the "

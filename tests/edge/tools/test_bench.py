@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from edge import __version__
 from edge.cli import main
+from edge.errors import InputError
 from edge.tools import bench
 from edge.tools.bench import summary, touch
 from edge.touch.track import ContactTracker, first_contact
@@ -81,6 +84,13 @@ def test_the_touch_is_a_contact_that_grows_over_the_whole_window(model):
     assert series.t[-1] == pytest.approx(info.window_s)
     assert series.area[-1] > series.area[0] > 1
     assert series.peak[-1] > series.peak[0]
+
+
+def test_a_model_of_a_skin_that_no_touch_reaches_is_refused(model):
+    deaf = replace(model.info.layout, threshold_counts=65535, onset_counts=65535)
+    info = replace(model.info, layout=deaf)
+    with pytest.raises(InputError, match="begins above 65535 counts, which no taxel"):
+        bench.time_stages(SimpleNamespace(info=info, path="model.onnx"), 4)
 
 
 def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, capsys):

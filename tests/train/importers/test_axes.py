@@ -125,6 +125,7 @@ def test_signed_values_lose_their_rest_on_each_axis(folder, imported):
     ("names", "options", "sentence"),
     [
         ("s1_x s1_y s1_z s2_z", ("--axes", "xyz"), "['s2'] lacks one of the axes"),
+        ("s1_x s1_y s1_z s1_X", ("--axes", "xyz"), "s1_x and s1_X are both x of s1"),
         ("s1 s2 s3 s4", ("--axes", "xyz"), "no columns are named by an axis"),
         ("s1_x s1_y s1_z s2", (), "or --axes xyz for taxels of three axes"),
         ("s1_x s1_y s1_z s2", ("--flip", "x"), "--flip needs --axes"),

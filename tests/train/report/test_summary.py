@@ -93,6 +93,19 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     assert sentence.startswith("warning: object: 3 trials have")
 
 
+def test_a_task_of_one_label_has_no_trial_far_outside(recordings, tmp_path):
+    for path in sorted(recordings.glob("*.npz")):
+        recording = load(path)
+        labels = {**recording.labels, "place": "here"}
+        save(
+            tmp_path / path.name,
+            replace(recording, meta={**recording.meta, "labels": labels}),
+        )
+    fitted = train.fit(str(tmp_path), features=["paper"], jobs=1, k=1, quick=True)
+    assert "place" in fitted.chosen
+    assert said(fitted, "lies far outside") == []
+
+
 @pytest.mark.parametrize("factor", [3e6, 1e12])
 def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(
     recordings, factor

@@ -172,6 +172,12 @@ class TestCommand:
         assert "base 10 ms, sliding 5 ms; they err by at most 1.2 %" in err
         assert len(list(tmp_path.iterdir())) == 8
 
+    def test_a_former_runs_recordings_are_named(self, tmp_path, capsys):
+        (tmp_path / "former.npz").touch()
+        main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)])
+        said = "holds other recordings too: 1, such as former.npz"
+        assert said in capsys.readouterr().err
+
     def test_explain_lists_effects_reasons_and_costs(self, tmp_path, capsys):
         path = tmp_path / "one.toml"
         path.write_text(
