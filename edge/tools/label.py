@@ -244,16 +244,25 @@ def _carry_out(journal: Path) -> list[Path]:
 def change_all(changes: Mapping[Path, Mapping[str, str]]) -> None:
     """Give each recording its new labels: all of them, or a later start does.
 
-    A journal beside the first file says what is to be done, until it is.
+    A journal beside the first file says what is to be done, until it is. Each folder
+    keeps the former labels of its recordings.
     """
-    folder = next(iter(changes)).parent
-    former = {path: load(path).labels for path in changes}
-    for name, all_labels in ((JOURNAL, changes), (UNDO, former)):
-        entries = [[str(path.absolute()), all_labels[path]] for path in changes]
-        with write_whole(folder / name) as file:
-            file.write(json.dumps(entries).encode())
-    shutil.rmtree(folder / DELETED, ignore_errors=True)
-    _carry_out(folder / JOURNAL)
+    former: dict[Path, dict[Path, Mapping[str, str]]] = {}
+    for path in changes:
+        former.setdefault(path.parent, {})[path] = load(path).labels
+    for folder, labels in former.items():
+        _note(folder / UNDO, labels)
+        shutil.rmtree(folder / DELETED, ignore_errors=True)
+    journal = next(iter(changes)).parent / JOURNAL
+    _note(journal, changes)
+    _carry_out(journal)
+
+
+def _note(journal: Path, labels: Mapping[Path, Mapping[str, str]]) -> None:
+    """Write a journal of the labels of recordings."""
+    entries = [[str(path.absolute()), labels[path]] for path in labels]
+    with write_whole(journal) as file:
+        file.write(json.dumps(entries).encode())
 
 
 def finish_interrupted(folder: Path) -> None:

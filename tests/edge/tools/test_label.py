@@ -126,6 +126,30 @@ def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
 
 
 @pytest.fixture
+def two_days(make_touch, tmp_path):
+    """Two folders with a recording each, whose label was changed on its own, and then
+    with the other's."""
+    paths = [tmp_path / day / "a.npz" for day in ("monday", "tuesday")]
+    for path in paths:
+        save(path, make_touch())
+        label.change_all({path: {"object": "first"}})
+    label.change_all({path: {"object": "second"} for path in paths})
+    return paths
+
+
+def test_a_change_of_several_folders_is_taken_back_in_all(two_days, edge):
+    assert edge("label", *(path.parent for path in two_days), "--undo")[0] == 0
+    assert [load(path).labels for path in two_days] == [{"object": "first"}] * 2
+
+
+def test_a_change_of_several_folders_is_taken_back_in_one(two_days, edge):
+    monday, tuesday = two_days
+    assert edge("label", tuesday.parent, "--undo")[0] == 0
+    assert load(tuesday).labels == {"object": "first"}
+    assert load(monday).labels == {"object": "second"}
+
+
+@pytest.fixture
 def kept(make_touch, tmp_path):
     """Kept touches: a sure one, an unsure one, a wrong one, and one that is unknown."""
     touch = make_touch()
