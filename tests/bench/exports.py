@@ -14,7 +14,7 @@ the share of the shifts of `make shifts` that are told, as is explained there.
 from __future__ import annotations
 
 from collections import defaultdict
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from itertools import chain
@@ -115,7 +115,7 @@ def judged(seed, fresh, shifted):
         data = Path(folder) / "data"
         write(scenes.load(SCENE, seed=seed), data)
         out = str(Path(folder) / "out")
-        with redirect_stdout(StringIO()):
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             main(["--data", str(data), "--out", out, "--jobs", "1"])
         model = Model(Path(out) / "model.onnx")
     touches = [r for _, r in simulate(scenes.load(SCENE, seed=FRESH_SEED, count=fresh))]
