@@ -103,12 +103,19 @@ def find(paths: list[str]) -> list[Path]:
     for path in map(Path, paths):
         inside = [path]
         if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-            inside = sorted(
-                p
-                for p in path.rglob("*.npz")
-                if not any(part[:1] == "." for part in p.relative_to(path).parts)
-            )
+            inside = recordings_in(path)
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
         files += inside
     return files
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """The `.npz` files in a folder and in those within it, but for hidden ones, such as
+    deleted recordings; sorted."""
+    files = []
+    for path in folder.rglob("*.npz"):
+        parts = path.relative_to(folder).parts
+        if not any(part.startswith(".") for part in parts):
+            files.append(path)
+    return sorted(files)

@@ -3,13 +3,16 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from edge.saving import recordings_in
+
 
 def warnings(folder: Path, written: Iterable[Path]) -> Iterator[str]:
     """A sentence where recordings of a folder are none of those just written.
 
     Whoever takes the folder as one data set takes these as well.
     """
-    former = sorted(set(folder.rglob("*.npz")) - set(written))
+    of_now = set(written)
+    former = [path for path in recordings_in(folder) if path not in of_now]
     if former:
         yield (
             f"warning: {folder} holds other recordings too: {len(former)}, such as "

@@ -4,7 +4,7 @@ from train.former_recordings import warnings
 
 
 def test_recordings_that_were_not_written_now_are_counted_and_one_is_named(tmp_path):
-    for name in ("a.npz", "b.npz", "within/c.npz", "golden.txt"):
+    for name in ("a.npz", "b.npz", "within/c.npz", "golden.txt", ".deleted/d.npz"):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.touch()

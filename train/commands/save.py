@@ -144,9 +144,9 @@ class Long:
             columns[f"taxel_{row}_{col}"] = array
         if self.shear is not None:
             for row, col in places:
-                along, around = self.shear[:, row, col].T
-                columns[f"taxel_{row}_{col}_along"] = along
-                columns[f"taxel_{row}_{col}_around"] = around
+                shear = self.shear[:, row, col]
+                columns[f"taxel_{row}_{col}_along"] = shear[:, 0]
+                columns[f"taxel_{row}_{col}_around"] = shear[:, 1]
         return columns
 
 

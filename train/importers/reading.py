@@ -297,12 +297,17 @@ def _parsed(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
     trial 007 is not trial 7. In a column of numbers such words are empty cells.
     """
-    names = header.names
     table = _cells(text, header, low_memory=False, **options)
-    is_number = pd.api.types.is_numeric_dtype
-    texts = [i for i in table if names[i] == "trial" or not is_number(table[i])]
-    if texts:
-        table[texts] = _texts(text, header, texts)
+    altered = []
+    for i, name in enumerate(header.names):
+        is_number = pd.api.types.is_numeric_dtype(table[i])
+        # A word such as `NA` is no string any more, nor is a number beyond measure.
+        is_text = pd.api.types.infer_dtype(table[i]) == "string"
+        stands = is_text and not table[i].hasnans
+        if not stands and (name == "trial" or not is_number):
+            altered.append(i)
+    if altered:
+        table[altered] = _texts(text, header, altered)
     return _named(table, header)
 
 
