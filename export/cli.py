@@ -158,7 +158,7 @@ def _add_front(top: argparse.ArgumentParser) -> None:
 
 
 def _add_results(top: argparse.ArgumentParser) -> None:
-    """What is written and scored."""
+    """The options of files that are written or scored."""
     option = top.add_argument
     text = "also write OUT/report.html, as `make export` does"
     option("--report", action="store_true", help=text)

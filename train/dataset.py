@@ -273,7 +273,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What is measured of each contact.
+    """The measures that are taken of each contact.
 
     Attributes:
         features: names of the features (see `edge.touch.measures`).

@@ -308,7 +308,7 @@ class ContactClassifier:
             self.rows_[space] = self.project(space, X[members])
 
     def _set_labels(self, y: Labels) -> None:
-        """Set what is known of each task's labels and coordinates."""
+        """Set the labels and the coordinates of each task."""
         self.classes_: dict[str, Strings] = {}
         self.labels_: dict[str, Integers] = {}
         self.components_: dict[str, int] = {}

@@ -1,8 +1,8 @@
 """The state of trials that run side by side, in arrays whose last axis is the trial.
 
 A `Batch` holds the arrays of all its trials. A hook gets `Trials`: some of them, whose
-arrays hold these alone. What it reads is gathered for it, and what it assigns is
-scattered among the others.
+arrays hold these alone. A read gathers the values of these trials, and an assignment
+scatters them among the others.
 """
 
 from collections.abc import Iterator, Mapping
