@@ -412,8 +412,8 @@ class Classifier:
         """The answers of the tasks that need not wait any longer."""
         answers = []
         for task in pending.tasks:
-            asked = replace(blank, task=task)
-            answer: Decided | None = self._answer(asked, decisions[task], unknown)
+            candidate = replace(blank, task=task)
+            answer: Decided | None = self._answer(candidate, decisions[task], unknown)
             if answer is not None and self._policies:
                 answer = self._policies[task].answer(
                     answer, pending.decision_point, pending.decided

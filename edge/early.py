@@ -38,7 +38,7 @@ class Policy(Protocol):
     """When and how a task is decided."""
 
     def answer(
-        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
@@ -56,13 +56,13 @@ class Uncertified:
         self._full = len(info.decision_points_s) - 1
 
     def answer(
-        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
     ) -> Decided | None:
         """The model's answer at the last decision point."""
         if point < self._full:
             return None
-        tie = ("tie",) if _decision(asked).tie else ()
-        return replace(asked, flags=(*asked.flags, *tie, "uncertified"))
+        tie = ("tie",) if _decision(candidate).tie else ()
+        return replace(candidate, flags=(*candidate.flags, *tie, "uncertified"))
 
 
 class Early:
@@ -87,46 +87,50 @@ class Early:
         self._names_unknown = info.novelty is not None and info.novelty.task == task
 
     def answer(
-        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
         An unknown contact waits for the full window.
         """
-        unknown = UNKNOWN in asked.flags
-        sure = self._is_sure(asked, point)
+        unknown = UNKNOWN in candidate.flags
+        sure = self._is_sure(candidate, point)
         last = len(self._info.decision_points_s) - 1 if unknown else self._rule.last
         if point < last and (unknown or not sure):
             return None
-        return self._answered(asked, point, sure)
+        return self._answered(candidate, point, sure)
 
-    def _is_sure(self, asked: Decided, point: int) -> bool:
-        decision = _decision(asked)
+    def _is_sure(self, candidate: Decided, point: int) -> bool:
+        decision = _decision(candidate)
         novelty = self._info.novelty
         if decision.label_distances is None or novelty is None:
-            raise InputError(f"the model gives no distances of {asked.task}'s labels")
+            raise InputError(
+                f"the model gives no distances of {candidate.task}'s labels"
+            )
         label = self._task.labels.index(decision.label)
         excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
         return self._stopping.sure(self._rule, distances, label, excess)
 
-    def _answered(self, asked: Decided, point: int, sure: bool) -> Decided:
+    def _answered(self, candidate: Decided, point: int, sure: bool) -> Decided:
         """The answer of the rule."""
         novelty = self._info.novelty
-        if UNKNOWN in asked.flags and self._names_unknown and novelty is not None:
-            rate = novelty.rate(point, _decision(asked).novelty)
-            asked = replace(asked, label=UNKNOWN, confidence=round(1.0 - rate, 6))
+        if UNKNOWN in candidate.flags and self._names_unknown and novelty is not None:
+            rate = novelty.rate(point, _decision(candidate).novelty)
+            candidate = replace(
+                candidate, label=UNKNOWN, confidence=round(1.0 - rate, 6)
+            )
         elif not sure and not self._rule.fixed:
-            asked = replace(asked, flags=(*asked.flags, "unsure"))
+            candidate = replace(candidate, flags=(*candidate.flags, "unsure"))
         stopped_by = "confidence" if sure else "window"
-        return replace(asked, error=self._error, stopped_by=stopped_by)
+        return replace(candidate, error=self._error, stopped_by=stopped_by)
 
 
 class Product(Early):
     """Decide when both factors are, by their labels."""
 
     def answer(
-        self, asked: Decided, point: int, decided: Mapping[str, Decided]
+        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
     ) -> Decided | None:
         """The answer once both factors have theirs."""
         factors = self._task.factors
@@ -142,16 +146,18 @@ class Product(Early):
             confidence *= answer.confidence or 0.0
             sure = sure and answer.stopped_by == "confidence"
         label = self._task.labels[product_label(factors, indices)]
-        decision = _decision(asked)._replace(label=label)
+        decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
-        asked = replace(asked, label=label, confidence=confidence, decision=decision)
-        return self._answered(asked, point, sure)
+        candidate = replace(
+            candidate, label=label, confidence=confidence, decision=decision
+        )
+        return self._answered(candidate, point, sure)
 
 
-def _decision(asked: Decided) -> Decision:
+def _decision(candidate: Decided) -> Decision:
     """The model's own answer, which is known of every task that is asked."""
-    assert asked.decision is not None
-    return asked.decision
+    assert candidate.decision is not None
+    return candidate.decision
 
 
 def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]:

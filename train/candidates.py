@@ -110,9 +110,9 @@ def known_products(y: Labels) -> dict[str, tuple[str, str]]:
     }
 
 
-def features_of(tried: Sequence[Candidate]) -> tuple[str, ...]:
+def features_of(candidates: Sequence[Candidate]) -> tuple[str, ...]:
     """The features of some candidates, each once."""
-    return expand([name for candidate in tried for name in candidate.sets])
+    return expand([name for candidate in candidates for name in candidate.sets])
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ class Choosing:
     Args:
         dataset: measured for every candidate.
         y: {task: (n,) labels}.
-        tried: the candidates, those of early decision points among them.
+        candidates: those of early decision points among them.
         divisions: the trials that are left out together.
         samples: values of a feature.
         jobs: processes.
@@ -106,7 +106,7 @@ class Choosing:
         self,
         dataset: DataSet,
         y: Labels,
-        tried: Sequence[Candidate],
+        candidates: Sequence[Candidate],
         divisions: Divisions,
         samples: int,
         jobs: int = 1,
@@ -114,8 +114,10 @@ class Choosing:
     ) -> None:
         self._dataset = dataset
         self._y = y
-        self.tried = [candidate for candidate in tried if candidate.full]
-        self._tried_early = [candidate for candidate in tried if candidate.early]
+        self.candidates = [candidate for candidate in candidates if candidate.full]
+        self._early_candidates = [
+            candidate for candidate in candidates if candidate.early
+        ]
         self._divisions = divisions
         self._groups = divisions.groups
         self._samples = samples
@@ -136,7 +138,7 @@ class Choosing:
     def _tables(
         self,
         vectors: Vectors,
-        tried: Sequence[Candidate],
+        candidates: Sequence[Candidate],
         what: str,
         *,
         nested: bool,
@@ -149,7 +151,7 @@ class Choosing:
         """
         folds = self._divisions.folds
         other_folds = self._divisions.others if repeated else ()
-        grids = [grid for candidate in tried for grid in candidate.grids]
+        grids = [grid for candidate in candidates for grid in candidate.grids]
         total = fits(folds, nested)
         total += sum(fits(other, False) for other in other_folds)
         if self._groups is not None:
@@ -176,7 +178,7 @@ class Choosing:
         best in plain cross-validation}."""
         vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
         what = f"{window_s:g} s"
-        trials, groups = self._tables(vectors, self.tried, what, nested=False)
+        trials, groups = self._tables(vectors, self.candidates, what, nested=False)
         right: dict[str, Floats] = {}
         for task in self._y:
             table = groups if self._is_grouped(task) else trials
@@ -231,7 +233,7 @@ class Choosing:
             [fold]{task: the choice made without the fold's trials}.
         """
         vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
-        trials, groups = self._tables(vectors, self.tried, "choosing", nested=True)
+        trials, groups = self._tables(vectors, self.candidates, "choosing", nested=True)
         chosen = {}
         of_task = {}
         for task in self._y:
@@ -251,7 +253,7 @@ class Choosing:
     ) -> EarlySettings | None:
         """The settings of the decision points before the full window, by the same rule
         as those of the full window; None without candidates for them."""
-        if not self._tried_early:
+        if not self._early_candidates:
             return None
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
         trials = averaged([by_trial for by_trial, _ in tables])
@@ -268,11 +270,11 @@ class Choosing:
 
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
         """The answers of the candidates for early decision points at one of them."""
-        tried = self._tried_early
-        dataset = self._dataset.of(features_of(tried))
+        candidates = self._early_candidates
+        dataset = self._dataset.of(features_of(candidates))
         vectors = self._vectors(dataset, window_s)
         what = f"{window_s:g} s"
-        return self._tables(vectors, tried, what, nested=False, repeated=False)
+        return self._tables(vectors, candidates, what, nested=False, repeated=False)
 
     def _settle_early(
         self, task: str, table: AnswerTable, k: int, margin: float = 0.0
@@ -341,7 +343,7 @@ class Choosing:
         rule = self._rule(task, table)
         return [
             replace(rule, allowed=places_of(candidate, choices))
-            for candidate in self.tried
+            for candidate in self.candidates
         ]
 
     def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:

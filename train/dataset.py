@@ -146,7 +146,7 @@ class DataSet:
     def part(self, trials: NDArray[np.bool_]) -> DataSet:
         """Some of the trials (n,)."""
         part = (
-            trial for trial, taken in zip(self.trials, trials, strict=True) if taken
+            trial for trial, chosen in zip(self.trials, trials, strict=True) if chosen
         )
         return replace(self, trials=tuple(part))
 
@@ -364,10 +364,10 @@ def load_trials(
         for recording, path in posed.recordings
     )
     count = len(posed.recordings)
-    shown = bar(
+    trials = bar(
         work, total=count, desc="following", unit=" trials", disable=not progress
     )
-    touched = collect(posed.recordings, shown, layout).completed()
+    touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
     labelled = touched.labelled(tasks, partial=partial)
     left_out = {f"a label for {task}": touched.without(task) for task in tasks}

@@ -56,7 +56,7 @@ class Result:
         components: of the best settings, or of those most often chosen; 0 where there
             was no choice.
         k: likewise.
-        said: (n,) the label answered for each trial, or None.
+        answers: (n,) the label answered for each trial, or None.
         hits: (n,) whether each trial is answered right, or None; two results on the
             same trials are compared by it.
     """
@@ -65,7 +65,7 @@ class Result:
     total: int
     components: int = 0
     k: int = 0
-    said: Strings | None = None
+    answers: Strings | None = None
     hits: Booleans | None = field(default=None, repr=False, compare=False)
 
     @property

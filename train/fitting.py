@@ -129,7 +129,9 @@ class FitOptions(Fixed):
             return self.decision_points_s[-1]
         return self.window_s
 
-    def tried(self, dataset: DataSet, y: Labels, *, drawn: bool) -> list[Candidate]:
+    def candidates_for(
+        self, dataset: DataSet, y: Labels, *, drawn: bool
+    ) -> list[Candidate]:
         """The candidates for some trials."""
         joints = dataset.joints > 0
         shear = dataset.layout.axes is not None
@@ -142,7 +144,7 @@ class FitOptions(Fixed):
         return Choosing(
             dataset,
             y,
-            self.tried(dataset, y, drawn=drawn),
+            self.candidates_for(dataset, y, drawn=drawn),
             Divisions.of(dataset, y, self.leave_out, self.quick),
             self.samples,
             self.processes,
@@ -243,7 +245,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         samples=fixed.samples,
         X=X,
         chosen=settings.chosen,
-        candidates=tuple(settings.tried),
+        candidates=tuple(settings.candidates),
         classifier=classifier,
         sequential=sequential,
         notes=tuple(notes),
@@ -303,7 +305,7 @@ def _with_thresholds(
     notes: list[str],
 ) -> DataSet:
     """The trials, by thresholds that are given, saved, proposed or chosen."""
-    tried = candidates(
+    usual = candidates(
         {},
         options,
         joints=recordings.joints,
@@ -312,7 +314,7 @@ def _with_thresholds(
         quick=options.quick,
     )
 
-    measurement = Measurement(features_of(tried), windows[-1], arm=options.arm)
+    measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
 
     def by(threshold: int | None, onset: int | None) -> DataSet:
         return load_trials(
@@ -390,7 +392,7 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
         )
     window_s, notes = choosing.window(windows)
     chosen, folds, without = choosing.choose(window_s)
-    settings = Settings(chosen, folds, without, choosing.tried, window_s, notes)
+    settings = Settings(chosen, folds, without, choosing.candidates, window_s, notes)
     if options.quick or not _has_early_points(settings, options):
         return settings
     return replace(settings, early=choosing.early(window_s, chosen))
@@ -419,9 +421,9 @@ def _choose_mixed(
     )
     mixed = mix(mixing, settings)
     y = {task: y[task] for task in mixed.chosen}
-    tried = options.tried(dataset, y, drawn=True)
+    usual = options.candidates_for(dataset, y, drawn=True)
     return Settings(
-        mixed.chosen, mixed.folds, mixed.without, tried, window_s, mixed.notes
+        mixed.chosen, mixed.folds, mixed.without, usual, window_s, mixed.notes
     )
 
 
@@ -461,14 +463,14 @@ def _early_of_known(
     Where groups are left out, settings are chosen for objects never met, though
     certificates are for recorded ones.
     """
-    known = [task for task, c in settings.chosen.items() if c.known is not None]
-    if not known:
+    tasks = [task for task, c in settings.chosen.items() if c.known is not None]
+    if not tasks:
         return []
-    other = calibrate(measured, y, points, settings.of_known, options)
+    calibrated = calibrate(measured, y, points, settings.of_known, options)
     errors = []
-    for task in known:
+    for task in tasks:
         smallest = exported.stopping_[task].smallest_error
-        instead = other.stopping_[task].smallest_error
+        instead = calibrated.stopping_[task].smallest_error
         errors.append(f"{task} {smallest:.1%}, instead {instead:.1%}")
     return [
         "the settings are chosen for objects never met; `--leave-out trial` chooses "

@@ -141,8 +141,8 @@ def _scale(x: Floats, widths: Sequence[int]) -> tuple[Floats, Floats]:
     columns = np.array(widths, dtype=np.int64)
     starts = np.cumsum(columns) - columns
     squares = np.add.reduceat(deviation**2, starts) / columns
-    least = LEAST_SHARE * np.repeat(np.sqrt(squares), columns)
-    deviation = np.maximum(deviation, least)
+    smallest = LEAST_SHARE * np.repeat(np.sqrt(squares), columns)
+    deviation = np.maximum(deviation, smallest)
     # The spread of a constant column is the rounding of its mean.
     moves = deviation > 1e-9 * np.abs(mean)
     gain = np.divide(2.0**STEP_BITS, deviation, out=np.zeros_like(mean), where=moves)

@@ -19,7 +19,7 @@ class Settings:
         chosen: {task: its settings}.
         folds: (n,) of the accuracies.
         without: [fold]{task: the choice made without the fold's trials}.
-        tried: the candidates that they were chosen among.
+        candidates: that they were chosen among.
         window_s: of the full decision.
         notes: sentences that a user should read.
         early: settings of earlier decision points; None where those of the full window
@@ -29,7 +29,7 @@ class Settings:
     chosen: dict[str, Chosen]
     folds: Integers
     without: list[dict[str, Choice]]
-    tried: Sequence[Candidate]
+    candidates: Sequence[Candidate]
     window_s: float
     notes: list[str]
     early: EarlySettings | None = None

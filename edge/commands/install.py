@@ -149,9 +149,9 @@ def restart(service: str | None) -> None:
         return
     command = ["systemctl", "restart", service]
     with refusing(f"{service} cannot be restarted with systemctl"):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        reason = done.stderr.strip() or f"exit status {done.returncode}"
+        completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    if completed.returncode:
+        reason = completed.stderr.strip() or f"exit status {completed.returncode}"
         raise EdgeError(f"{service} cannot be restarted: {reason}")
 
 

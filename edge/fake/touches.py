@@ -60,8 +60,8 @@ def touches(
     counts_per_newton = file.layout.counts_per_newton
     if counts_per_newton is None:
         weakest = min(trial(kind)[1].max() for kind in range(len(sources)))
-        least = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET)
-        counts_per_newton = least / weakest
+        lowest_peak = WEAKEST_ONSETS * max(file.layout.onset, LEAST_ONSET)
+        counts_per_newton = lowest_peak / weakest
     most = reach(file)
     covered = taxel_map(file).served.reshape(file.layout.shape)
     for number in range(trials):

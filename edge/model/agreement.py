@@ -87,5 +87,6 @@ def _named_after(
         forward.append(f"{first[a]}-{second[b]}")
         backward.append(f"{second[b]}-{first[a]}")
     return all(
-        tuple(made) == names or set(made) != set(names) for made in (forward, backward)
+        tuple(pair_names) == names or set(pair_names) != set(names)
+        for pair_names in (forward, backward)
     )

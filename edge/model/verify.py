@@ -129,10 +129,10 @@ def second_opinion(model: Model, arrays: Mapping[str, NDArray[Any]]) -> Check | 
         return None
     name = "the same in numpy"
     rows = len(arrays["vectors"])
-    other = answers(Model(model.path, "numpy"), arrays)
+    in_numpy = answers(Model(model.path, "numpy"), arrays)
     for key, answer in _comparable(model, arrays).items():
         answered = golden_labels(arrays, key) >= 0
-        check = compared(key, answer[answered], other[key][answered], 0.0)
+        check = compared(key, answer[answered], in_numpy[key][answered], 0.0)
         if not check.passed:
             return replace(check, name=f"{name}: {key}", rows=rows)
     return Check(name, rows, 0.0, None)
@@ -301,32 +301,32 @@ def renew(
 
 
 def compared(
-    name: str, seen: NDArray[Any], expected: NDArray[Any], bound: float
+    name: str, values: NDArray[Any], expected: NDArray[Any], bound: float
 ) -> Check:
     """Compare a quantity, whose first axis is the rows; see the module for the
     bound."""
-    if seen.shape != expected.shape:
+    if values.shape != expected.shape:
         return Check(
-            name, len(expected), np.inf, 0, f"shape {seen.shape}", f"{expected.shape}"
+            name, len(expected), np.inf, 0, f"shape {values.shape}", f"{expected.shape}"
         )
-    if seen.size == 0:
+    if values.size == 0:
         return Check(name, 0, 0.0, None)
-    same = (seen == expected) | (np.isnan(seen) & np.isnan(expected))
+    same = (values == expected) | (np.isnan(values) & np.isnan(expected))
     allowance = bound * np.maximum(1.0, np.abs(expected))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         # An infinite value is near no other, though its allowance is infinite.
         gap = np.where(
-            np.isfinite(allowance), np.abs(seen - expected) / allowance, np.inf
+            np.isfinite(allowance), np.abs(values - expected) / allowance, np.inf
         )
     share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(
-        len(seen), -1
+        len(values), -1
     )
     row, column = divmod(int(share.argmax()), share.shape[1])
     worst = float(share[row, column])
     if worst == 0.0:
-        return Check(name, len(seen), 0.0, None)
+        return Check(name, len(values), 0.0, None)
     texts = []
-    for values in (seen, expected):
-        at_row = values.reshape(share.shape)[row]
+    for side in (values, expected):
+        at_row = side.reshape(share.shape)[row]
         texts.append(str(at_row) if bound == 0.0 else repr(float(at_row[column])))
-    return Check(name, len(seen), worst, row, *texts)
+    return Check(name, len(values), worst, row, *texts)

@@ -58,8 +58,8 @@ class ShearReader:
         for data, count, stages, taxels in self._chips:
             self.raw[taxels] = axes(data[None], count)[0, stages, 1:]
         flat = self.raw.ravel()
-        both = np.repeat(valid, 2)
-        counts = self._baseline.away(flat) * both
+        valid_axes = np.repeat(valid, 2)
+        counts = self._baseline.away(flat) * valid_axes
         if settled:
-            self._baseline.follow(flat, both)
+            self._baseline.follow(flat, valid_axes)
         return np.asarray(counts.reshape(*self._shape, 2))

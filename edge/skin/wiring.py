@@ -251,10 +251,10 @@ def _check_addresses(bus: BusSpec, place: str) -> None:
     claimed.update({(None, None, mux): "a mux" for mux in muxes})
     for index, chip in order:
         route = (chip.mux, chip.channel, chip.address)
-        other = claimed.get(route) or claimed.get((None, None, chip.address))
-        if other is not None:
+        owner = claimed.get(route) or claimed.get((None, None, chip.address))
+        if owner is not None:
             raise InputError(
-                f"{place} chip {index} has the same address as {other}, {chip.route}"
+                f"{place} chip {index} has the same address as {owner}, {chip.route}"
             )
         claimed[route] = f"chip {index}"
 

@@ -175,13 +175,13 @@ def explain(
     touch = _Touch(space, vector, features, widths)
     nearest = tuple(map(touch.near, voters))
     answered = space.labels == label
-    others = space.labels == truth
-    if truth == label or not others.any():
-        others = ~answered & (space.labels >= 0)
-    if not others.any():
+    other_rows = space.labels == truth
+    if truth == label or not other_rows.any():
+        other_rows = ~answered & (space.labels >= 0)
+    if not other_rows.any():
         return Explanation(nearest)
     ally = touch.nearest(answered)
-    rival = touch.nearest(others)
+    rival = touch.nearest(other_rows)
     pulls = touch.pulls(space.rows[ally] - space.rows[rival])
     if space.vote(touch.z, len(voters)) != label:
         return Explanation(nearest, touch.near(rival), pulls)
@@ -189,7 +189,7 @@ def explain(
     # the answer.
     votes = np.isin(np.arange(len(touch.squares)), voters)
     leaves = np.where(votes & answered, touch.squares, -np.inf).argmax()
-    joins = touch.nearest(others & ~votes)
+    joins = touch.nearest(other_rows & ~votes)
     direction = space.rows[leaves] - space.rows[joins]
     gap = min(touch.squares[leaves] - touch.squares[joins], 0.0)
     changes = []

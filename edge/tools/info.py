@@ -78,8 +78,8 @@ def change_text(key: str, a: Any, b: Any) -> str:
     a = _names(key, a)
     b = _names(key, b)
     texts = []
-    for sign, names, others in (("-", a, b), ("+", b, a)):
-        only = [name for name in names if name not in others]
+    for sign, names, beside in (("-", a, b), ("+", b, a)):
+        only = [name for name in names if name not in beside]
         if only:
             more = f" and {len(only) - NAMED} more" if len(only) > NAMED else ""
             texts.append(f"{sign} {', '.join(only[:NAMED])}{more}")

@@ -299,13 +299,13 @@ def _text(labels: Mapping[str, str]) -> str:
 
 def _decided_text(decided: Mapping[str, Mapping[str, Any]]) -> str:
     """The decisions of a kept touch, with their confidence and flags."""
-    parts = []
+    answers = []
     for task, answer in decided.items():
         sure = answer["confidence"]
         notes = [] if sure is None else [f"{sure:.0%}"]
         notes += answer["flags"]
-        parts.append(f"{task}={answer['label']} {', '.join(notes)}".strip())
-    return "; ".join(parts)
+        answers.append(f"{task}={answer['label']} {', '.join(notes)}".strip())
+    return "; ".join(answers)
 
 
 def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None:

@@ -163,10 +163,10 @@ def _stacked(frames: list[Frame], field: str) -> NDArray[Any]:
 
 def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:
     """(n, dof) joint angles; None where no frame has any."""
-    known = [frame.joints for frame in frames if frame.joints is not None]
-    if not known:
+    measured = [frame.joints for frame in frames if frame.joints is not None]
+    if not measured:
         return None
-    unknown = np.full(len(known[0]), np.nan)
+    unknown = np.full(len(measured[0]), np.nan)
     return np.array([unknown if f.joints is None else f.joints for f in frames])
 
 

@@ -228,7 +228,7 @@ class ActiveTaxels:
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""
-        others = self.bits & ~region.bits
-        if not others:
+        beside = self.bits & ~region.bits
+        if not beside:
             return False
-        return int(self.counts[self._grid.unpack(others)].max()) > onset
+        return int(self.counts[self._grid.unpack(beside)].max()) > onset

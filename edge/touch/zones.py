@@ -30,8 +30,8 @@ class Zones:
     """
 
     def __init__(self, layout: SkinLayout, features: Sequence[Feature]) -> None:
-        needed = {zone for feature in features for zone in feature.zones}
-        self.names = tuple(zone for zone in ZONES if zone in needed)
+        zones = {zone for feature in features for zone in feature.zones}
+        self.names = tuple(zone for zone in ZONES if zone in zones)
         self.width = ZONE_WIDTH
         self._shear_sums: Callable[..., list[int]] | None = None
         if any(feature.quantity in SHEAR for feature in features):

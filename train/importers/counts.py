@@ -139,14 +139,14 @@ class Trial:
 
 
 def skin_shape(
-    trial: Trial, told: Sequence[int], options: argparse.Namespace
+    trial: Trial, stated_shape: Sequence[int], options: argparse.Namespace
 ) -> tuple[int, int]:
     """The rows and columns of a trial's skin: those of --shape, or those that are told.
 
     Raises:
         InputError: they are those of another number of taxels.
     """
-    shape = options.shape or told
+    shape = options.shape or stated_shape
     taxels = trial.values.shape[1]
     if len(shape) != 2 or math.prod(shape) != taxels:
         size = " x ".join(map(str, shape))

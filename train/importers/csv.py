@@ -194,8 +194,8 @@ def _skipping(options: argparse.Namespace) -> Iterator[None]:
 def _nothing(path: Path, options: argparse.Namespace) -> InputError:
     """The error where nothing can be imported."""
     if options.skipped:
-        (first, *others) = options.skipped
-        more = f"; {len(others)} more cannot be used either" if others else ""
+        (first, *further) = options.skipped
+        more = f"; {len(further)} more cannot be used either" if further else ""
         return InputError(first + more)
     kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
     return InputError(f"{path}: holds no {kind}; give a folder of trials")
@@ -206,9 +206,9 @@ def _announced(
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints what was taken, once for all files."""
     taxels = len(first.meaning.taxels)
-    told = first.meaning.shape
-    told = told or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = skin_shape(first.numbers, told, options)
+    shape_in_file = first.meaning.shape
+    shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
+    shape = skin_shape(first.numbers, shape_in_file, options)
     text = first.meaning.text(first.label, shape)
     say("; ".join([text, *first.form]))
     if axes is not None:
@@ -249,9 +249,9 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
             f"{path}: needs a column trial with names such as {shown(trials)}"
         )
     require_filled(path, data, "trial")
-    again = data["trial"][data["trial"].duplicated()]
-    if len(again):
-        raise InputError(f"{path}: {again.iloc[0]} has two rows; remove one of them")
+    repeated = data["trial"][data["trial"].duplicated()]
+    if len(repeated):
+        raise InputError(f"{path}: {repeated.iloc[0]} has two rows; remove one of them")
     rows = data.set_index("trial").iterrows()
     return {str(trial): row.dropna().to_dict() for trial, row in rows}
 
@@ -362,11 +362,11 @@ def _trials_in(table: Table) -> Iterator[Source]:
     for trial, rows in table.data.groupby("trial", sort=False):
         texts = rows[tasks].astype(object).fillna("").astype(str)
         for task in tasks:
-            first, *others = texts[task].unique()
-            if others:
+            first, *further_texts = texts[task].unique()
+            if further_texts:
                 raise InputError(
                     f"{table.path}: {task} changes within trial {trial}, from "
-                    f"{shown(first)} to {shown(others[0])}"
+                    f"{shown(first)} to {shown(further_texts[0])}"
                 )
         data = rows.drop(columns=["trial", *tasks]).reset_index(drop=True)
         part = replace(table, data=data, file_names=tuple(table.names))
@@ -398,9 +398,9 @@ def _pivoted(table: Table, trial: str) -> Table:
             f"{table.path}: needs the columns value and a time beside taxel"
         )
     time = times[0]
-    again = data[data.duplicated([time, "taxel"])]
-    if len(again):
-        row = again.iloc[0]
+    repeated = data[data.duplicated([time, "taxel"])]
+    if len(repeated):
+        row = repeated.iloc[0]
         raise InputError(
             f"{table.path}: trial {trial} has two values of taxel {row['taxel']} at "
             f"time {row[time]}"

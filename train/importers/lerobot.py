@@ -82,8 +82,8 @@ def trials(
     rest = rest_of([episode.trial for episode in episodes], options)
     first = episodes[0]
     taxels = first.trial.values.shape[1]
-    told = first.shape if len(first.shape) == 2 else (1, taxels)
-    shape = skin_shape(first.trial, told, options)
+    stated_shape = first.shape if len(first.shape) == 2 else (1, taxels)
+    shape = skin_shape(first.trial, stated_shape, options)
     say(
         f'time: "timestamp" in s, taxels: "{options.taxels}" ({taxels}, as '
         f"{shape[0]} x {shape[1]}), label: the episode's task"

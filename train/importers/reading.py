@@ -334,8 +334,8 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
     """The columns by their names, without those that have neither a name nor a
     value."""
-    used = [i for i in table if header.names[i] or table[i].notna().any()]
-    return table[used].set_axis([header.unique[i] for i in used], axis=1)
+    filled = [i for i in table if header.names[i] or table[i].notna().any()]
+    return table[filled].set_axis([header.unique[i] for i in filled], axis=1)
 
 
 def _unpacked(suffix: str, data: bytes) -> bytes:

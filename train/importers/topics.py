@@ -99,7 +99,7 @@ class Log:
     """{topic: (stamp, time of logging, name of a joint or else its place, its angle)}"""
     _left_out: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     """{topic: why no frame can be read from each of some messages}."""
-    _seen: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    _topics: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     """{`frames` or `joints`: all topics of such a kind}."""
 
     @classmethod
@@ -118,10 +118,10 @@ class Log:
     def takes(self, topic: str, kind: str) -> bool:
         """Whether messages of a kind on a topic are wanted; others are never read."""
         if kind == JOINTS:
-            self._seen["joints"].add(topic)
+            self._topics["joints"].add(topic)
             return bool(self.beside.get("joints_topic", topic) == topic)
         if kind in FRAMES:
-            self._seen["frames"].add(topic)
+            self._topics["frames"].add(topic)
         if self.beside.has("frames_topic"):
             return bool(self.beside.get("frames_topic") == topic)
         return kind in FRAMES or self.options.field is not None
@@ -243,7 +243,7 @@ class Log:
                 meta["joint_names"] = names
         if self.axes is not None:
             say(self.axes.text)
-        shape = skin_shape(trial, self._told(values.shape[1:]), self.options)
+        shape = skin_shape(trial, self._stated_shape(values.shape[1:]), self.options)
         return rest_of([trial], self.options).recording(trial, shape, meta)
 
     def _frames_of(self, name: str) -> pd.DataFrame:
@@ -273,7 +273,7 @@ class Log:
             "message of a sensor's own with --field"
         )
 
-    def _told(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+    def _stated_shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """The rows and columns that frames of a shape tell, or the file beside the log.
 
         Raises:
@@ -375,7 +375,7 @@ class Log:
             why = f"; it {reasons[0]}" if reasons else ""
             raise InputError(
                 f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
-                f"{sorted(self._seen[kind])}, not {shown(name)}{why}"
+                f"{sorted(self._topics[kind])}, not {shown(name)}{why}"
             )
         return name
 

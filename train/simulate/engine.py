@@ -82,10 +82,10 @@ def _values(scene: Scene, trials: list[TrialSpec]) -> dict[str, Any]:
         "taxel_n_m": scene.taxel_n_m,
         **PLACED,
     }
-    again = f".{first.attempt}" if first.attempt else ""
+    suffix = f".{first.attempt}" if first.attempt else ""
 
     def drawn(name: str, kind: str) -> Array:
-        return streams.draws(scene.seed, name + again, first.key, numbers, kind)
+        return streams.draws(scene.seed, name + suffix, first.key, numbers, kind)
 
     out: dict[str, Any] = {name: value.low for name, value in values.items()}
     for name, value in values.items():
@@ -262,10 +262,10 @@ def start_frames(starts: Trials) -> None:
     starts.run(*PACE)
     changed = clock.steps != before
     if changed.any():
-        others = starts.only(changed)
-        rate_hz = starts.scene.rate_hz * others.clock.steps
-        others.clock.h = np.asarray(1.0 / rate_hz, dtype=float)
-        others.run(*TUNE)
+        changed_starts = starts.only(changed)
+        rate_hz = starts.scene.rate_hz * changed_starts.clock.steps
+        changed_starts.clock.h = np.asarray(1.0 / rate_hz, dtype=float)
+        changed_starts.run(*TUNE)
     starts.run(*FRAME)
     clock.left = clock.steps
 

@@ -295,8 +295,8 @@ def _objects(
     tables = list(_named(top, "object"))
     for family in _named(top, "family"):
         for drawn in draw_family(family, seed, push_n, skin):
-            called = f"{family.prefix}object {drawn['name']!r}: "
-            tables.append(SceneTable(drawn, top.where, called))
+            prefix = f"{family.prefix}object {drawn['name']!r}: "
+            tables.append(SceneTable(drawn, top.where, prefix))
     if not tables:
         raise InputError(f"{top.where}: give at least one [[object]] or [[family]]")
     objects = tuple(_object(table, spread) for table in tables)

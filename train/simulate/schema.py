@@ -137,14 +137,14 @@ class Family:
             soft.
         thickness: the key of the depth to which a soft object can yield; empty for a
             rigid one.
-        own: keys that objects of other families do not have.
+        keys: those that objects of other families do not have.
         defaults: {key: the family's typical value}, in place of the default in
             `OBJECT`.
     """
 
     effects: tuple[str, ...] = ()
     thickness: str = ""
-    own: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
     defaults: dict[str, float] = field(default_factory=dict)
 
 
@@ -164,8 +164,8 @@ FAMILIES = {
 def keys_of(family: str) -> dict[str, float | None]:
     """{key of `OBJECT` that an object of a family may have: its default, or None}."""
     family_info = FAMILIES[family]
-    others = {key for other in FAMILIES.values() for key in other.own} - {
-        *family_info.own
+    others = {key for other in FAMILIES.values() for key in other.keys} - {
+        *family_info.keys
     }
     defaults = {
         key: field.default for key, field in OBJECT.items() if key not in others

@@ -126,8 +126,8 @@ def true_runs(
             else:
                 wrong[spec.key, spec.number] = spec, contradiction
         yield physics, np.array(sorted(fits.values()), dtype=int)
-        again = [wrong[trial] for trial in wrong if trial not in fits]
-        specs = tuple(spec for last in again for spec in _next_draws(scene, *last))
+        retries = [wrong[trial] for trial in wrong if trial not in fits]
+        specs = tuple(spec for last in retries for spec in _next_draws(scene, *last))
 
 
 def _next_draws(

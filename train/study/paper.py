@@ -270,17 +270,17 @@ def _ranks(
 def _wrong_objects(theirs: Numbers, ours: Numbers) -> list[str]:
     """A paragraph on the category in trials with a wrong object; none if a task is
     missing."""
-    paper = right_despite_the_object(theirs)
-    here = right_despite_the_object({key: ours[key] for key in theirs})
-    if np.isnan(paper) or np.isnan(here):
+    paper_percent = right_despite_the_object(theirs)
+    ours_percent = right_despite_the_object({key: ours[key] for key in theirs})
+    if np.isnan(paper_percent) or np.isnan(ours_percent):
         return []
     return [
         "When the classifier names the wrong object, it still names the right category "
-        f"in {paper:.0f} % of the trials in the paper and in {here:.0f} % here, as a "
-        "mean over the settings that have both tasks; guessing among four categories "
-        "gives 25 %. A higher share means that the objects of a category feel more "
-        "alike: a skin that is too coarse to recognise the object still recognises its "
-        "category."
+        f"in {paper_percent:.0f} % of the trials in the paper and in "
+        f"{ours_percent:.0f} % here, as a mean over the settings that have both "
+        "tasks; guessing among four categories gives 25 %. A higher share means that the "
+        "objects of a category feel more alike: a skin that is too coarse to recognise "
+        "the object still recognises its category."
     ]
 
 

@@ -110,7 +110,7 @@ def _analysed(context: Context, seeds: int) -> list[Section]:
     if scene is not None:
         numbers = [_numbers(applicable)]
         for i in bar(range(1, seeds), desc="data sets"):
-            numbers.append(_again(context, scene, i))
+            numbers.append(_of_another_seed(context, scene, i))
         trials = seeds * len(context.dataset.trials)
         applicable.insert(1, paper.comparison(numbers, trials))
     return applicable
@@ -158,7 +158,7 @@ def _numbers(sections: Sequence[Section]) -> paper.Numbers:
     return numbers
 
 
-def _again(context: Context, scene: Scene, i: int) -> paper.Numbers:
+def _of_another_seed(context: Context, scene: Scene, i: int) -> paper.Numbers:
     """The accuracies to compare with the paper's, on the scene simulated with another
     seed."""
     with tempfile.TemporaryDirectory() as folder:

@@ -50,12 +50,12 @@ def confusion(context: Context) -> Section:
     pictures = []
     for task, result in grid_search(context.vectors(), context.labels).items():
         truth = context.labels[task]
-        assert result.said is not None
+        assert result.answers is not None
         size = {"task": task, "classes": len(set(truth)), "trials": result.total}
         best.append(size | score(result))
         title = f"{task}: the label that each touch was given, by leave-one-out"
         pictures.append(
-            figures.confusion(f"confusion_{task}", title, truth, result.said)
+            figures.confusion(f"confusion_{task}", title, truth, result.answers)
         )
     return Section(
         "Classification (Figs. 6 to 8)",

@@ -105,10 +105,10 @@ def prices(measured: Measured) -> Section:
         best = cheapest(measured, task)
         low, high = best.result.interval
         mean = round(best.price(best.result.accuracy, measured), 2)
-        least = round(best.price(high, measured), 2)
-        most = round(best.price(low, measured), 2)
+        lowest = round(best.price(high, measured), 2)
+        highest = round(best.price(low, measured), 2)
         row: Row = {"task": task, "best use": best.name, "mean price": mean}
-        row["95 % interval"] = f"{least:g} to {most:g}"
+        row["95 % interval"] = f"{lowest:g} to {highest:g}"
         row["command"] = f"`{', then '.join(best.commands)}`"
         rows.append(row)
     command = measured.commands.tradeoff("--cost wrong=10,second=1")

@@ -68,8 +68,8 @@ def followed(
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
     drawn = kinds_of(raw.recordings) is not None
-    tried = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
-    sets = [name for candidate in tried for name in candidate.sets]
+    usual = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
+    sets = [name for candidate in usual for name in candidate.sets]
     measurement = Measurement(
         expand([*sets, *features]),
         WINDOWS_S[-1],

@@ -89,8 +89,8 @@ def _fewer_frames(
         carried = [w.name for w in wires(layout) if w.every(rate_hz) == n]
         if carried:
             price = f"{carried[0]} are enough"
-        parts = [part(r, slice(None, None, n)) for r in raw.recordings]
-        source = replace(raw, recordings=tuple(parts))
+        thinned = [part(r, slice(None, None, n)) for r in raw.recordings]
+        source = replace(raw, recordings=tuple(thinned))
         yield Change(f"{rate_hz / n:.0f} frames a second", price, source)
 
 
@@ -118,10 +118,10 @@ def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
     count = len(dataset.trials)
     for folds in PARTS:
         kept = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
-        left = len(kept.trials)
-        if left >= FEWEST:
-            price = f"{counted(count - left, 'recording')} fewer"
-            yield Change(f"{left} of {count} trials", price, kept, fewer=True)
+        remaining = len(kept.trials)
+        if remaining >= FEWEST:
+            price = f"{counted(count - remaining, 'recording')} fewer"
+            yield Change(f"{remaining} of {count} trials", price, kept, fewer=True)
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:

@@ -152,12 +152,12 @@ def gains(compared: Compared) -> list[Row]:
 
 def price(dataset: DataSet) -> str:
     """What three axes cost on the wire."""
-    three = microcontroller(replace(dataset.layout, axes=3))
-    one = microcontroller(replace(dataset.layout, axes=None))
+    all_axes = microcontroller(replace(dataset.layout, axes=3))
+    normal_only = microcontroller(replace(dataset.layout, axes=None))
     return (
         f"{dataset.layout.rows * dataset.layout.cols * 4} bytes a frame fewer: "
-        f"{1.0 / one.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
-        f"{1.0 / three.frame_s:.0f}"
+        f"{1.0 / normal_only.frame_s:.0f} frames a second on one bus at 1 MHz instead of "
+        f"{1.0 / all_axes.frame_s:.0f}"
     )
 
 

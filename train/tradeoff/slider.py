@@ -83,7 +83,7 @@ def slider(measured: Measured) -> str:
 
 def reached(measured: Measured, level: float) -> str:
     """The time after which each task reaches an accuracy, early and fixed."""
-    parts = []
+    texts = []
     for task in measured.y:
         times = []
         early = soonest_s(measured.comparisons[task], level)
@@ -93,8 +93,8 @@ def reached(measured: Measured, level: float) -> str:
         fixed = [window for window in results if results[window].accuracy >= level]
         if fixed:
             times.append(f"{min(fixed):g} s (fixed)")
-        parts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")
-    return "; ".join(parts)
+        texts.append(f"{task} {'after ' + ', '.join(times) if times else 'never'}")
+    return "; ".join(texts)
 
 
 def fronts(measured: Measured) -> str:

@@ -37,7 +37,7 @@ def test_the_best_cell_is_reported_with_its_answers():
     best = grid_search(vectors.X, vectors.y)["t"]
     table = accuracies(neighbours(vectors.X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
-    assert best.right == int((best.said == y).sum())
+    assert best.right == int((best.answers == y).sum())
 
 
 def test_a_changed_trial_is_never_recognised_by_its_own_twin():

@@ -29,7 +29,7 @@ class Viscous(Group):
         loss_s, ratio, relax_s: (n,) T, r and tau.
         kept, let_go, late, damped: (n,) for the present step: e, r - s, s - e r and
             T / h.
-        force, given: (rows, n) F and w.
+        force, before: (rows, n) F and w.
     """
 
     loss_s: Array
@@ -40,7 +40,7 @@ class Viscous(Group):
     late: Array
     damped: Array
     force: PerRow
-    given: PerRow
+    before: PerRow
 
 
 def stand(t: Trials) -> None:
@@ -69,7 +69,7 @@ def bear_on(t: Trials) -> None:
     """Set the load with which each row's next step begins."""
     viscous = t.states["viscous"]
     late = viscous.late + viscous.damped
-    t.bed.load = -(viscous.kept * viscous.given + late * viscous.force)
+    t.bed.load = -(viscous.kept * viscous.before + late * viscous.force)
 
 
 def settle(t: Trials) -> None:
@@ -79,7 +79,7 @@ def settle(t: Trials) -> None:
     """
     viscous = t.states["viscous"]
     elastic = np.maximum((t.bed.row_force - t.bed.load) / t.bed.gain, 0.0)
-    pushed = viscous.kept * viscous.given + viscous.late * viscous.force
-    viscous.given = pushed + viscous.let_go * elastic
+    pushed = viscous.kept * viscous.before + viscous.late * viscous.force
+    viscous.before = pushed + viscous.let_go * elastic
     viscous.force = elastic
     bear_on(t)
