@@ -162,7 +162,9 @@ class Page:
         try:
             self.saved(path, load(path))
         except InputError as error:
-            self.notice(f"{error}; it is left out of the list")
+            sentence = f"{error}; it is left out of the list"
+            if sentence not in self._notices:
+                self.notice(sentence)
 
     def _curves(self) -> Json | None:
         """The last contact: its taxels, and its features since onset."""
@@ -188,7 +190,7 @@ class Page:
         gone."""
         if self._folder is None:
             return
-        paths = sorted(self._folder.glob("*.npz"))[-LAST_TRIALS:]
+        paths = sorted(self._folder.glob("[!.]*.npz"))[-LAST_TRIALS:]
         present = {path.name for path in paths}
         for name in set(self._trials) - present:
             del self._trials[name]
@@ -212,7 +214,12 @@ class Page:
             trials = list(self._trials.items())
             return [{"file": name, **trial} for name, trial in trials]
         if kind == "labels":
-            self.labels = _labels(action)
+            labels = {**self.labels, **_labels(action)}
+            self.labels = _labels({"labels": labels})
+        elif kind == "unlabel":
+            removed = action.get("task")
+            self.labels = {t: name for t, name in self.labels.items() if t != removed}
+            self.recording &= bool(self.labels)
         elif kind == "record":
             self._switch(bool(action.get("on")))
         elif kind == "undo":

@@ -9,7 +9,11 @@ let latest = null;
 let trials = [];
 let version = null;
 let askedAt = 0;
-let drawnTrials = "";
+
+// A text that stays as it is can be selected, and is not read out again.
+function say(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
 
 function element(tag, text, className) {
   const node = document.createElement(tag);
@@ -38,9 +42,13 @@ function canvas(id, height) {
   return [pen, width, tall];
 }
 
-// Dark red over orange to pale yellow: brightness alone tells the force.
-function heat(part) {
-  const stops = [[139, 0, 0], [255, 140, 0], [255, 233, 168]];
+// From red over orange to pale yellow: brightness alone tells the force.
+function heatStops() {
+  return ["--weak", "--middle", "--strong"].map((name) =>
+    [1, 3, 5].map((at) => parseInt(colour(name).slice(at, at + 2), 16)));
+}
+
+function heat(stops, part) {
   const at = Math.min(Math.max(part, 0), 1) * (stops.length - 1);
   const low = Math.min(Math.floor(at), stops.length - 2);
   const mixed = stops[low].map((value, i) => Math.round(value + (at - low) * (stops[low + 1][i] - value)));
@@ -57,15 +65,18 @@ function drawSkin(picture) {
   const invalid = new Set(picture.invalid);
   const dead = new Set(picture.dead);
   const floor = Math.max(threshold, 1);
-  const full = Math.log(Math.max(scale > 1 ? 17 * scale : 50 * floor, floor + 2) / floor);
+  const top = Math.max(scale > 1 ? 17 * scale : 50 * floor, floor + 2);
+  const full = Math.log(top / floor);
+  const stops = heatStops();
   const rest = [colour("--rest-low"), colour("--rest-high")];
+  say("scale", `in contact, from ${shortNumber(floor / scale)} to ${shortNumber(top / scale)} ${picture.units.force}s`);
   for (let i = 0; i < counts.length; i++) {
     const x = left + (i % cols) * side;
     const y = Math.floor(i / cols) * side;
     const count = counts[i];
     if (dead.has(i)) pen.fillStyle = colour("--dead");
     else if (invalid.has(i)) pen.fillStyle = colour("--invalid");
-    else if (count > threshold) pen.fillStyle = heat(Math.log(count / floor) / full);
+    else if (count > threshold) pen.fillStyle = heat(stops, Math.log(count / floor) / full);
     else pen.fillStyle = count * 2 > threshold ? rest[1] : rest[0];
     pen.fillRect(x + 0.5, y + 0.5, side - 1, side - 1);
     if (dead.has(i)) {
@@ -89,9 +100,9 @@ function drawSkin(picture) {
   }
   pen.stroke();
   if (picture.shear) drawShear(pen, picture, touched, left, side);
-  $("seam").textContent = picture.wraps ?
+  say("seam", picture.wraps ?
     "Rows run down, from elbow to wrist. The last column touches the first." :
-    "Rows run down, columns to the right.";
+    "Rows run down, columns to the right.");
 }
 
 // A line from the middle of each taxel in contact: its shear, half a taxel for the strongest.
@@ -156,9 +167,9 @@ function shortNumber(value) {
 function drawContact(picture) {
   const contact = picture.contact;
   const seconds = contact && contact.t.length ? contact.t[contact.t.length - 1] : 0;
-  $("contact").textContent = !contact ? "No contact yet."
+  say("contact", !contact ? "No contact yet."
     : contact.ended ? `The last contact ended after ${seconds.toFixed(2)} s.`
-    : `In contact for ${seconds.toFixed(2)} s.`;
+    : `In contact for ${seconds.toFixed(2)} s.`);
   const t = contact ? contact.t : [];
   drawCurve("force", "largest force", picture.units.force, t, contact ? contact.force : []);
   drawCurve("area", "area", "taxels", t, contact ? contact.area : []);
@@ -169,10 +180,14 @@ function drawDecisions(picture) {
   const box = $("decisions");
   $("decision-part").hidden = !picture.decides;
   if (!picture.decisions.length) {
-    box.replaceChildren(element("p", picture.contact && !picture.contact.ended
-      ? "Waiting for the window to end." : "No decision yet."));
+    say("decisions", picture.contact && !picture.contact.ended
+      ? "Waiting for the window to end." : "No decision yet.");
+    box.dataset.shown = "";
     return;
   }
+  const shown = JSON.stringify(picture.decisions);
+  if (box.dataset.shown === shown) return;
+  box.dataset.shown = shown;
   box.replaceChildren(...picture.decisions.map((decision) => {
     const item = element("div", undefined, "decision");
     item.append(element("div", `${decision.task}, after ${decision.window_s} s`, "task"));
@@ -211,6 +226,8 @@ async function act(action) {
 
 function labelRow(task, label) {
   const row = element("div", undefined, "label-row");
+  row.onchange = () => { row.dataset.task = changeLabel(row); };
+  row.dataset.task = task;
   const inputs = [["task", task], ["label", label]].map(([name, value]) => {
     const input = element("input");
     input.placeholder = name;
@@ -222,24 +239,44 @@ function labelRow(task, label) {
   const remove = element("button", "−");
   remove.type = "button";
   remove.setAttribute("aria-label", "remove this task");
-  remove.onclick = () => row.remove();
+  remove.onclick = () => { row.remove(); if (row.dataset.task) act({ do: "unlabel", task: row.dataset.task }); };
   row.append(...inputs, remove);
   $("label-rows").append(row);
 }
 
-function formLabels() {
-  const labels = {};
-  for (const row of $("label-rows").children) {
-    const [task, label] = row.querySelectorAll("input");
-    if (task.value.trim()) labels[task.value.trim()] = label.value.trim();
-  }
-  return labels;
+function rowLabel(row) {
+  return [...row.querySelectorAll("input")].map((input) => input.value.trim());
 }
 
-// The labels that stand in the form: of buttons, and of the rows of free text.
+// A label applies as soon as it is chosen; returns the row's task.
+function changeLabel(row) {
+  const [task, label] = rowLabel(row);
+  const former = row.dataset.task;
+  if (!task || !label) {
+    if (former in latest.labels) $("label-rows").dataset.shown = "";
+    return former;
+  }
+  act({ do: "labels", labels: { [task]: label } })
+    .then((done) => done && former && former !== task && act({ do: "unlabel", task: former }));
+  return task;
+}
+
+// The program's labels, and those that have just been written into the form.
 function chosenLabels() {
-  const fixed = Object.keys(latest.choices).filter((task) => task in latest.labels);
-  return { ...Object.fromEntries(fixed.map((task) => [task, latest.labels[task]])), ...formLabels() };
+  const rows = [...$("label-rows").children].map(rowLabel);
+  return { ...latest.labels, ...Object.fromEntries(rows.filter(([task, label]) => task && label)) };
+}
+
+// The rows of free text show the program's labels, whichever browser gave them.
+function drawRows(picture) {
+  const box = $("label-rows");
+  const labels = Object.entries(picture.labels).filter(([task]) => !(task in picture.choices));
+  if (!labels.length && !Object.keys(picture.choices).length) labels.push(["object", ""]);
+  const text = JSON.stringify(labels);
+  if (box.dataset.shown === text || box.contains(document.activeElement)) return;
+  box.dataset.shown = text;
+  box.replaceChildren();
+  for (const [task, label] of labels) labelRow(task, label);
 }
 
 function labelText(labels) {
@@ -263,7 +300,7 @@ function drawChoices(picture) {
         button.dataset.task = task;
         button.dataset.label = name;
         if (digit < 10) button.dataset.key = digit;
-        button.onclick = () => act({ do: "labels", labels: { ...latest.labels, [task]: name } });
+        button.onclick = () => act({ do: "labels", labels: { [task]: name } });
         group.append(button);
       }
       return group;
@@ -279,17 +316,14 @@ function drawRecord(picture) {
   if (picture.folder === null) return;
   $("record").hidden = picture.decides;
   drawChoices(picture);
-  if (!$("label-rows").children.length && !Object.keys(picture.choices).length) {
-    const labels = Object.entries(picture.labels);
-    for (const [task, label] of labels.length ? labels : [["object", ""]]) labelRow(task, label);
-  }
+  drawRows(picture);
   $("record").setAttribute("aria-pressed", picture.recording);
-  $("record").textContent = picture.recording ? "Stop recording" : "Record";
+  say("record", picture.recording ? "Stop recording" : "Record");
   const what = labelText(picture.labels) || "no labels yet";
   const count = trials.length;
   const number = `${count} ${count === 1 ? "touch" : "touches"} in ${picture.folder}.`;
   const saved = picture.recording ? `Each contact is saved with ${what}; ` : `Contacts are not saved (${what}); `;
-  $("recording").textContent = picture.decides ? number : saved + number;
+  say("recording", picture.decides ? number : saved + number);
   const late = picture.decides && performance.now() - askedAt > 2000;
   if (picture.trials !== version || late) fetchTrials(picture.trials);
 }
@@ -345,28 +379,40 @@ function smallCurve(percent) {
   return svg;
 }
 
+// New touches come last, and a row is made anew only where its touch has changed: nothing moves
+// under the pointer, and the focus stays at its button.
 function drawTrials() {
   drawFilter();
-  const text = JSON.stringify(trials) + $("filter").value;
-  if (text === drawnTrials) return;
-  drawnTrials = text;
-  $("trials").replaceChildren(...shownTrials().reverse().map(trialRow));
+  const body = $("trials");
+  const focused = document.activeElement.closest("#trials tr");
+  const place = focused && focused.sectionRowIndex;
+  const name = document.activeElement.textContent;
+  const former = new Map([...body.rows].map((row) => [row.dataset.text, row]));
+  const rows = shownTrials().map((trial) => former.get(JSON.stringify(trial)) || trialRow(trial));
+  const kept = new Set(rows);
+  for (const row of [...body.rows]) if (!kept.has(row)) row.remove();
+  rows.forEach((row, i) => { if (body.rows[i] !== row) body.insertBefore(row, body.rows[i] || null); });
+  if (!focused || body.contains(focused) || !rows.length) return;
+  const buttons = [...rows[Math.min(place, rows.length - 1)].querySelectorAll("button")];
+  buttons.find((button) => button.textContent === name).focus();
 }
 
 function trialRow(trial) {
   const row = element("tr");
+  row.dataset.text = JSON.stringify(trial);
   const buttons = element("td");
   const decided = Object.entries(trial.decided);
   if (decided.length) {
     const accept = element("button", "Accept");
-    accept.title = "Label this touch as it was decided";
+    accept.title = `Label ${trial.file} as it was decided`;
     accept.onclick = () => act({ do: "accept", file: trial.file });
     buttons.append(accept, " ");
   }
   const relabel = element("button", decided.length ? "Correct" : "Relabel");
-  relabel.title = "Give this touch the labels chosen above; its other tasks keep theirs";
+  relabel.title = `Give ${trial.file} the labels chosen above; its other tasks keep theirs`;
   relabel.onclick = () => act({ do: "relabel", file: trial.file, labels: chosenLabels() });
   const remove = element("button", "Delete");
+  remove.title = `Delete ${trial.file}`;
   remove.onclick = () => confirm(`Delete ${trial.file}?`) && act({ do: "delete", file: trial.file });
   buttons.append(relabel, " ", remove);
   const name = element("td", trial.file);
@@ -382,28 +428,31 @@ function trialRow(trial) {
 
 function drawUndo(picture) {
   $("undo").hidden = !picture.undo;
-  $("undo").textContent = picture.undo ? `Undo the change of ${picture.undo}` : "Undo";
+  say("undo", picture.undo ? `Undo the change of ${picture.undo}` : "Undo");
 }
 
 function draw(picture) {
   latest = picture;
-  $("title").textContent = picture.title;
+  say("title", picture.title);
   document.title = picture.title;
   $("state").className = "";
   const rate = picture.rate_hz ? `${picture.rate_hz} frames/s, ${picture.missed} missed, ` : "";
-  $("state").textContent = `${rate}${picture.invalid.length} of ${picture.counts.length} taxels cannot be read`;
+  say("state", `${rate}${picture.invalid.length} of ${picture.counts.length} taxels cannot be read`);
   drawSkin(picture);
   drawContact(picture);
   drawDecisions(picture);
   drawRecord(picture);
   drawUndo(picture);
   $("notice-part").hidden = !picture.notices.length;
+  const notices = JSON.stringify(picture.notices);
+  if ($("notices").dataset.shown === notices) return;
+  $("notices").dataset.shown = notices;
   $("notices").replaceChildren(...picture.notices.map((text) => element("li", text)));
 }
 
 $("undo").onclick = () => act({ do: "undo" });
 $("more").onclick = () => labelRow("", "");
-$("labels").onsubmit = (event) => { event.preventDefault(); act({ do: "labels", labels: chosenLabels() }); };
+$("labels").onsubmit = (event) => event.preventDefault();
 $("filter").onchange = drawTrials;
 addEventListener("keydown", (event) => {
   if (["INPUT", "SELECT", "TEXTAREA"].includes(event.target.tagName) || event.ctrlKey || event.metaKey) return;
@@ -412,7 +461,8 @@ addEventListener("keydown", (event) => {
 });
 $("record").onclick = async () => {
   const on = !(latest && latest.recording);
-  if (!on || await act({ do: "labels", labels: chosenLabels() })) act({ do: "record", on });
+  const labels = chosenLabels();
+  if (!on || !Object.keys(labels).length || await act({ do: "labels", labels })) act({ do: "record", on });
 };
 addEventListener("resize", () => latest && draw(latest));
 

@@ -1,9 +1,11 @@
 """The live page shows frames, contacts and decisions, and relabels and deletes
 trials."""
 
+import re
 import shutil
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -146,6 +148,7 @@ def test_labels_and_recording_are_set_from_the_page(page):
         {"do": "labels", "labels": {"object": 3}},
         {"do": "labels", "labels": {"object": ""}},
         {"do": "labels", "labels": {"object": "a\nb"}},
+        {"do": "labels", "labels": {f"task {number}": "a" for number in range(17)}},
         {"do": "relabel", "file": "../model.onnx", "labels": {"object": "box"}},
         {"do": "delete", "file": ["a"]},
     ],
@@ -153,6 +156,22 @@ def test_labels_and_recording_are_set_from_the_page(page):
 def test_an_action_that_makes_no_sense_is_refused(page, action):
     with pytest.raises(InputError):
         page._act(action)
+
+
+def test_a_label_that_is_given_leaves_those_of_other_tasks(page):
+    """A browser whose form is old changes no more than what is chosen there."""
+    page._act({"do": "labels", "labels": {"object": "box", "softness": "hard"}})
+    page._act({"do": "labels", "labels": {"softness": "soft"}})
+    assert page.labels == {"object": "box", "softness": "soft"}
+    page._act({"do": "unlabel", "task": "object"})
+    assert page.labels == {"softness": "soft"}
+
+
+def test_without_any_label_nothing_is_recorded(page):
+    page._act({"do": "labels", "labels": {"object": "box"}})
+    page._act({"do": "record", "on": True})
+    page._act({"do": "unlabel", "task": "object"})
+    assert not page.recording
 
 
 def test_a_page_without_a_folder_changes_nothing(serve):
@@ -166,7 +185,7 @@ TOUCH = edge.load(demo.FOLDER / "foam-block-fixed.npz")
 @pytest.fixture
 def folder_page(tmp_path, serve):
     """A page of a folder with the trials a and b, and one file that is damaged."""
-    for name in ("a.npz", "b.npz"):
+    for name in ("a.npz", "b.npz", ".hidden.npz"):
         edge.save(tmp_path / name, TOUCH)
     (tmp_path / "c.npz").write_bytes(b"PK damaged")
     return serve(TOUCH.layout)
@@ -183,6 +202,7 @@ def test_trials_of_the_folder_are_relabelled_and_deleted(folder_page, tmp_path):
 
 def test_a_damaged_recording_is_named_and_left_out(folder_page):
     assert sorted(folder_page._trials) == ["a.npz", "b.npz"]
+    folder_page.look()
     (notice,) = folder_page._notices
     assert "c.npz" in notice
     assert "left out" in notice
@@ -289,6 +309,29 @@ def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     assert after > before
 
 
+THEME = re.compile(r"--([\w-]+): (#[0-9a-f]{6});")
+
+
+def luminance(colour):
+    """The relative luminance of WCAG 2, of #rrggbb."""
+    channels = np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)]) / 255
+    linear = np.where(
+        channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4
+    )
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+def test_the_weakest_contact_stands_out_from_every_rest_in_both_themes():
+    css = resources.files("edge.tools").joinpath("pages/page.css").read_text()
+    light_part, dark_part = css.split("@media (prefers-color-scheme: dark)")
+    light = dict(THEME.findall(light_part))
+    for theme in (light, {**light, **dict(THEME.findall(dark_part))}):
+        weak = luminance(theme["weak"])
+        for ground in ("rest-low", "rest-high", "panel"):
+            darker, brighter = sorted((weak, luminance(theme[ground])))
+            assert (brighter + 0.05) / (darker + 0.05) >= 3.0
+
+
 def until(condition, page, stream, browser):
     """Push frames of a stream until a condition holds."""
     for _ in range(400):
@@ -320,7 +363,82 @@ class TestInABrowser:
             label.send_keys("box")
             browser.find_element("id", "record").click()
             until(lambda: page.recording, page, stream, browser)
+            images = browser.find_elements("css selector", "canvas")
+            assert all(image.get_attribute("aria-label") for image in images)
+            assert {image.get_attribute("role") for image in images} == {"img"}
+            assert "0.1 to 17 newtons" in browser.find_element("id", "scale").text
         assert page.labels == {"object": "box"}
+
+    def test_a_label_applies_when_it_is_chosen_and_every_browser_shows_it(self, page):
+        stream = frames(10_000, touched_from=0)
+        link = page.server.link
+        with chromium(390, link) as first, chromium(390, link) as second:
+
+            def comes(condition):
+                def in_both():
+                    first.execute_script("return 1")
+                    return condition()
+
+                until(in_both, page, stream, second)
+
+            def form(browser):
+                script = "return [...document.querySelectorAll('.label-row input')]"
+                return browser.execute_script(f"{script}.map(input => input.value)")
+
+            comes(lambda: form(first) == form(second) == ["object", ""])
+            label = first.find_element("css selector", "input[aria-label=label]")
+            label.send_keys("box\n")
+            comes(lambda: form(second) == ["object", "box"])
+            assert page.labels == {"object": "box"}
+            second.find_element("id", "record").click()
+            comes(lambda: page.recording)
+            assert page.labels == {"object": "box"}
+
+    def test_new_touches_move_neither_rows_nor_focus(self, kept_page, kept):
+        stream = frames(10_000, touched_from=0)
+        with chromium(1200, kept_page.server.link) as browser:
+
+            def rows():
+                return browser.find_elements("css selector", "#trials tr")
+
+            def comes(condition):
+                until(condition, kept_page, stream, browser)
+
+            comes(lambda: len(rows()) == 1)
+            browser.execute_script("document.querySelector('#trials button').focus()")
+            button = browser.switch_to.active_element
+            height = button.rect["y"]
+            shutil.copy(kept / "kept-1.npz", kept / "kept-2.npz")
+            kept_page.look()
+            comes(lambda: len(rows()) == 2)
+            assert browser.switch_to.active_element == button
+            assert button.rect["y"] == height
+            browser.execute_script("arguments[0].click()", button)  # accepts the first
+            comes(lambda: "softness=hard" in rows()[0].text)
+            assert browser.switch_to.active_element.text == "Accept"
+
+    def test_only_decisions_are_read_out_and_only_when_they_change(self, kept_page):
+        decided = Decided("softness", "hard", 0.8, 1.2, 0.1, 0.3, ())
+        still = next(frames(1))
+        times = iter(range(10_000))
+        regions = "return [...document.querySelectorAll('[aria-live],[role=status]')]"
+        marked = "return Boolean(document.querySelector('.decision').marked)"
+        with chromium(390, kept_page.server.link) as browser:
+
+            def comes(condition):
+                for _ in range(400):
+                    kept_page.push(replace(still, t=float(next(times))), [decided])
+                    if browser.execute_script(condition):
+                        return
+                raise AssertionError("it never came")
+
+            comes("return document.querySelector('.decision') !== null")
+            names = browser.execute_script(f"{regions}.map(node => node.id)")
+            assert names == ["decisions"]
+            browser.execute_script("document.querySelector('.decision').marked = true")
+            version = browser.execute_script("return latest.t")
+            comes(f"return latest.t > {version}")
+            assert browser.execute_script(marked)
 
     def test_a_wrong_token_shows_nothing(self, serve):
         page = serve(folder=None)
