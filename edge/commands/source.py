@@ -207,9 +207,9 @@ def reading(
 
     Args:
         arguments: with the options of `options.add_reading`.
-        model: decides on the contacts; its arm and its angles are wanted.
-        arm: whose angles are wanted, without a model.
-        dof: how many angles are wanted, without a model.
+        model: decides on the contacts; its arm and its angles are wanted, if no others.
+        arm: whose angles are wanted.
+        dof: how many angles are wanted.
         needs_joints: refuse a source without the angles that the model needs.
         real_time: play a recording at its original speed, whatever the options say, as
             a page always does.
@@ -219,7 +219,7 @@ def reading(
         InputError: the options cannot be used.
         EdgeError: the skin cannot be read.
     """
-    if model is not None:
+    if model is not None and dof is None:
         arm = model.info.chain
         dof = model.info.dof
     if arguments.fake is not None and (real_time or arguments.web is not None):

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-from edge.commands.output import LOG
+from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
@@ -17,7 +16,7 @@ from edge.model.calibration import UNKNOWN
 from edge.model.info import ModelInfo
 from edge.saving import save
 from edge.tools.record import Trials, recording, shared_meta
-from edge.tools.review import UNSURE
+from edge.tools.review import UNSURE, decisions_of
 from edge.touch.frame import Frame
 from edge.writing import check_writable
 
@@ -99,7 +98,7 @@ class Keeper:
         self._thread.join()
         if self.kept or self.lost:
             lost = f", {self.lost} lost" if self.lost else ""
-            LOG.info(f"{self._folder}: {self.kept} touches kept{lost}")
+            LOG.info(f"{self._folder}: {counted(self.kept, 'recording')} kept{lost}")
 
     def _hand_over(self, frames: list[Frame]) -> None:
         first = frames[0].t
@@ -163,20 +162,6 @@ def reasons_of(decided: Sequence[Decided]) -> set[str]:
         if sure is None or sure < UNSURE or "unsure" in decision.flags:
             reasons.add("unsure")
     return reasons
-
-
-def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
-    """{task: its answer} for the metadata of a kept touch."""
-    return {
-        decision.task: {
-            "label": decision.label,
-            "confidence": decision.confidence,
-            "flags": list(decision.flags),
-            "window_s": decision.window_s,
-            "model": decision.model,
-        }
-        for decision in decided
-    }
 
 
 def reasons(text: str) -> tuple[str, ...]:

@@ -23,12 +23,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.classifier import Classifier
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
 from edge.commands.texts import labels_text
 from edge.errors import InputError
+from edge.events import Decided, Event
 from edge.files import refusing
+from edge.model.model import Model
 from edge.output.event_writer import Lines
 from edge.recording import Recording
 from edge.saving import save
@@ -36,6 +39,8 @@ from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
 from edge.tools import terminal
+from edge.tools.label import DELETED, delete
+from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
@@ -79,6 +84,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="recordings",
         metavar="FOLDER|FILE.npz",
         help="a folder for numbered trials (default: %(default)s), or a file for one trial",
+    )
+    parser.add_argument(
+        "--model",
+        help="model.onnx, whose decisions are shown beside the labels and kept in each "
+        "trial",
     )
     parser.add_argument(
         "--trials", type=within(int, 1, 1e9), help="stop after this many trials"
@@ -194,7 +204,13 @@ def trial_path(out: Path, labels: dict[str, str]) -> Path:
     with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
         if out.suffix != ".npz":
             paths = (out / f"{stem}-{number:03}.npz" for number in count(1))
-            return next(path for path in paths if not os.path.lexists(path))
+            # A deleted trial may come back under its name.
+            deleted = out / DELETED
+            return next(
+                path
+                for path in paths
+                if not (os.path.lexists(path) or os.path.lexists(deleted / path.name))
+            )
         with suppress(FileNotFoundError):
             out.lstat()
             raise InputError(f"{out}: exists already; choose another name or remove it")
@@ -207,18 +223,21 @@ def run(arguments: argparse.Namespace) -> int:
     folder = None if arguments.out.suffix == ".npz" else arguments.out
     labels = _labels(arguments, folder, by_key)
     check_writable(trial_path(arguments.out, labels).parent)
-    arm = open_arm(arguments)
+    model = None if arguments.model is None else Model(arguments.model)
+    arm = _arm(arguments, model)
     dof = _dof(arguments, arm)
     with (
         # Angles go by the real clock.
         reading(
             arguments,
+            model=model,
+            needs_joints=False,
             arm=arm,
             dof=dof,
             real_time=arguments.joints is not None,
             folder=folder,
             labels=labels,
-            choices=_choices(arguments),
+            choices=_choices(arguments, model),
         ) as live,
         closing(live.lines()) as lines,
         terminal.keys(live.stop) as typed,
@@ -236,18 +255,34 @@ def run(arguments: argparse.Namespace) -> int:
         for digit, (task, label) in zip(DIGITS, recorder.choices, strict=False):
             LOG.info(f"  {digit}  {task}={label}")
         trials = Trials(live.skin, arguments.length)
+        classifier = None if model is None else Classifier(model, live.skin.layout)
         most = arguments.trials if folder else 1
         for frame, faults in live.frames():
-            lines.write(faults)
+            events = [] if classifier is None else classifier.push(frame)
+            lines.write([*faults, *(event.to_dict() for event in events)])
             for key in typed():
                 recorder.press(key)
-            live.show(frame, faults)
-            recorder.follow(trials)
+            live.show(frame, faults, events)
+            recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
             if recorder.count == most:
                 break
         recorder.save(trials.rest(), complete=False)
     return _status(arguments, recorder, live.skin)
+
+
+def _arm(arguments: argparse.Namespace, model: Model | None) -> Chain | None:
+    """The arm that the options name, or that of the model.
+
+    Raises:
+        InputError: both are given.
+    """
+    arm = open_arm(arguments)
+    if model is None or model.info.chain is None:
+        return arm
+    if arm is not None:
+        raise InputError(f"{model.path} brings the arm that it needs: leave --arm out")
+    return model.info.chain
 
 
 def _dof(arguments: argparse.Namespace, arm: Chain | None) -> int | None:
@@ -288,10 +323,14 @@ def _labels(
     return labels
 
 
-def _choices(arguments: argparse.Namespace) -> dict[str, list[str]]:
-    """{task: the labels that a person may choose from}: those of the skin file, and
-    those of --label where a task has several."""
+def _choices(
+    arguments: argparse.Namespace, model: Model | None
+) -> dict[str, list[str]]:
+    """{task: the labels that a person may choose from}: those of the model and of the
+    skin file, and those of --label where a task has several."""
     choices: dict[str, list[str]] = {}
+    if model is not None:
+        choices = {name: list(task.labels) for name, task in model.info.tasks.items()}
     if arguments.skin is not None:
         for task, names in skinfile.load(arguments.skin).labels.items():
             choices[task] = list(names)
@@ -358,6 +397,8 @@ class Recorder:
         choices: the labels that keys choose, with their tasks.
         paths: the trials saved so far and not deleted.
         recording: whether the touch under way, or the next one, is to be saved.
+        held: the labels of the touch under way, which are those of its beginning.
+        decided: the model's decisions about it.
         any_joints: whether a saved frame had joint angles.
     """
 
@@ -370,7 +411,12 @@ class Recorder:
     choices: Sequence[tuple[str, str]] = ()
     paths: list[Path] = field(default_factory=list)
     recording: bool = True
+    held: dict[str, str] = field(default_factory=dict)
+    decided: list[Decided] = field(default_factory=list)
     any_joints: bool = False
+
+    def __post_init__(self) -> None:
+        self.held = self.labels
 
     def press(self, key: str) -> None:
         """Take a key: a number chooses its label, d deletes the last trial."""
@@ -382,7 +428,7 @@ class Recorder:
             LOG.info(f"next: {labels_text(self.labels)}")
         elif key in ("d", "D") and self.paths:
             path = self.paths.pop()
-            path.unlink(missing_ok=True)
+            delete([path])
             self.lines.write([{"event": "deleted", "file": str(path)}])
 
     @property
@@ -390,12 +436,16 @@ class Recorder:
         """Trials that have been saved and are still there."""
         return sum(path.exists() for path in self.paths)
 
-    def follow(self, trials: Trials) -> None:
-        """Take over the page's labels, but for a touch that is under way: a trial has
-        those of its beginning."""
-        if self.page is not None and not trials.under_way:
+    def follow(self, trials: Trials, events: Sequence[Event] = ()) -> None:
+        """Take over the page's labels, and the decisions about the touch under way,
+        which keeps the labels of its beginning."""
+        self.decided += [event for event in events if isinstance(event, Decided)]
+        if trials.under_way:
+            return
+        if self.page is not None:
             self.labels = self.page.labels
             self.recording = self.page.recording
+        self.held = self.labels
 
     def save(self, frames: list[Frame] | None, *, complete: bool) -> None:
         """Save the frames of a trial, if there is one and it is to be saved."""
@@ -404,20 +454,27 @@ class Recorder:
         if self.recording:
             self._save(frames, complete)
         elif self.page is not None and self.page.recording:
-            LOG.warning(
+            sentence = (
                 "recording was switched on during the touch, whose onset is missing: "
                 "it is not saved"
             )
+            LOG.warning(sentence)
+            self.page.notice(sentence)
 
     def _save(self, frames: list[Frame], complete: bool) -> None:
         """Save the frames of a trial under the next free name."""
         unposed = sum(frame.joints is None for frame in frames)
-        meta = {**self.meta, "labels": self.labels, "complete": complete}
+        meta = {**self.meta, "labels": self.held, "complete": complete}
+        first = frames[0].t
+        decided = [event for event in self.decided if event.onset_s >= first]
+        if decided:
+            meta["decided"] = decisions_of(decided)
+        self.decided.clear()
         if self.names is not None and unposed < len(frames):
             meta["joint_names"] = list(self.names)
         trial = recording(frames, meta)
         while True:
-            path = trial_path(self.out, self.labels)
+            path = trial_path(self.out, self.held)
             meta["trial"] = path.stem
             with suppress(NameTaken):  # another recorder in this folder was faster
                 save(path, trial, overwrite=False)
@@ -427,7 +484,7 @@ class Recorder:
         event = {
             "event": "saved",
             "file": str(path),
-            "labels": self.labels,
+            "labels": self.held,
             "frames": len(frames),
             "seconds": round(frames[-1].t - frames[0].t, 3),
             "joints": trial.joints is not None,

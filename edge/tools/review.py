@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.events import Decided
 from edge.model.calibration import UNKNOWN
 from edge.recording import Recording
 
@@ -34,6 +35,20 @@ def sparkline(percent: Sequence[int]) -> str:
     '▁▄█'
     """
     return "".join(BLOCKS[value * (len(BLOCKS) - 1) // 100] for value in percent)
+
+
+def decisions_of(decided: Sequence[Decided]) -> dict[str, Any]:
+    """{task: its answer} for the metadata of a kept touch."""
+    return {
+        decision.task: {
+            "label": decision.label,
+            "confidence": decision.confidence,
+            "flags": list(decision.flags),
+            "window_s": decision.window_s,
+            "model": decision.model,
+        }
+        for decision in decided
+    }
 
 
 def decisions(meta: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -178,7 +178,7 @@ function drawContact(picture) {
 
 function drawDecisions(picture) {
   const box = $("decisions");
-  $("decision-part").hidden = !picture.decides;
+  $("decision-part").hidden = !picture.decides && !picture.decisions.length;
   if (!picture.decisions.length) {
     say("decisions", picture.contact && !picture.contact.ended
       ? "Waiting for the window to end." : "No decision yet.");
@@ -292,6 +292,7 @@ function drawChoices(picture) {
     let digit = 0;
     box.replaceChildren(...Object.entries(picture.choices).map(([task, names]) => {
       const group = element("fieldset");
+      group.dataset.task = task;
       group.append(element("legend", task));
       for (const name of names) {
         digit += 1;
@@ -308,6 +309,12 @@ function drawChoices(picture) {
   }
   for (const button of box.querySelectorAll("button")) {
     button.setAttribute("aria-pressed", picture.labels[button.dataset.task] === button.dataset.label);
+  }
+  const decided = Object.fromEntries(picture.decisions.map((it) => [it.task, `decided: ${answerText(it)}`]));
+  for (const group of box.children) {
+    const task = group.dataset.task;
+    const text = task in decided ? `${task}, ${decided[task]}` : task;
+    if (group.firstChild.textContent !== text) group.firstChild.textContent = text;
   }
 }
 
@@ -360,10 +367,10 @@ function drawFilter() {
   $("filter").value = ["", ...names].includes(chosen) ? chosen : "";
 }
 
-function decisionText([task, { label, confidence, flags }]) {
+function answerText({ label, confidence, flags }) {
   const sure = confidence === null ? [] : [`${Math.round(100 * confidence)} %`];
   const notes = [...sure, ...flags].join(", ");
-  return `${task}: ${label === null ? "out of range" : label}` + (notes ? ` (${notes})` : "");
+  return (label === null ? "out of range" : label) + (notes ? ` (${notes})` : "");
 }
 
 function smallCurve(percent) {
@@ -420,7 +427,7 @@ function trialRow(trial) {
   const picture = element("td", undefined, "small");
   picture.append(smallCurve(trial.curve));
   const what = element("td", labelText(trial.labels) || "no label");
-  for (const decision of decided) what.append(element("div", decisionText(decision), "near"));
+  for (const [task, answer] of decided) what.append(element("div", `${task}: ${answerText(answer)}`, "near"));
   for (const kind of trial.kinds) what.append(element("span", kind, "flag"));
   row.append(picture, name, what, buttons);
   return row;

@@ -43,7 +43,7 @@ def run(edge, folder, *words):
 def test_a_kept_touch_has_the_frames_and_the_decision(edge, tmp_path):
     status, lines, err = run(edge, tmp_path / "kept", "--keep-if", "all")
     assert status == 0
-    assert "1 touches kept" in err
+    assert "1 recording kept" in err
     (path,) = (tmp_path / "kept").glob("kept-*.npz")
     kept = load(path)
     assert kept.labels == {}

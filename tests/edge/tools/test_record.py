@@ -10,19 +10,21 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from edge import demo
 from edge.commands.source import ending_signals
 from edge.fake.clock import VirtualClock
 from edge.output.event_writer import Lines
 from edge.recording import load
 from edge.saving import save
-from edge.tools import terminal
+from edge.tools import review, terminal
 from edge.tools.record import Recorder, Trials, trial_path
 from edge.touch.frame import Frame
-from tests.conftest import full_pipe, started
+from tests.conftest import ROOT, full_pipe, started
 
 
 def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp_path):
@@ -282,7 +284,64 @@ def test_keys_choose_the_label_and_delete_the_last_trial(
         ("saved", "soft-left-001.npz"),
         ("saved", "hard-left-001.npz"),
         ("deleted", "hard-left-001.npz"),
-        ("saved", "hard-left-001.npz"),
         ("saved", "hard-left-002.npz"),
+        ("saved", "hard-left-003.npz"),
     ]
     assert "next: touch=hard, hand=left" in err
+    assert edge("label", trials, "--undo")[0] == 0
+    assert (trials / "hard-left-001.npz").exists()
+
+
+def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
+    begun = SimpleNamespace(under_way=False)
+    with recorder(tmp_path) as mine:
+        mine.choices = [("object", "box"), ("object", "pillow")]
+        mine.follow(begun)
+        begun.under_way = True
+        mine.press("2")
+        mine.follow(begun)
+        mine.save(frames(None), complete=True)
+        begun.under_way = False
+        mine.follow(begun)
+        mine.save(frames(None), complete=True)
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == [
+        "box-001.npz",
+        "pillow-001.npz",
+    ]
+
+
+def test_the_page_says_of_a_touch_that_its_onset_was_not_recorded(tmp_path):
+    notices = []
+    page = SimpleNamespace(labels={}, recording=False, notice=notices.append)
+    with recorder(tmp_path) as mine:
+        mine.page = page
+        mine.follow(SimpleNamespace(under_way=False))
+        page.recording = True
+        mine.follow(SimpleNamespace(under_way=True))
+        mine.save(frames(None), complete=True)
+    assert list(tmp_path.iterdir()) == []
+    (notice,) = notices
+    assert "whose onset is missing: it is not saved" in notice
+
+
+def test_a_trial_keeps_what_a_model_said_of_its_touch(edge, tmp_path):
+    touch = demo.FOLDER / "pillow-movable.npz"
+    given = ("--fake", touch, "--label", "object=cushion", "--out", tmp_path / "a.npz")
+    status, events, _ = edge("record", "--model", demo.MODEL, *given)
+    assert status == 0
+    kinds = [event["event"] for event in events]
+    assert kinds.index("decision") < kinds.index("saved")
+    trial = load(tmp_path / "a.npz")
+    assert trial.labels == {"object": "cushion"}
+    assert trial.meta["decided"]["object"]["label"] == "pillow"
+    assert "arm" in trial.meta
+    assert "wrong" in review.kinds(trial.meta)
+
+
+def test_a_model_brings_the_arm_that_it_needs(refused, tmp_path):
+    touch = demo.FOLDER / "pillow-movable.npz"
+    given = ("--fake", touch, "--label", "object=a", "--out", tmp_path / "a.npz")
+    arm = tmp_path / "arm.toml"
+    arm.write_text((ROOT / "edge/arms/cody.toml").read_text())
+    said = refused("record", "--model", demo.MODEL, *given, "--arm", arm)
+    assert "leave --arm out" in said
