@@ -68,16 +68,21 @@ def run(arguments: argparse.Namespace) -> int:
     golden = arguments.golden or arguments.model.with_name("golden.npz")
     prove(arguments.model, golden, arguments.skin)
     place(arguments.model, golden, target)
-    restart(arguments.service)
+    try:
+        restart(arguments.service)
+    except EdgeError:
+        _return_by_itself(target)
+        raise
     if arguments.service and not runs_on(is_active_of(arguments.service)):
         LOG.error(f"{arguments.service} does not run with the new model")
-        if with_end(target, FORMER).is_file():
-            go_back(target)
+        if _return_by_itself(target):
             restart(arguments.service)
-            LOG.error(f"{target}: the former model is back")
         return 1
     version = Model(target).version
-    text = f"{target}: {version} is installed; `edge-classify install --back` goes back"
+    text = (
+        f"{target}: {version} is installed; `edge-classify install --back --to {target}` "
+        "goes back"
+    )
     output.event({"event": "installed", "version": version}, text)
     return 0
 
@@ -113,9 +118,30 @@ def with_end(path: Path, end: str) -> Path:
 def place(model: Path, golden: Path, target: Path) -> None:
     """Put the model and its golden file in place, and keep the former ones."""
     for source, goal in ((golden, target.with_name("golden.npz")), (model, target)):
-        if goal.is_file():
-            _copy(goal, with_end(goal, FORMER))
-        _copy(source, goal)
+        data = read_bytes(source, LARGEST_BYTES)
+        keep_former(goal, data)
+        _write(goal, data)
+
+
+def keep_former(goal: Path, data: bytes) -> bool:
+    """Copy the file that other bytes are to replace, under a longer name; whether
+    there is one."""
+    if not goal.is_file():
+        return False
+    former = read_bytes(goal, LARGEST_BYTES)
+    if former == data:  # installed twice, it would be its own way back
+        return False
+    _write(with_end(goal, FORMER), former)
+    return True
+
+
+def _return_by_itself(target: Path) -> bool:
+    """Bring the former model back; whether there is one."""
+    if not with_end(target, FORMER).is_file():
+        return False
+    go_back(target)
+    LOG.error(f"{target}: the former model is back")
+    return True
 
 
 def go_back(target: Path) -> None:
@@ -129,12 +155,11 @@ def go_back(target: Path) -> None:
     for goal in (target.with_name("golden.npz"), target):
         former = with_end(goal, FORMER)
         if former.is_file():
-            _copy(former, goal)
+            _write(goal, read_bytes(former, LARGEST_BYTES))
             os.unlink(former)
 
 
-def _copy(source: Path, goal: Path) -> None:
-    data = read_bytes(source, LARGEST_BYTES)
+def _write(goal: Path, data: bytes) -> None:
     with write_whole(goal) as file:
         file.write(data)
 
@@ -156,11 +181,16 @@ def restart(service: str | None) -> None:
 
 
 def is_active_of(service: str) -> Callable[[], bool]:
-    """A function that asks whether a service runs."""
+    """A function that asks whether a service runs, and was not started again since it
+    was asked first."""
+    command = ["systemctl", "show", "--property=ActiveState,NRestarts", service]
+    former: list[str] = []
 
     def is_active() -> bool:
-        command = ["systemctl", "is-active", "--quiet", service]
-        return subprocess.run(command, check=False).returncode == 0
+        completed = subprocess.run(command, capture_output=True, text=True, check=False)
+        state = completed.stdout.split()
+        former[:] = former or state
+        return "ActiveState=active" in state and state == former
 
     return is_active
 

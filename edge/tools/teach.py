@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.commands.install import FORMER, keep_former
 from edge.commands.output import LOG, Output, counted
 from edge.model.model import Model
 from edge.model.verify import renew
@@ -57,6 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
     at_points = np.array(vectors).swapaxes(0, 1)
     data = taught(model, names, at_points, labels, new_labels=arguments.new_labels)
     target = arguments.out / "model.onnx"
+    if keep_former(target, data):
+        LOG.warning(
+            f"{target}: the model that was there is kept, with the end {FORMER}"
+        )
+        keep_former(target.with_name("golden.npz"), b"")
     with write_whole(target) as file:
         file.write(data)
     after = Model(target)

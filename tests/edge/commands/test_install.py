@@ -1,11 +1,15 @@
 """A model takes the place of another, and gives it back."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 
 from edge.commands import install
+from edge.model.info import METADATA_KEY
+from edge.model.metadata import to_json
 from edge.model.model import Model
+from edge.tools.rewriting import rewritten
 
 
 @pytest.fixture
@@ -40,10 +44,12 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
 
 
 def test_the_former_model_comes_back_once(edge, new, running):
-    shutil.copy(new, running)
-    shutil.copy(new.with_name("golden.npz"), running.with_name("golden.npz"))
+    metadata = to_json(replace(Model(new).info, name="former"))
+    former = rewritten(new.read_bytes(), {}, {METADATA_KEY: metadata})
+    running.write_bytes(former)
     edge("install", new, "--to", running)
     assert edge("install", "--back", "--to", running)[0] == 0
+    assert running.read_bytes() == former
     assert sorted(path.name for path in running.parent.iterdir()) == [
         "golden.npz",
         "model.onnx",
@@ -51,6 +57,12 @@ def test_the_former_model_comes_back_once(edge, new, running):
     status, _, err = edge("install", "--back", "--to", running)
     assert status == 2
     assert "has no former model to go back to" in err
+
+
+def test_a_model_that_is_installed_twice_is_not_its_own_way_back(edge, new, running):
+    for _ in range(2):
+        assert edge("install", new, "--to", running)[0] == 0
+    assert running.with_name("model.onnx.former").read_bytes() == b"former model"
 
 
 @pytest.mark.parametrize("damage", ["model", "golden", "missing"])
@@ -88,6 +100,35 @@ def test_a_machine_without_systemd_is_told_so(edge, new, running, monkeypatch):
     status, _, err = edge("install", new, "--to", running, "--service", "robot")
     assert status == 2
     assert "robot cannot be restarted with systemctl: No such file or directory" in err
+    assert "the former model is back" in err
+    assert running.read_bytes() == b"former model"
+
+
+@pytest.fixture
+def looks(tmp_path, monkeypatch):
+    """What a stand-in for systemctl says of the service, a text for each look."""
+    program = tmp_path / "systemctl"
+    program.write_text("#!/bin/sh\ncat state\n")
+    program.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    is_active = install.is_active_of("robot")
+
+    def look(state):
+        (tmp_path / "state").write_text(state)
+        return is_active()
+
+    return look
+
+
+def test_a_service_that_was_started_again_has_not_run_on(looks):
+    assert looks("ActiveState=active\nNRestarts=0\n")
+    assert looks("ActiveState=active\nNRestarts=0\n")
+    assert not looks("ActiveState=active\nNRestarts=1\n")
+
+
+def test_a_service_that_waits_for_its_next_start_does_not_run(looks):
+    assert not looks("ActiveState=activating\nNRestarts=0\n")
 
 
 def test_a_service_is_watched_for_a_minute():

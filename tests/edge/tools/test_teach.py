@@ -72,6 +72,20 @@ def test_a_taught_trial_is_known_again(teach, exported, cup, tmp_path):
     assert (decisions["object"].distances == former).all()
 
 
+def test_another_model_in_its_place_is_kept_and_named(teach, cup, make_touch, tmp_path):
+    folder = tmp_path / "taught"
+    _, _, messages = teach(cup)
+    assert "is kept" not in messages
+    former = [(folder / name).read_bytes() for name in ("model.onnx", "golden.npz")]
+    other = tmp_path / "other.npz"
+    save(other, labelled(make_touch(seed=71), category="soft-fixed"))
+    _, _, messages = teach(other)
+    assert f"{folder}/model.onnx: the model that was there is kept" in messages
+    assert (folder / "model.onnx").read_bytes() != former[0]
+    assert (folder / "model.onnx.former").read_bytes() == former[0]
+    assert (folder / "golden.npz.former").read_bytes() == former[1]
+
+
 def test_the_new_golden_file_agrees_with_the_taught_model(teach, edge, cup, tmp_path):
     teach(cup)
     taught = tmp_path / "taught"
