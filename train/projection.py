@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,23 @@ def principal_axes(
     return mean, axes, values[:rank]
 
 
+@dataclass(frozen=True)
+class Classes:
+    """The classes of rows of a `Spectrum`.
+
+    Attributes:
+        labels: (n,) class indices.
+        sizes: (c,) number of rows of each.
+        members: (n, c) 1 where a row is of a class, else 0.
+        means: (r, c) of the scores, times the root of the size.
+    """
+
+    labels: Integers
+    sizes: Integers
+    members: Floats
+    means: Floats
+
+
 class Spectrum:
     """Principal axes and discriminants of rows, for any number of axes, shrinkage and
     labels.
@@ -183,31 +201,47 @@ class Spectrum:
         Raises:
             InputError: the shrinkage is not above 0.
         """
-        weights = self._lift(self.directions(labels, shrinkage))
+        (directions,) = self.directions(self.classes(labels), (shrinkage,))
+        weights = self._lift(directions)
         return np.asarray(weights * _signs(weights.T))
 
-    def directions(self, labels: Integers, shrinkage: float) -> Floats:
-        """(r, c) the `discriminants` in the eigenvectors' basis, to be multiplied by
-        `scores`."""
-        if not shrinkage > 0.0:
-            raise InputError(f"the shrinkage of lda must be above 0, not {shrinkage:g}")
-        n = len(labels)
-        ridge = shrinkage * float(self.values.sum()) / n
-        root = 1.0 / np.sqrt(self.values + ridge)
+    def classes(self, labels: Integers) -> Classes:
+        """The classes of the rows, by their indices (n,)."""
         sizes = np.bincount(labels)
         if not sizes.all():
             sizes = sizes[sizes > 0]
             labels = np.unique(labels, return_inverse=True)[1]
         members = (labels[:, None] == np.arange(len(sizes))).astype(np.float64)
         # The indicators of the members need no centring, as the rows are centred.
-        means = root[:, None] * (self.scores.T @ (members / np.sqrt(sizes)))
-        left, separation, _ = np.linalg.svd(means, full_matrices=False)
-        keep = separation[: len(sizes) - 1] > NO_DISTANCE
-        directions = root[:, None] * left[:, : len(keep)][:, keep]
-        z = self.scores @ directions
-        within = z - (members.T @ z / sizes[:, None])[labels]
-        variance = ((within**2).sum(axis=0) + ridge * (directions**2).sum(axis=0)) / n
-        return np.asarray(directions / np.sqrt(variance))
+        means = self.scores.T @ (members / np.sqrt(sizes))
+        return Classes(labels, sizes, members, means)
+
+    def directions(self, classes: Classes, shrinkages: Sequence[float]) -> list[Floats]:
+        """[shrinkage] (r, c) the `discriminants` in the eigenvectors' basis, to be
+        multiplied by `scores`."""
+        if not min(shrinkages) > 0.0:
+            raise InputError(
+                f"the shrinkage of lda must be above 0, not {min(shrinkages):g}"
+            )
+        n = len(classes.labels)
+        ridge = np.array(shrinkages)[:, None] * float(self.values.sum()) / n
+        root = 1.0 / np.sqrt(self.values + ridge)
+        left, separation, _ = np.linalg.svd(
+            root[:, :, None] * classes.means, full_matrices=False
+        )
+        separate = separation[:, : len(classes.sizes) - 1] > NO_DISTANCE
+        directions: list[Floats] = []
+        # Shrinkages in a row nearly always separate along as many directions.
+        for count, group in groupby(range(len(root)), separate.sum(axis=1).__getitem__):
+            places = list(group)
+            along = root[places, :, None] * left[places, :, :count]
+            z = self.scores @ along
+            means = classes.members.T @ z / classes.sizes[:, None]
+            within = z - means[:, classes.labels]
+            spread = ridge[places] * (along**2).sum(axis=1)
+            variance = ((within**2).sum(axis=1) + spread) / n
+            directions += list(along / np.sqrt(variance)[:, None, :])
+        return directions
 
 
 def on_grid(weights: Floats) -> Floats:

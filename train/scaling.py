@@ -15,6 +15,8 @@ SMALLEST_SCALE = 1e-30
 LARGEST_SCALE = 1e100
 """Sizes of scaled features whose grid steps and squares are ordinary float64
 numbers."""
+SUMMABLE = 1e290
+"""Smaller entries of fewer than 10^18 rows add up to a finite number."""
 
 
 def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -34,8 +36,11 @@ def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
 def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
     """(p,) mean of each column of X (n, p), also where its sum would overflow.
 
-    A power of two brings each column's largest entry near 1. It rounds nothing.
+    A power of two brings each column's largest entry near 1. It rounds nothing, and
+    entries whose sums are finite do without.
     """
+    if np.abs(X).max(initial=0.0) < SUMMABLE:
+        return np.asarray(X.mean(axis=0))
     powers = np.frexp(np.abs(X).max(axis=0, initial=0.0))[1]
     return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
 

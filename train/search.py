@@ -1,7 +1,7 @@
 """Settings that share a decomposition of features, and the neighbours that each of them
 finds."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,29 +78,43 @@ class SearchGrid:
         ]
 
 
-def _nearest(training: Floats, tested: Floats, k: int) -> Integers:
-    """(m, k) rows of `training` (n, c) nearest to each of `tested` (m, c), equal ones in
-    their order.
+def _nearest(spaces: Sequence[tuple[Floats, Floats]], k: int) -> Integers:
+    """(spaces, m, k) rows of training (n, c) nearest to each tested one (m, c), in each
+    of some spaces of both; equal ones in their order.
 
     Which of several equal ones is the last of the k is left open. The coordinates are
     whole numbers, whose squared distances are exact. scikit-learn never holds all (m,
     n) of them and is fast for many, but it checks its input for longer than a few take.
     """
-    if not training.shape[1]:
-        return np.tile(np.arange(k), (len(tested), 1))
+    training, tested = spaces[0]
     if len(training) * len(tested) > MANY:
-        search = NearestNeighbors(
-            n_neighbors=k, algorithm="brute", metric="sqeuclidean"
-        ).fit(training)
-        squares, rows = search.kneighbors(tested)
+        pairs = [_searched(*space, k) for space in spaces]
+        squares, rows = map(np.stack, zip(*pairs, strict=True))
     else:
-        squares = np.einsum("ij,ij->i", training, training) - 2.0 * (
-            tested @ training.T
-        )
-        rows = np.argpartition(squares, k - 1, axis=1)[:, :k]
-        squares = np.take_along_axis(squares, rows, axis=1)
-    order = np.lexsort((rows, squares), axis=1)
-    return np.take_along_axis(rows, order, axis=1)
+        squares = np.stack([_squares(*space) for space in spaces])
+        rows = np.argpartition(squares, k - 1, axis=-1)[..., :k]
+        squares = np.take_along_axis(squares, rows, axis=-1)
+    order = np.lexsort((rows, squares), axis=-1)
+    return np.take_along_axis(rows, order, axis=-1)
+
+
+def _squares(training: Floats, tested: Floats) -> Floats:
+    """(m, n) squared distances but for a constant of each tested row; where there are
+    no coordinates, the order of the rows."""
+    lengths = np.einsum("ij,ij->i", training, training)
+    if not training.shape[1]:
+        lengths = np.arange(len(training), dtype=np.float64)
+    return np.asarray(lengths - 2.0 * (tested @ training.T))
+
+
+def _searched(training: Floats, tested: Floats, k: int) -> tuple[Floats, Integers]:
+    """(m, k) squared distances and rows, by scikit-learn."""
+    if not training.shape[1]:
+        rows = np.tile(np.arange(k), (len(tested), 1))
+        return rows.astype(np.float64), rows
+    search = NearestNeighbors(n_neighbors=k, algorithm="brute", metric="sqeuclidean")
+    squares, rows = search.fit(training).kneighbors(tested)
+    return squares, rows
 
 
 def _rounded(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -146,7 +160,9 @@ class Decomposition:
         self._labels = labels
         self._first = first
         self._new_scores: Floats | None = None
-        self._along: dict[tuple[str, float], tuple[Floats, Floats]] = {}
+        self._along: dict[
+            tuple[str, tuple[float, ...]], list[tuple[Floats, Floats]]
+        ] = {}
 
     def neighbours(self, grid: SearchGrid, task: str) -> Integers:
         """(projections, m, k) places among the trials, for each projection of a
@@ -157,29 +173,36 @@ class Decomposition:
             training, tested = _rounded(
                 self._spectrum.rows[self._first] @ axes, self._new @ axes
             )
-            return np.stack(
-                [_nearest(training[:, :c], tested[:, :c], k) for c in grid.components]
-            )
-        places = []
-        for shrinkage in grid.shrinkages:
-            parts = [
-                self._discriminants(target, shrinkage)
-                for target in grid.targets or (task,)
-            ]
-            coordinates = (
-                np.hstack(pair)[:, : grid.most_directions]
-                for pair in zip(*parts, strict=True)
-            )
-            places.append(_nearest(*_rounded(*coordinates), k))
-        return np.stack(places)
+            spaces = [(training[:, :c], tested[:, :c]) for c in grid.components]
+            return _nearest(spaces, k)
+        by_target = [
+            self._discriminants(target, grid.shrinkages)
+            for target in grid.targets or (task,)
+        ]
+        spaces = []
+        for coordinates in zip(*by_target, strict=True):
+            rows, new = zip(*coordinates, strict=True)
+            most = grid.most_directions
+            spaces.append(_rounded(_beside(rows)[:, :most], _beside(new)[:, :most]))
+        return _nearest(spaces, k)
 
-    def _discriminants(self, task: str, shrinkage: float) -> tuple[Floats, Floats]:
-        """Coordinates (trials, c) and (m, c) along the discriminants of a task's
-        labels."""
+    def _discriminants(
+        self, task: str, shrinkages: tuple[float, ...]
+    ) -> list[tuple[Floats, Floats]]:
+        """[shrinkage] coordinates (trials, c) and (m, c) along the discriminants of a
+        task's labels."""
         if self._new_scores is None:
             self._new_scores = self._spectrum.scores_of(self._new)
-        if (task, shrinkage) not in self._along:
-            directions = self._spectrum.directions(self._labels[task], shrinkage)
-            rows = (self._spectrum.scores @ directions)[self._first]
-            self._along[task, shrinkage] = rows, self._new_scores @ directions
-        return self._along[task, shrinkage]
+        if (task, shrinkages) not in self._along:
+            spectrum = self._spectrum
+            classes = spectrum.classes(self._labels[task])
+            self._along[task, shrinkages] = [
+                ((spectrum.scores @ along)[self._first], self._new_scores @ along)
+                for along in spectrum.directions(classes, shrinkages)
+            ]
+        return self._along[task, shrinkages]
+
+
+def _beside(coordinates: Sequence[Floats]) -> Floats:
+    """Coordinates (n, c) side by side; hstack copies a single one too."""
+    return coordinates[0] if len(coordinates) == 1 else np.hstack(coordinates)

@@ -44,7 +44,7 @@ def test_few_and_many_trials_have_the_neighbours_of_a_sort(n):
     training = rng.permutation(10 * n)[: 2 * n].reshape(n, 2)
     tested = rng.integers(0, n, (30, 2))
     squares = ((tested[:, None] - training) ** 2).sum(axis=2)
-    near = _nearest(training.astype(float), tested.astype(float), 4)
+    (near,) = _nearest([(training.astype(float), tested.astype(float))], 4)
     nearest = np.take_along_axis(squares, near, axis=1)
     np.testing.assert_array_equal(nearest, np.sort(squares, axis=1)[:, :4])
     ties = nearest[:, 1:] == nearest[:, :-1]
