@@ -38,8 +38,9 @@ def table_csv(table: Table) -> dict[str, str]:
 
 
 def file_name(name: str, suffix: str) -> str:
-    """A file's name from that of a table or figure, which may hold a task's name."""
-    return re.sub(r"[^\w.-]+", "_", name) + suffix
+    """A file's name from that of a table or figure, which may hold a task's name: other
+    signs are told by their numbers, so that two tasks never share a file."""
+    return re.sub(r"[^\w.-]", lambda sign: f"_{ord(sign[0]):x}", name) + suffix
 
 
 def _text(text: str) -> str:

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from tests import browser
-from train.report.page import page, table_csv, write
+from train.report.page import file_name, page, table_csv, write
 from train.report.section import Figure, Section, Table, counted
 
 WIDE = Table(
@@ -45,6 +45,15 @@ def test_a_task_of_any_name_stays_in_the_folder_of_the_report(tmp_path, task):
     (linked,) = re.findall('href="([^"]+)"', report.read_text())
     assert (out / linked).read_text() == "n\n1\n"
     assert len(list(out.glob("confusion_*.png"))) == 1
+
+
+def test_two_tasks_never_share_a_file():
+    names = {file_name(f"confusion_{task}", ".png") for task in ("a b", "a_b", "a/b")}
+    assert names == {
+        "confusion_a_20b.png",
+        "confusion_a_b.png",
+        "confusion_a_2fb.png",
+    }
 
 
 def test_a_table_is_the_same_in_its_csv():
