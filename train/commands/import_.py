@@ -77,18 +77,20 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def counted_warnings() -> Iterator[None]:
-    """Print the first of the recordings' warnings that differ in names and numbers
-    alone, and how many more there were."""
-    logger = logging.getLogger("edge")
+    """Print the first of the warnings that differ in names and numbers alone, and how
+    many more there were."""
     kept = BufferingHandler(capacity=sys.maxsize)
-    handlers = logger.handlers
-    logger.handlers = [kept]
-    logger.propagate = False
+    loggers = [logging.getLogger(name) for name in ("edge", "train")]
+    handlers = [logger.handlers for logger in loggers]
+    for logger in loggers:
+        logger.handlers = [kept]
+        logger.propagate = False
     try:
         yield
     finally:
-        logger.handlers = handlers
-        logger.propagate = True
+        for logger, former in zip(loggers, handlers, strict=True):
+            logger.handlers = former
+            logger.propagate = True
         messages = [record.getMessage() for record in kept.buffer]
         kinds = Counter(map(kind_of, messages))
         firsts = {kind_of(message): message for message in reversed(messages)}
@@ -98,8 +100,8 @@ def counted_warnings() -> Iterator[None]:
 
 
 def kind_of(message: str) -> str:
-    """A recording's warning without the recording's name and without numbers."""
-    return re.sub(r"[\d.e+-]*\d", "#", message.partition(": ")[2])
+    """A warning without the names before it and without numbers."""
+    return re.sub(r"[\d.e+-]*\d", "#", message.rpartition(": ")[2])
 
 
 def write(

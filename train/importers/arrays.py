@@ -4,6 +4,7 @@ import argparse
 import io
 import math
 import zipfile
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -73,10 +74,24 @@ def _hdf5(file: BinaryIO) -> Arrays:
         import h5py
     arrays: Arrays = {}
 
+    def value(item: Any) -> Any:
+        kind = item.attrs.get("MATLAB_class")
+        _check_size(math.prod(item.shape or ()))
+        array = item[()]
+        if kind is None or not isinstance(array, np.ndarray):
+            return array
+        if kind == b"char":
+            return np.array("".join(map(chr, array.flat)))
+        if kind == b"cell":
+            cells = np.empty(array.size, object)
+            for i, reference in enumerate(array.flat):
+                cells[i] = value(stored[reference])
+            return cells
+        return array.T  # MATLAB stores columns one after another
+
     def collect(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
-            _check_size(math.prod(item.shape or ()))
-            arrays[name.replace("/", ".")] = item[()]
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            arrays[name.replace("/", ".")] = value(item)
 
     with h5py.File(file, "r") as stored:
         stored.visititems(collect)
@@ -91,11 +106,11 @@ def _check_size(values: int) -> None:
         )
 
 
-def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
+def table_of(where: str, arrays: Arrays, options: argparse.Namespace) -> Table:
     """A row for each frame of some arrays, and a column for each of their other values.
 
     Args:
-        path: of the file.
+        where: names the file in errors.
         arrays: {name: array}; those without numbers are left out.
         options: `axis` is that of the time, from 1; if `taxels` are named, the other
             arrays that no option names are left out, but for the times and trials.
@@ -105,9 +120,12 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
     """
     numbers = _numbers(arrays, options)
     if not numbers:
-        raise InputError(EMPTY)
+        has_parts = any(array.dtype.hasobject for array in arrays.values())
+        raise InputError(
+            "holds cells or structures; give --trials" * has_parts or EMPTY
+        )
     axis = None if options.axis is None else options.axis - 1
-    frames = _frames(numbers, axis)
+    frames = _frames(numbers, axis, options.time)
     names: list[str] = []
     blocks: list[NDArray[Any]] = []
     form: list[str] = []
@@ -128,7 +146,7 @@ def table_of(path: Path, arrays: Arrays, options: argparse.Namespace) -> Table:
         names += [name] if is_column else numbered(name, block.shape[1])
     require_unique(names)
     data = pd.DataFrame(np.hstack(blocks), columns=names)
-    return Table(path, data, named="" not in numbers, shape=shape, form=tuple(form))
+    return Table(where, data, named="" not in numbers, shape=shape, form=tuple(form))
 
 
 def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
@@ -150,20 +168,21 @@ def _is_vector(array: NDArray[Any]) -> bool:
     return array.ndim == 0 or (array.ndim == 2 and 1 in array.shape)
 
 
-def _frames(arrays: Arrays, axis: int | None) -> int:
-    """The number of frames: that of the times, or what all arrays share."""
+def _frames(arrays: Arrays, axis: int | None, time: str | None) -> int:
+    """The number of frames: that of the times, or what all arrays share. A single array
+    has its longest axis first."""
     for name, array in arrays.items():
-        if TIME.fullmatch(name) and array.ndim == 1:
+        if array.ndim == 1 and (name == time or TIME.fullmatch(name)):
             return array.size
     largest = max(arrays.values(), key=np.size)
     if axis is not None:
         if axis >= largest.ndim:
             raise InputError(f"--axis must be 1 to {largest.ndim}")
         return int(largest.shape[axis])
-    if len(arrays) == 1:
-        return len(largest)
-    sizes = {name: array.shape for name, array in arrays.items()}
+    sizes = {name or "the array": array.shape for name, array in arrays.items()}
     shared = set.intersection(*map(set, sizes.values()))
+    if len(arrays) == 1:
+        shared = {len(largest)} & {max(largest.shape)}
     if len(shared) == 1:
         return int(shared.pop())
     raise InputError(
@@ -197,23 +216,31 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
 def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Arrays]]:
     """The labels and arrays of each trial of a file that holds several.
 
-    Trials are the entries of a cell array or of a structure, or the first axis that all
-    arrays share. What is a text or a number for each trial is a label, named by its
+    Trials are the groups or structures of the file, the entries of a cell array or of a
+    structure, or the first axis that all arrays share. What is a text or a number for each trial is a label, named by its
     array; one that is called label or labels is the label of `task`.
 
     Raises:
         InputError: the arrays do not share an axis of trials.
     """
-    entries = _entries(arrays)
-    for values in zip(*entries.values(), strict=True):
+    groups = _groups(arrays)
+    fields = {tuple(sorted(group)) for group in groups.values()}
+    if len(groups) > 1 and len(fields) == 1:
+        of_trials = list(groups.values())
+    else:
+        entries = _entries(arrays)
+        columns = zip(*entries.values(), strict=True)
+        of_trials = [dict(zip(entries, values, strict=True)) for values in columns]
+    for trial in of_trials:
         labels: dict[str, str] = {}
         of_trial: Arrays = {}
-        for name, stored in zip(entries, values, strict=True):
+        for path, stored in trial.items():
             value = np.asarray(stored)
             if value.dtype.names:  # a structure within it is no value
                 continue
             if value.size == 1:  # without the array that MATLAB puts around a value
                 value = np.asarray(value.item())
+            name = path.rpartition(".")[2]
             if value.ndim == 0 or value.dtype.kind in "US":
                 is_label = name.lower() in ("label", "labels")
                 labels[task if is_label else name] = str(value)
@@ -222,12 +249,26 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
         yield labels, of_trial
 
 
+def _groups(arrays: Arrays) -> dict[str, Arrays]:
+    """The arrays of each group, or of each structure."""
+    groups: dict[str, Arrays] = defaultdict(dict)
+    for path, array in arrays.items():
+        group, _, name = path.rpartition(".")
+        if array.dtype.names and array.size == 1:
+            fields = zip(array.dtype.names, array.item(), strict=True)
+            groups[path] = {field: np.asarray(value) for field, value in fields}
+        else:
+            groups[group][name] = array
+    return groups
+
+
 def _entries(arrays: Arrays) -> Arrays:
     """The entries of each array or field, one for each trial."""
     entries: Arrays = {}
     for name, stored in arrays.items():
         array = _of_structures(stored) if stored.dtype == object else stored
         if array.dtype.names:
+            require_unique([*entries, *array.dtype.names])
             entries |= {field: array[field].ravel() for field in array.dtype.names}
         elif array.dtype == object or _is_vector(array):
             entries[name] = array.ravel()

@@ -123,7 +123,7 @@ class Parted(Table):
         """
         for name in names:
             if name not in self.axes.index:
-                raise InputError(f"{self.path}: taxel {name} has one axis alone")
+                raise InputError(f"{self.where}: taxel {name} has one axis alone")
         columns = self.axes.loc[list(names)].to_numpy()
         return self.whole.numbers(columns.flat).reshape(-1, *columns.shape)
 
@@ -157,7 +157,7 @@ def parted(table: Table, normal: str) -> Parted:
     odd = axes.index[axes.isna().any(axis=1)]
     if len(odd):
         raise InputError(
-            f"{table.path}: {shown(sorted(odd)[:3])} lacks one of the axes x, y, z; "
+            f"{table.where}: {shown(sorted(odd)[:3])} lacks one of the axes x, y, z; "
             "leave --axes out, or mend the names"
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
@@ -167,11 +167,11 @@ def parted(table: Table, normal: str) -> Parted:
     if not data.columns.is_unique:
         twice = data.columns[data.columns.duplicated()][0]
         raise InputError(
-            f"{table.path}: {twice} names a column and a taxel of three axes; rename one "
+            f"{table.where}: {twice} names a column and a taxel of three axes; rename one "
             "of them"
         )
     return Parted(
-        path=table.path,
+        where=table.where,
         data=data,
         named=table.named,
         shape=shape,
@@ -191,7 +191,7 @@ def _by_letters(table: Table) -> pd.DataFrame:
             former = columns[taxel].get(letter)
             if former is not None:
                 raise InputError(
-                    f"{table.path}: {former} and {name} are both {letter} of {taxel}; "
+                    f"{table.where}: {former} and {name} are both {letter} of {taxel}; "
                     "rename one of them"
                 )
             columns[taxel][letter] = name
@@ -208,7 +208,7 @@ def _three_by_three(table: Table) -> pd.DataFrame:
     is_array = table.shape[-1:] == (3,)
     if (table.named and not is_array) or len(threes) != 1:
         raise InputError(
-            f"{table.path}: no columns are named by an axis, such as s1_x, s1_y and "
+            f"{table.where}: no columns are named by an axis, such as s1_x, s1_y and "
             f"s1_z; it has {shown(table.names)}"
         )
     names = np.reshape(threes[0], (-1, 3))

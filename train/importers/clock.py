@@ -6,11 +6,13 @@ since two touches would be mixed. Of two frames at one time the later counts. Jo
 angles are interpolated, but not across a gap.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.commands.output import counted
 from edge.errors import InputError
 
 JITTER_STEPS = 0.5
@@ -37,21 +39,29 @@ class Order:
     text: str
 
 
-def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
+def order(
+    t: NDArray[np.float64],
+    where: object,
+    frame: str = "frame",
+    numbers: Sequence[int] | None = None,
+) -> Order:
     """Which of frames at some times count.
 
     Args:
         t: (n,) seconds.
         where: names the file in errors.
-        frame: what a frame is called there, such as `row`.
+        frame: what a frame is called there, such as `line`.
+        numbers: of the frames there; None where they count from 1.
 
     Raises:
         InputError: a time is not finite, goes back by more than the jitter, or stands
             still.
     """
+    if numbers is None:
+        numbers = range(1, len(t) + 1)
     bad = np.flatnonzero(~np.isfinite(t))
     if len(bad):
-        raise InputError(f"{where}: {frame} {bad[0] + 1} has no time")
+        raise InputError(f"{where}: {frame} {numbers[bad[0]]} has no time")
     steps = np.diff(t)
     forward = steps[steps > 0.0]
     jitter_s = JITTER_STEPS * float(np.median(forward)) if len(forward) else 0.0
@@ -59,7 +69,7 @@ def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
     if len(back):
         raise InputError(
             f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
-            f"{back[0] + 2}; split it there, or mend the times"
+            f"{numbers[back[0] + 1]}; split it there, or mend the times"
         )
     kept = np.argsort(t, kind="stable")
     last = np.append(np.diff(t[kept]) > 0.0, True)
@@ -67,16 +77,16 @@ def order(t: NDArray[np.float64], where: object, frame: str = "frame") -> Order:
     if len(repeated) > MOST_REPEATED * len(t):
         still = kept[repeated[0] + 1]
         raise InputError(
-            f"{where}: its time stands still at {frame} {still + 1}; name another time, "
-            "or mend the times"
+            f"{where}: its time stands still at {frame} {numbers[still]}; name another "
+            "time, or mend the times"
         )
     changes = []
     swapped = int((steps < 0.0).sum())
     if swapped:
-        changes.append(f"{swapped} times went back within the jitter")
+        changes.append(f"{counted(swapped, 'time')} went back within the jitter")
     if len(repeated):
         changes.append(
-            f"{len(repeated)} frames were left out, as later ones have their times"
+            f"{counted(len(repeated), 'frame')} left out, as later ones have their times"
         )
     return Order(kept[last], "; ".join(changes))
 

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from edge.config import shown
 from edge.errors import InputError
 from train.importers.axes import lettered
-from train.importers.reading import Table, numbered, numbers_of
+from train.importers.reading import Table, numbered, numbers_of, require_converted
 
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 UNITS = (*UNITS_S, "iso")
@@ -34,11 +35,11 @@ RUNNING = (
 """A name with a number at its end, or with a row and a column: s1, s[1], s_1_2, s[1][2]."""
 EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 """The least time since 1970 in each unit that a log of today has."""
-SECONDS_AT_MOST = 0.75
+LONGEST_STEP = 0.25
 DOUBTFUL_BELOW = 3.0
-"""Median steps that are certainly seconds, and that may be seconds or milliseconds."""
-LONGEST_STEPS = {"s": SECONDS_AT_MOST, "ms": 2e3, "us": 2e6, "ns": math.inf}
-"""Longest median steps that are taken for these units."""
+"""Median steps that are certainly in a unit, and that may be in the next smaller one."""
+TAXELS = re.compile(r"(taxels?|tactile)\b|(taxels?|tactile)[\d_]", re.I)
+"""Names that are a taxel's beside those of other running numbers."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Meaning:
         time: the column of times; None without one.
         unit: of the times.
         unit_from: how the unit is known.
+        are_all: the taxels are all columns that are nothing else, since none has a
+            name.
     """
 
     taxels: list[str]
@@ -61,6 +64,7 @@ class Meaning:
     time: str | None
     unit: str
     unit_from: str
+    are_all: bool = False
 
     def text(self, label: str, shape: Sequence[int]) -> str:
         """A line that says what was taken."""
@@ -104,9 +108,9 @@ def columns(table: Table, terms: str) -> list[str]:
         picks += _term(table, term.strip())
     for name in picks:
         if picks.count(name) > 1:
-            raise InputError(f"{table.path}: column {name} is named twice in {terms}")
+            raise InputError(f"{table.where}: column {name} is named twice in {terms}")
         if name not in table.names:
-            raise InputError(f"{table.path}: column {name} holds no values of a frame")
+            raise InputError(f"{table.where}: column {name} holds no values of a frame")
     return picks
 
 
@@ -124,7 +128,7 @@ def _term(table: Table, term: str) -> list[str]:
             last = places.index(ends[-1])
             if first <= last:
                 return names[first : last + 1]
-    raise InputError(f"{table.path}: has no column {term[:40]}; it has {shown(names)}")
+    raise InputError(f"{table.where}: has no column {term[:40]}; it has {shown(names)}")
 
 
 def meaning(table: Table, options: argparse.Namespace) -> Meaning:
@@ -145,13 +149,14 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
     for name in taxels:
         if name not in rest:
             raise InputError(
-                f"{table.path}: column {name} is named both as a taxel and as time or "
+                f"{table.where}: column {name} is named both as a taxel and as time or "
                 "joint"
             )
     left_out = [name for name in rest if name not in taxels]
     unit, source = _unit(table, time, options)
+    is_told = table.named or table.shape or table.file_names or options.taxels
     shape = table.shape or shape
-    return Meaning(taxels, joints, left_out, shape, time, unit, source)
+    return Meaning(taxels, joints, left_out, shape, time, unit, source, not is_told)
 
 
 def _time_column(
@@ -161,24 +166,24 @@ def _time_column(
     if options.time:
         times = columns(table, options.time)
         if len(times) > 1:
-            raise InputError(f"{table.path}: --time names several columns; name one")
+            raise InputError(f"{table.where}: --time names several columns; name one")
     else:
-        times = _times(table, joints)
+        times = named_times(table, joints)
     if not times and options.rate is None:
         raise InputError(
-            f"{table.path}: no column is a time; give --rate HZ or --time COL"
+            f"{table.where}: no column is a time; give --rate HZ or --time COL"
         )
     if not times:
         return None
     if options.rate is not None:
         raise InputError(
-            f"{table.path}: has a column of times, {quoted(times[0])}, beside --rate; "
+            f"{table.where}: has a column of times, {quoted(times[0])}, beside --rate; "
             "leave --rate out, or name another time by --time"
         )
     return times[0]
 
 
-def _times(table: Table, joints: Sequence[str]) -> list[str]:
+def named_times(table: Table, joints: Sequence[str] = ()) -> list[str]:
     """The columns that are called a time, or else the only one of dates."""
     named = filter(TIME.fullmatch, table.names)
     times = [name for name in named if name not in joints]
@@ -213,17 +218,21 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
     grids = list(_grids(rest))
-    grids = [grid for grid in grids if len(grid[0]) > 1] or grids
+    for is_likely in (
+        lambda names: len(names) > 1,
+        lambda names: TAXELS.match(names[0]),
+    ):
+        grids = [grid for grid in grids if is_likely(grid[0])] or grids
     if len(grids) > 1:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(
-            f"{table.path}: are the taxels {spans}? Name them by --taxels, and joint "
+            f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
             "angles by --joints"
         )
     if not grids:
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
         raise InputError(
-            f"{table.path}: no columns are named as taxels, such as s1 to s16; name them "
+            f"{table.where}: no columns are named as taxels, such as s1 to s16; name them "
             f"by --taxels{three}, among {shown(list(rest))}"
         )
     return grids[0]
@@ -265,19 +274,22 @@ def _likely_unit(table: Table, time: str) -> tuple[str, str]:
     """The unit of times that only their numbers tell, and how they do."""
     values = numbers_of(table, time).dropna()
     if values.empty:
-        raise InputError(f"{table.path}: column {time} holds no times")
+        raise InputError(f"{table.where}: column {time} holds no times")
     for unit, least in EPOCHS.items():
         if abs(values.iloc[0]) >= least:
             return unit, "since 1970"
     steps = values.diff()
-    step = steps[steps > 0.0].median()
-    if SECONDS_AT_MOST < step < DOUBTFUL_BELOW:
-        raise InputError(
-            f"{table.path}: {quoted(time)} has steps of {step:g}, which may be seconds "
-            "or milliseconds; give --time-unit s or ms"
-        )
-    units = [unit for unit, longest in LONGEST_STEPS.items() if not step > longest]
-    return units[0], "from its steps"
+    step = median = steps[steps > 0.0].median()
+    for unit, smaller in pairwise(UNITS_S):
+        if not step > LONGEST_STEP:
+            return unit, "from its steps"
+        if step < DOUBTFUL_BELOW:
+            raise InputError(
+                f"{table.where}: {quoted(time)} has steps of {median:g}, which may be in "
+                f"{unit} or {smaller}; give --time-unit {unit} or {smaller}"
+            )
+        step /= 1e3
+    return "ns", "from its steps"
 
 
 def times_of(
@@ -289,6 +301,7 @@ def times_of(
     if meaning.unit == "iso":
         column = table.data[meaning.time]
         dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
+        require_converted(table, meaning.time, dates, "no ISO date")
         seconds = (dates - dates.iloc[0]).dt.total_seconds()
     else:
         numbers = numbers_of(table, meaning.time)

@@ -1,6 +1,7 @@
 """Values of any sensor as counts: what they are at rest, and their scale."""
 
 import argparse
+import logging
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -12,11 +13,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.options import within
+from edge.commands.output import counted
 from edge.errors import InputError
 from edge.recording import Recording
 from train.importers import clock
 from train.importers.axes import Axes, axis_letters, flipped_letters
 from train.progress import say
+
+LOG = logging.getLogger(__name__)
 
 START = 3
 """Frames at the start of a trial, whose median may be the rest value."""
@@ -124,15 +128,18 @@ class Trial:
         """(n, taxels) which taxels lack a value of an axis."""
         return np.asarray(~np.isfinite(self.values).all(axis=2))
 
-    def in_order(self, frame: str) -> Self:
-        """The frames in the order of their times; says what that leaves out.
+    def in_order(
+        self, frame: str = "frame", numbers: Sequence[int] | None = None
+    ) -> Self:
+        """The frames in the order of their times, as `clock.order`; warns of what that
+        changes.
 
         Raises:
             InputError: a time is missing, goes back or stands still.
         """
-        order = clock.order(self.t, self.where, frame)
+        order = clock.order(self.t, self.where, frame, numbers)
         if order.text:
-            say(f"{self.where}: {order.text}")
+            LOG.warning(f"{self.where}: {order.text}")
         kept = order.kept
         joints = None if self.joints is None else self.joints[kept]
         return replace(self, t=self.t[kept], values=self.values[kept], joints=joints)
@@ -225,13 +232,20 @@ class Rest:
 
 
 def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
-    """The values at rest, and the scale that keeps all digits of signed ones.
+    """The values at rest, and the scale that keeps all digits of signed ones; says
+    which values are missing, or are lost.
 
     Raises:
         InputError: the options exclude each other.
     """
     if options.falls and options.signed:
         raise InputError("--falls and --signed exclude each other; give one")
+    missing = sum(int(trial.missing.sum()) for trial in trials)
+    if missing:
+        say(
+            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
+            "frame"
+        )
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
@@ -240,9 +254,13 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
         usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
         unrest = np.abs(unrest + usual)
     values = starts[np.nansum(unrest, axis=1).argmin()]
+    deviations = [(trial.values - values)[..., 0] for trial in trials]
     scale = options.scale
     if options.signed and scale == 1.0:
-        scale = _finest([(trial.values - values)[..., 0] for trial in trials])
+        scale = _finest(deviations)
+    rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
+    if options.falls and rise > 0.0:
+        say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
     return Rest(values, options.falls, scale)
 
 

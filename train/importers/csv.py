@@ -17,9 +17,10 @@ out. Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays:
 
 import argparse
 import re
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.options import within
+from edge.commands.output import counted
 from edge.config import ConfigTable, shown
 from edge.errors import InputError, about
 from edge.files import parsing
@@ -35,7 +37,15 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from train.importers import arrays, counts
 from train.importers.axes import Axes, parted
-from train.importers.columns import UNITS, Meaning, is_date, meaning, times_of
+from train.importers.columns import (
+    UNITS,
+    Meaning,
+    columns,
+    is_date,
+    meaning,
+    named_times,
+    times_of,
+)
 from train.importers.counts import Trial, rest_of, skin_shape
 from train.importers.reading import (
     TEXTS,
@@ -54,11 +64,14 @@ from train.json_files import json_table
 from train.progress import say
 
 LABELS = "labels.csv"
+SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
 FASTEST_HZ = 1e6
 """A higher frame rate must be a mistake."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
+FEWEST_ROWS = 8
+"""Rows of a trial from which on a column is seen to count them."""
 SPARSEST = 64
 """Cells for each value of a long table; more would be nearly empty."""
 
@@ -104,15 +117,15 @@ class Source:
 
     Attributes:
         name: of the trial.
-        labels: {task: label}.
-        label: where the label comes from.
         table: its values.
+        labels: {task: label}.
+        label: where the label comes from; empty if the names of its file tell it.
     """
 
     name: str
-    labels: dict[str, str]
-    label: str
     table: Table
+    labels: dict[str, str] = field(default_factory=dict)
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -120,20 +133,19 @@ class Measured:
     """A trial whose columns are understood.
 
     Attributes:
-        name: of the trial.
-        labels: {task: label}.
-        label: where the label comes from.
-        form: how its file was read, where that is worth saying.
+        source: of the trial.
         meaning: of the columns.
         numbers: of the trial.
     """
 
-    name: str
-    labels: dict[str, str]
-    label: str
-    form: tuple[str, ...]
+    source: Source
     meaning: Meaning
     numbers: Trial
+
+    @property
+    def kind(self) -> tuple[list[str], str]:
+        """The taxels and the unit of times, which are the same in all trials."""
+        return self.meaning.taxels, self.meaning.unit
 
 
 def trials(
@@ -149,35 +161,31 @@ def trials(
     options.skipped = []
     axes = Axes.of(options)
     folder = path if path.is_dir() else path.parent
-    measured = _measured(_sources(path, folder, options), axes, options)
+    sources = _sources(path, folder, options)
+    if (folder / LABELS).is_file():
+        sources = _labelled(list(sources), folder / LABELS, options)
+    measured = _measured(sources, axes, options)
     if not measured:
         raise _nothing(path, options)
-    if (folder / LABELS).is_file():
-        measured = _labelled(measured, folder / LABELS, options)
-    skin = json_table(folder / "skin.json")
+    skin = json_table(folder / SKIN)
     shape = _announced(measured[0], skin, axes, options)
     rest = rest_of([trial.numbers for trial in measured], options)
-    missing = []
+    written = 0
     for trial in measured:
         meta: dict[str, Any] = {
             "skin": skin.raw,
-            "labels": trial.labels,
+            "labels": trial.source.labels,
             "source": path.name,
-            "trial": trial.name,
+            "trial": trial.source.name,
         }
         if trial.numbers.joints is not None:
             meta["arm"] = arm and arm.to_dict()
         with _skipping(options):
             recording = rest.recording(trial.numbers, shape, meta)
-            missing.append(trial.numbers.missing.sum())
-            yield trial.name, recording
-    if not missing:
+            written += 1
+            yield trial.source.name, recording
+    if not written:
         raise _nothing(path, options)
-    if sum(missing):
-        say(
-            f"{sum(missing)} values are missing; these taxels are not valid in their "
-            "frames"
-        )
 
 
 @contextmanager
@@ -209,36 +217,34 @@ def _announced(
     shape_in_file = first.meaning.shape
     shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
     shape = skin_shape(first.numbers, shape_in_file, options)
-    text = first.meaning.text(first.label, shape)
-    say("; ".join([text, *first.form]))
+    text = first.meaning.text(first.source.label, shape)
+    say("; ".join([text, *first.source.table.form]))
     if axes is not None:
         say(axes.text)
     return shape
 
 
 def _labelled(
-    measured: list[Measured], path: Path, options: argparse.Namespace
-) -> list[Measured]:
+    sources: Sequence[Source], path: Path, options: argparse.Namespace
+) -> Iterator[Source]:
     """The trials with the labels of a labels.csv instead of those of the files' names.
 
     Raises:
         InputError: it names none of the trials.
     """
-    trials = [trial.name for trial in measured]
+    trials = [source.name for source in sources]
     rows = _label_rows(path, trials)
     unknown = [row for row in rows if row not in trials]
     options.skipped += [f"{path}: {row} names no file" for row in unknown]
-    labelled = []
-    for trial in measured:
-        if trial.name not in rows:
+    for source in sources:
+        if source.name not in rows:
             options.skipped.append(
-                f"{path}: has no row for {trial.name}, which has no label"
+                f"{path}: has no row for {source.name}, which has no label"
             )
-        labels = {**trial.labels}
+        labels = {**source.labels}
         labels.pop(options.task, None)
-        labels |= rows.get(trial.name, {})
-        labelled.append(replace(trial, labels=labels, label=LABELS))
-    return labelled
+        labels |= rows.get(source.name, {})
+        yield replace(source, labels=labels, label=LABELS)
 
 
 def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
@@ -260,68 +266,106 @@ def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[
     """The trials of the file, or of the files or folders in the folder."""
     places = [path]
     if options.frames:
-        places = sorted(place for place in path.rglob("*") if place.is_dir())
+        places = [place for place in _visible(path) if place.is_dir()]
     elif path.is_dir():
-        places = _files(path.rglob("*"))
+        places = _files(_visible(path))
     read = _of_frames if options.frames else _of_file
+    counting = _counting([place.relative_to(folder) for place in places])
     for place in places:
         with _skipping(options):
-            yield from read(place, folder, options)
+            for source in read(place, folder, options):
+                labels, label = _label(place.relative_to(folder), counting, options)
+                if source.label:
+                    labels, label = source.labels, source.label
+                yield replace(source, labels=labels, label=label)
+
+
+def _visible(folder: Path) -> list[Path]:
+    """What a folder holds, without what is hidden."""
+    return [
+        place
+        for place in sorted(folder.rglob("*"))
+        if not any(part.startswith(".") for part in place.relative_to(folder).parts)
+    ]
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
-    """The tables among paths, in the order of their names."""
-    return sorted(p for p in paths if suffix_of(p) in SUFFIXES and p.name != LABELS)
+    """The tables among paths; says how many files are none."""
+    files = [path for path in paths if path.name not in (LABELS, SKIN)]
+    tables = [path for path in files if suffix_of(path) in SUFFIXES]
+    others = [path for path in files if path.is_file() and path not in tables]
+    if tables and others:
+        count = counted(len(others), "file")
+        say(f"left out {count} of another format, such as {others[0]}")
+    return tables
 
 
-def _source(place: Path, table: Table, task: str) -> Source:
-    """The trial at a place in the folder, with the label that its names tell."""
-    folders = [part for part in place.parts[:-1] if not NUMBERED.fullmatch(part)]
-    name = "_".join(place.parts)
-    if folders:
-        return Source(name, {task: folders[-1]}, "the folder's name", table)
-    stem = re.sub(r"[\s_.-]*\d+$", "", place.name) or place.name
-    return Source(name, {task: stem}, "the file's name", table)
+def _counting(places: Sequence[Path]) -> set[str]:
+    """The names of folders that only count trials: words such as trial_1, and on each
+    level below the first, names that differ in their numbers alone."""
+    counting = set()
+    levels = max((len(place.parts) for place in places), default=0)
+    for level in range(levels):
+        names = {place.parts[level] for place in places if place.parts[level + 1 :]}
+        stems = {re.sub(r"[\d\W_]+$", "", name) for name in names}
+        if level and len(stems) == 1 and stems.isdisjoint(names):
+            counting |= names
+        counting |= set(filter(NUMBERED.fullmatch, names))
+    return counting
+
+
+def _label(
+    place: Path, counting: Set[str], options: argparse.Namespace
+) -> tuple[dict[str, str], str]:
+    """The labels that the names of a file and its folders tell, and how."""
+    folders = [part for part in place.parts[:-1] if part not in counting]
+    stem = re.sub(r"[\s_.-]*\d+$", "", inner(place).stem)
+    names = [*filter(None, [stem]), *folders]
+    if not names:
+        return {}, "none, as the files' names only count"
+    kind = "folder's" if folders else "file's"
+    return {options.task: names[-1]}, f'the {kind} name, such as "{names[-1]}"'
 
 
 def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
     """The trials in a file."""
-    place = inner(file.relative_to(folder)).with_suffix("")
     suffix = suffix_of(file)
-    if suffix in arrays.SUFFIXES and options.trials:
-        yield from _of_arrays(file, place, options)
-        return
     if suffix in arrays.SUFFIXES:
         stored = arrays.read_arrays(file)
+        if options.trials:
+            yield from _of_arrays(file, stored, options)
+            return
         with about(str(file)):
-            table = arrays.table_of(file, stored, options)
+            table = arrays.table_of(str(file), stored, options)
     else:
         table = read_parquet(file) if suffix == ".parquet" else read_text(file)
     if "trial" in table.names:
         with parsing(str(file), "a table of trials"):
-            yield from _trials_in(table)
+            yield from _trials_in(table, options)
     else:
-        yield _source(place, table, options.task)
+        place = inner(file.relative_to(folder)).with_suffix("")
+        yield Source("_".join(place.parts), table)
 
 
 def _of_arrays(
-    file: Path, place: Path, options: argparse.Namespace
+    file: Path, stored: arrays.Arrays, options: argparse.Namespace
 ) -> Iterator[Source]:
     """The trials in a file of arrays."""
-    stored = arrays.read_arrays(file)
     with about(str(file)):
-        trials = arrays.trials_of(stored, options.task)
-        for number, (labels, of_trial) in enumerate(trials):
-            table = arrays.table_of(file, of_trial, options)
-            labels = {**_source(place, table, options.task).labels, **labels}
-            yield Source(f"{file.stem}_{number:03}", labels, "the arrays", table)
+        trials = list(arrays.trials_of(stored, options.task))
+    for number, (labels, of_trial) in enumerate(trials):
+        name = f"{file.stem}_{number:03}"
+        where = f"{file}: trial {name}"
+        with _skipping(options), about(where):
+            table = arrays.table_of(where, of_trial, options)
+            yield Source(name, table, labels, "the arrays" if labels else "")
 
 
 def _of_frames(
     inside: Path, folder: Path, options: argparse.Namespace
 ) -> Iterator[Source]:
     """The trial of a folder with a file for each frame, if it has files."""
-    files = _files(inside.glob("*"))
+    files = sorted(p for p in inside.glob("[!.]*") if suffix_of(p) in SUFFIXES)
     if not files:
         return
     frames = [_frame(file) for file in files]
@@ -340,8 +384,8 @@ def _of_frames(
                 raise ValueError("a time is not finite")
         data.insert(0, "time_s", t)
         data = data.sort_values("time_s", kind="stable", ignore_index=True)
-    table = Table(inside, data, False, shape)
-    yield _source(inside.relative_to(folder), table, options.task)
+    table = Table(str(inside), data, named=False, shape=shape)
+    yield Source("_".join(inside.relative_to(folder).parts), table)
 
 
 def _frame(file: Path) -> NDArray[np.float64]:
@@ -353,34 +397,29 @@ def _frame(file: Path) -> NDArray[np.float64]:
     return read_frame(file)
 
 
-def _trials_in(table: Table) -> Iterator[Source]:
+def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
     """The trials of a long table."""
     for name in {"trial", "taxel"} & set(table.names):
-        require_filled(table.path, table.data, name)
-    tasks = _tasks_in(table)
+        require_filled(table.where, table.data, name)
+    tasks = _tasks_in(table, options)
     label = f"columns {', '.join(tasks)}" if tasks else "none"
     for trial, rows in table.data.groupby("trial", sort=False):
-        texts = rows[tasks].astype(object).fillna("").astype(str)
-        for task in tasks:
-            first, *further_texts = texts[task].unique()
-            if further_texts:
-                raise InputError(
-                    f"{table.path}: {task} changes within trial {trial}, from "
-                    f"{shown(first)} to {shown(further_texts[0])}"
-                )
-        data = rows.drop(columns=["trial", *tasks]).reset_index(drop=True)
-        part = replace(table, data=data, file_names=tuple(table.names))
-        if "taxel" in data:
-            part = _pivoted(part, str(trial))
-        labels = {task: text for task, text in texts.iloc[0].items() if text}
-        yield Source(str(trial), labels, label, part)
+        where = f"{table.where}: trial {trial}"
+        with _skipping(options):
+            labels = _labels_in(where, rows[tasks])
+            data = rows.drop(columns=["trial", *tasks])
+            part = replace(table, where=where, data=data, file_names=tuple(table.names))
+            if "taxel" in data:
+                part = _pivoted(part, options)
+            yield Source(str(trial), part, labels, label)
 
 
-def _tasks_in(table: Table) -> list[str]:
-    """The columns of text of a long table, apart from times that run within a trial."""
+def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
+    """The columns of labels of a long table: those of texts, apart from times that run
+    within a trial, and that of the task."""
     by_trial = table.data.groupby("trial")
     names = [name for name in table.names if name not in ("trial", "taxel")]
-    texts = [name for name in names if is_text(table, name)]
+    texts = [name for name in names if name == options.task or is_text(table, name)]
     return [
         name
         for name in texts
@@ -388,36 +427,61 @@ def _tasks_in(table: Table) -> list[str]:
     ]
 
 
-def _pivoted(table: Table, trial: str) -> Table:
+def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
+    """The labels in the rows of a trial."""
+    labels = {}
+    for task, column in rows.items():
+        first, *further = [_plain(cell) for cell in column.fillna("").unique()]
+        if further:
+            raise InputError(
+                f"{where}: {task} changes, from {shown(first)} to {shown(further[0])}"
+            )
+        if first:
+            labels[str(task)] = first
+    return labels
+
+
+def _pivoted(table: Table, options: argparse.Namespace) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
     data = table.data
-    times = [name for name in table.names if name not in ("taxel", "value")]
-    if "value" not in data or not times:
+    further = [name for name in table.names if name not in ("taxel", "value")]
+    times = named_times(table) or further
+    if options.time:
+        times = columns(table, options.time)
+    if "value" not in data or len(times) != 1:
         raise InputError(
-            f"{table.path}: needs the columns value and a time beside taxel"
+            f"{table.where}: needs the columns value and a time beside taxel, which "
+            "--time names"
         )
-    time = times[0]
+    (time,) = times
     repeated = data[data.duplicated([time, "taxel"])]
     if len(repeated):
         row = repeated.iloc[0]
         raise InputError(
-            f"{table.path}: trial {trial} has two values of taxel {row['taxel']} at "
-            f"time {row[time]}"
+            f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
+            f"{row[time]}"
         )
     cells = data[time].nunique() * data["taxel"].nunique()
     if cells > SPARSEST * len(data):
         raise InputError(
-            f"{table.path}: the {len(data)} values of trial {trial} would fill "
-            f"{len(data) / cells:.1%} of a table; the taxels need times in common"
+            f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
+            "of a table; the taxels need times in common"
         )
     wide = data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
     if not wide.columns.is_unique or time in wide:
         raise InputError(
-            f"{table.path}: trial {trial} has two taxels of one name; rename one of them"
+            f"{table.where} has two taxels of one name; rename one of them"
         )
-    return Table(table.path, wide.reset_index(), named=False, form=table.form)
+    form = [f'left out: "{name}"' for name in further if name != time]
+    return replace(
+        table,
+        data=wide.reset_index(),
+        named=False,
+        form=(*table.form, *form),
+        file_names=tuple(wide.columns),
+    )
 
 
 def _plain(name: Any) -> str:
@@ -433,23 +497,32 @@ def _natural(name: Any) -> list[Any]:
 def _measured(
     sources: Iterable[Source], axes: Axes | None, options: argparse.Namespace
 ) -> list[Measured]:
-    """The numbers of the trials whose columns are those of the first."""
+    """The numbers of the trials whose columns are those of most of them.
+
+    Raises:
+        InputError: columns without a name may be no taxels.
+    """
     measured: list[Measured] = []
     for source in sources:
         with _skipping(options):
-            trial = _understood(source, axes, options)
-            if measured:
-                _compare(trial, measured[0])
-            measured.append(trial)
-    return measured
+            measured.append(_understood(source, axes, options))
+    usual = Counter(str(trial.kind) for trial in measured).most_common(1)
+    alike = []
+    for trial in measured:
+        with _skipping(options):
+            _compare(trial, next(m for m in measured if str(m.kind) == usual[0][0]))
+            alike.append(trial)
+    if alike and alike[0].meaning.are_all:
+        _require_taxels(alike)
+    return alike
 
 
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
     path = trial.numbers.where
     first_path = first.numbers.where
-    taxels = trial.meaning.taxels
-    first_taxels = first.meaning.taxels
+    taxels, unit = trial.kind
+    first_taxels, first_unit = first.kind
     if len(taxels) != len(first_taxels):
         raise InputError(
             f"{path}: has {len(taxels)} taxels, and {first_path} {len(first_taxels)}; "
@@ -460,10 +533,32 @@ def _compare(trial: Measured, first: Measured) -> None:
             f"{path}: its taxels are {shown(taxels)}, and those of {first_path} "
             f"{shown(first_taxels)}"
         )
-    if trial.meaning.unit != first.meaning.unit:
+    if unit != first_unit:
         raise InputError(
-            f"{path}: its time seems to be in {trial.meaning.unit}, and that of {first_path} "
-            f"in {first.meaning.unit}; give --time-unit"
+            f"{path}: its time seems to be in {unit}, and that of {first_path} in "
+            f"{first_unit}; give --time-unit"
+        )
+
+
+def _require_taxels(measured: Sequence[Measured]) -> None:
+    """Refuse columns without a name of which some count the rows or time, or tell the
+    trials apart.
+
+    Raises:
+        InputError: there is one.
+    """
+    values = [trial.numbers.values[..., 0] for trial in measured]
+    if min(map(len, values)) < FEWEST_ROWS:
+        return
+    starts = np.array([frames[0] for frames in values])
+    rises = np.all([(np.diff(frames, axis=0) > 0.0).all(0) for frames in values], 0)
+    stays = np.all([(frames == frames[0]).all(0) for frames in values], 0)
+    doubtful = rises | (stays & (starts != starts[0]).any(0))
+    if doubtful.any() and not doubtful.all():
+        first = measured[0]
+        raise InputError(
+            f"{first.numbers.where}: column {first.meaning.taxels[doubtful.argmax()]} "
+            "counts up, or tells the trials apart; name the taxels by --taxels"
         )
 
 
@@ -479,14 +574,8 @@ def _understood(
         unit = np.pi / 180.0 if options.degrees else 1.0
         joints = unit * table.numbers(sense.joints)
     t = times_of(table, sense, options)
-    numbers = replace(Trial.of(str(table.path), t, values, axes), joints=joints)
+    numbers = replace(Trial.of(table.where, t, values, axes), joints=joints)
     if np.isnan(numbers.values[..., 0]).all():
-        raise InputError(f"{table.path}: none of its values is a finite number")
-    return Measured(
-        name=source.name,
-        labels=source.labels,
-        label=source.label,
-        form=table.form,
-        meaning=sense,
-        numbers=numbers.in_order("row"),
-    )
+        raise InputError(f"{table.where}: none of its values is a finite number")
+    rows = table.data.index
+    return Measured(source, sense, numbers.in_order(str(rows.name), rows))

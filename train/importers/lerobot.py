@@ -25,7 +25,7 @@ from edge.touch.arm import Chain
 from train.importers import counts
 from train.importers.axes import Axes
 from train.importers.counts import Trial, rest_of, skin_shape
-from train.importers.reading import Table, numbers_of, read_parquet
+from train.importers.reading import Table, numbers_of, place_of, read_parquet
 from train.json_files import json_table
 from train.progress import say
 
@@ -166,8 +166,8 @@ def indices(table: Table, name: str) -> pd.Series:
     is_index = (numbers % 1.0 == 0.0) & numbers.between(0, LARGEST_INDEX)
     if not is_index.all():
         raise InputError(
-            f"{table.path}: row {is_index.argmin() + 1} has no {name}, which is a whole "
-            "number from 0; fetch the data set again"
+            f"{table.where}: {place_of(~is_index)} has no {name}, which is a whole number "
+            "from 0; fetch the data set again"
         )
     return numbers.astype(np.int64)
 
@@ -185,7 +185,7 @@ def _episode(
     joints = None
     if options.joints is not None:
         joints = stacked(where, rows[options.joints]).reshape(len(t), -1)
-    trial = replace(Trial.of(where, t, values, axes), joints=joints).in_order("frame")
+    trial = replace(Trial.of(where, t, values, axes), joints=joints).in_order()
     first = rows.iloc[0]
     shape = values.shape[1:] if axes is None else values.shape[1:-1]
     label = tasks.get(first.get("task_index", -1), "")
@@ -223,6 +223,6 @@ def task_names(path: Path) -> dict[int, str]:
             entries = list(map(json.loads, read_text(lines).splitlines()))
         else:
             data = read_parquet(table).data
-            tasks = data.get("task", data.index)
+            tasks = data.get("task", data.get("index"))
             entries = data.assign(task=tasks).to_dict("records")
         return {int(entry["task_index"]): str(entry["task"]) for entry in entries}

@@ -12,7 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import islice
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +34,16 @@ UNPACKERS: dict[str, Callable[..., Any]] = {
 }
 """Files that hold one packed text, by their suffix."""
 PACKED = (*UNPACKERS, ".zip")
-MARKS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
+MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
 HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
-ABOVE = re.compile(r"\A((?:(?:#.*|\s*)\n)*)", re.A)
-"""Comments and blank lines before the first row."""
+COMMENTS = ("#", "%")
+ABOVE = re.compile(r"[#%]|\s*\Z", re.A)
+"""How a comment or blank line before the first row begins."""
+COMMAS = re.compile(r"\s*[+-]?\d*(?:,\d+)?(?:\s+[+-]?\d*,\d+)+\s*")
+"""A row of numbers with decimal commas, separated by blanks."""
+FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
+"""A cell with a fraction after a sign, where commas separate no cells."""
 LONGEST_LINE = 4 << 20
 FEWEST_NAMES = 3
 """Whole numbers in a row from 0 or 1 are a header if they are so many."""
@@ -49,21 +54,28 @@ class Table:
     """The columns of a file, or those of one trial in it.
 
     Attributes:
-        path: of the file.
+        where: names the file, and the trial in it, in errors.
         data: a column for each; columns without a header are named "1", "2" and so on.
+            Its index is called `line`, and counts the lines of a text, or `row`.
         named: the file has a header.
+        typed: the file tells numbers from texts.
         shape: of the skin, where the file tells it.
         form: how the file was read, where that is worth saying.
         file_names: the names of all columns of the file, in its order, where they are
             not those of `data`.
     """
 
-    path: Path
+    where: str
     data: pd.DataFrame
     named: bool = True
+    typed: bool = False
     shape: tuple[int, ...] = ()
     form: tuple[str, ...] = ()
     file_names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.data.index.name is None:
+            self.data.index = pd.RangeIndex(1, len(self.data) + 1, name="row")
 
     @property
     def names(self) -> list[str]:
@@ -123,14 +135,16 @@ class _Text:
     """A text, taken apart.
 
     Attributes:
-        body: from the first row on, without comments and blank lines.
+        lines: from the first row on, without comments and blank lines.
+        numbers: the line in the file of each row.
         mark: the separator; empty for blanks.
         rows: the cells of the first row, and of the second if there is one.
         comment: the last comment before the first row; empty without one.
         form: how it was encoded, if not as UTF-8.
     """
 
-    body: str
+    lines: list[str]
+    numbers: list[int]
     mark: str
     rows: list[list[str]]
     comment: str
@@ -166,15 +180,14 @@ def read_text(path: Path) -> Table:
     """The table in a text file."""
     with _opened(path) as text:
         form = text.form
-        decimal = "."
-        if text.mark in ("\t", ";"):
-            if any("," in cell for row in text.rows[1:] for cell in row):
-                decimal = ","
-                form.append("decimal commas")
+        decimal = _decimal(text)
+        if decimal == ",":
+            form.append("decimal commas")
+        if text.mark not in ("", ","):
             form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
         data = _parsed(text, header, decimal=decimal)
-        return Table(path, data, header.named, form=(*form, *header.form))
+        return Table(str(path), data, header.named, form=(*form, *header.form))
 
 
 def read_labels(path: Path) -> pd.DataFrame:
@@ -187,8 +200,8 @@ def read_labels(path: Path) -> pd.DataFrame:
 def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
     with _opened(path) as text:
-        _check_widths(text)
-        table = Table(path, _parsed(text, _without_names(text)))
+        data = _parsed(text, _without_names(text), decimal=_decimal(text))
+    table = Table(str(path), data)
     return table.numbers(table.names)
 
 
@@ -209,36 +222,67 @@ def _text(data: bytes) -> _Text:
     text, form = _decoded(data)
     if "\0" in text:
         raise ValueError("it is not text")
-    text = re.sub("\r\n?", "\n", text)
-    _, above, body = re.split(ABOVE, text, maxsplit=1)
-    line = body.partition("\n")[0]
-    if len(line) > LONGEST_LINE:
-        raise InputError(f"has a line of {len(line) >> 20} MB, too long for a frame")
-    mark = next(filter(line.__contains__, MARKS), "")
-    body = re.sub(rf"(?am)^(?:#.*|[^\S\n{mark}]*)(?:\n|\Z)", "", body)
-    if not body:
+    lines = re.sub("\r\n?", "\n", text).split("\n")
+    above = list(takewhile(ABOVE.match, lines))
+    if len(above) == len(lines):
         raise InputError(EMPTY)
-    rows = list(islice(_rows(body, mark), 2))
-    comments = re.findall("^#.*", above, re.M)
-    return _Text(body, mark, rows, "".join(comments[-1:]), form)
+    first = lines[len(above)]
+    if len(first) > LONGEST_LINE:
+        raise InputError(f"has a line of {len(first) >> 20} MB, too long for a frame")
+    mark = next(filter(first.__contains__, MARKS), "")
+    if COMMAS.fullmatch(first):
+        mark = ""
+    skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
+    numbers = [n for n, line in enumerate(lines, 1) if not skipped.match(line)]
+    kept = [lines[number - 1] for number in numbers]
+    comments = [line for line in above if line.startswith(COMMENTS)]
+    rows: list[list[str]] = []
+    of_rows = []
+    for place, row in _rows(kept, mark):
+        of_rows.append(numbers[place - 1])
+        _check_width(row, rows, of_rows[-1])
+        if len(rows) < 2:
+            rows.append(row)
+    return _Text(kept, of_rows, mark, rows, "".join(comments[-1:]), form)
 
 
-def _rows(text: str, mark: str) -> Iterator[list[str]]:
-    """The cells of each line."""
-    lines = io.StringIO(text)
+def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
+    """The cells of each row, and at which of the lines it ends, from 1."""
     if not mark:
-        return map(str.split, lines)
-    return csv.reader(lines, delimiter=mark, skipinitialspace=True)
+        yield from enumerate(map(str.split, lines), 1)
+        return
+    reader = csv.reader(lines, delimiter=mark, skipinitialspace=True)
+    for row in reader:
+        yield reader.line_num, row
 
 
-def _check_widths(text: _Text) -> None:
-    """Refuse rows of another width than the first, but for a separator at the end."""
-    width = len(text.rows[0])
-    for number, row in enumerate(_rows(text.body, text.mark), 1):
-        ends_in_mark = len(row) == width + 1 and not row[-1].strip()
-        if len(row) != width and not ends_in_mark:
-            values = f"{len(row)} value{'s' * (len(row) != 1)}"
-            raise InputError(f"row {number} has {values}, and the first row {width}")
+def _check_width(row: list[str], rows: list[list[str]], line: int) -> None:
+    """Refuse a row of another width than the first of some rows, but for a separator
+    at the end."""
+    width = len(rows[0]) if rows else len(row)
+    ends_in_mark = len(row) == width + 1 and not row[-1].strip()
+    if len(row) != width and not ends_in_mark:
+        values = f"{len(row)} value{'s' * (len(row) != 1)}"
+        raise InputError(f"line {line} has {values}, and the first row {width}")
+
+
+def _decimal(text: _Text) -> str:
+    """The sign before a fraction.
+
+    Raises:
+        InputError: there are two.
+    """
+    if text.mark == ",":
+        return "."
+    body = "\n".join(text.lines)
+    comma = re.search(FRACTION % ",", body)
+    point = re.search(FRACTION % r"\.", body)
+    if comma and point:
+        raise InputError(
+            f"has numbers with a comma and with a point, such as {comma[0]} and "
+            f"{point[0]}; save it with one of them"
+        )
+    return "," if comma else "."
 
 
 def _names(cells: list[str]) -> list[str]:
@@ -248,7 +292,7 @@ def _names(cells: list[str]) -> list[str]:
 
 def _without_names(text: _Text) -> _Header:
     """The numbers that name the columns of a text without a header."""
-    return _Header(numbered("", len(text.rows[0])), False, 0)
+    return _Header(numbered("", len(text.rows[0])), False, 0, ("no header",))
 
 
 def _header(text: _Text) -> _Header:
@@ -262,7 +306,6 @@ def _header(text: _Text) -> _Header:
         if HEX.fullmatch(name):
             raise InputError(f"{name} is no decimal number; save it as one")
     require_unique(header.unique)
-    _check_widths(text)
     if header.rows == len(text.rows):
         raise InputError(EMPTY)
     return header
@@ -273,7 +316,9 @@ def _stated(text: _Text) -> _Header:
     cells = _names(text.rows[0])
     if not all(map(_is_number, cells)):
         return _Header(cells, True, 1)
-    heading = _names(next(_rows(text.comment.lstrip("# "), text.mark), []))
+    above = [text.comment.lstrip("#% ")]
+    _, heading = next(_rows(above, text.mark), (0, [""]))
+    heading = _names(heading)
     if len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
     counted = numbered("", len(cells))
@@ -318,9 +363,11 @@ def _texts(text: _Text, header: _Header, columns: Sequence[int]) -> pd.DataFrame
 
 
 def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
-    """The columns of a text, which are named by their places."""
+    """The columns of a text, which are named by their places; the index is the line of
+    each row."""
+    lines = pd.Index(text.numbers[header.rows :], name="line")
     return pd.read_csv(
-        io.StringIO(text.body),
+        io.StringIO("\n".join(text.lines)),
         sep=text.mark or r"\s+",
         header=None,
         skiprows=header.rows,
@@ -328,7 +375,7 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
         index_col=False,
         skipinitialspace=True,
         **options,
-    )
+    ).set_axis(lines)
 
 
 def _named(table: pd.DataFrame, header: _Header) -> pd.DataFrame:
@@ -381,7 +428,14 @@ def read_parquet(path: Path, **options: Any) -> Table:
         data = pd.read_parquet(file, **options)
     if data.empty:
         raise InputError(f"{path}: {EMPTY}")
-    return Table(path, data.rename(columns=str))
+    if not isinstance(data.index, pd.RangeIndex):
+        data = data.reset_index()
+    return Table(str(path), data.rename(columns=str), typed=True)
+
+
+def place_of(mask: pd.Series) -> str:
+    """The first row of a table that a mask names, in words."""
+    return f"{mask.index.name} {mask.idxmax()}"
 
 
 def numbers_of(table: Table, name: str) -> pd.Series:
@@ -390,17 +444,30 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     Raises:
         InputError: a cell is no number.
     """
-    column = table.data[name]
-    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
-    if np.isinf(numbers).any():
+    numbers = pd.to_numeric(table.data[name], errors="coerce").astype("float64")
+    infinite = np.isinf(numbers)
+    if infinite.any():
         raise InputError(
-            f"{table.path}: column {name} has a number beyond measure; mend or leave it out"
+            f"{table.where}: column {name} has a number beyond measure in "
+            f"{place_of(infinite)}; mend or leave it out"
         )
-    bad = numbers.isna() & column.notna()
+    require_converted(table, name, numbers, "no number")
+    return numbers
+
+
+def require_converted(table: Table, name: str, converted: pd.Series, kind: str) -> None:
+    """Refuse a column of which a filled cell could not be converted.
+
+    Raises:
+        InputError: there is one; the sentence says that it is of that kind.
+    """
+    column = table.data[name]
+    bad = converted.isna() & column.notna()
     if bad.any():
         cell = str(column[bad].iloc[0])
-        raise InputError(f"{table.path}: {shown(cell)} in column {name} is no number")
-    return numbers
+        raise InputError(
+            f"{table.where}: {shown(cell)} in column {name} is {kind} ({place_of(bad)})"
+        )
 
 
 def require_unique(names: Iterable[str]) -> None:
@@ -414,17 +481,16 @@ def require_unique(names: Iterable[str]) -> None:
             raise InputError(f"two columns are named {name}; rename one of them")
 
 
-def require_filled(path: Path, data: pd.DataFrame, name: str) -> None:
+def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
     """Refuse a table with an empty cell in a column that tells its rows apart.
 
     Raises:
-        InputError: a cell is empty; the sentence names its row.
+        InputError: a cell is empty; the sentence names its line.
     """
     empty = data[name].isna()
     if empty.any():
         raise InputError(
-            f"{path}: row {empty.argmax() + 1} has no {name}; enter it, or leave the "
-            "row out"
+            f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
         )
 
 
@@ -433,4 +499,4 @@ def is_text(table: Table, name: str) -> bool:
     column = table.data[name]
     if pd.api.types.is_numeric_dtype(column):
         return False
-    return bool(pd.to_numeric(column, errors="coerce").isna().all())
+    return table.typed or bool(pd.to_numeric(column, errors="coerce").isna().all())

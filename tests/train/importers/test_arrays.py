@@ -1,7 +1,6 @@
 """Arrays: which axis is the time, trials within a file, and sizes."""
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from edge.errors import InputError
 from train.importers import arrays
 from train.importers.arrays import read_arrays, table_of, trials_of
 
-PATH = Path("a.mat")
 OPTIONS = argparse.Namespace(axis=None, taxels=None, joints=None, time=None)
 FRAMES = np.arange(24).reshape(6, 4)
 
@@ -26,7 +24,7 @@ FRAMES = np.arange(24).reshape(6, 4)
     ],
 )
 def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
-    table = table_of(PATH, stored, OPTIONS)
+    table = table_of("a.mat", stored, OPTIONS)
     assert form in table.form
     skin = [name for name in table.names if name.startswith("skin")]
     assert table.data[skin].to_numpy().tolist() == FRAMES.tolist()
@@ -46,20 +44,20 @@ def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
 )
 def test_what_would_be_guessed_is_asked(stored, sentence):
     with pytest.raises(InputError, match=sentence):
-        table_of(PATH, stored, OPTIONS)
+        table_of("a.mat", stored, OPTIONS)
 
 
 def test_an_axis_that_is_named_is_taken():
     square = np.arange(36).reshape(6, 6)
     stored = {"a": square, "b": np.ones((6, 2))}
     named = argparse.Namespace(axis=2, taxels="a", joints=None, time=None)
-    table = table_of(PATH, stored, named)
+    table = table_of("a.mat", stored, named)
     assert table.data.to_numpy().tolist() == square.T.tolist()
 
 
 def test_an_array_of_rows_and_columns_tells_the_shape():
     stored = {"t": np.arange(6.0), "skin": FRAMES.reshape(6, 2, 2)}
-    assert table_of(PATH, stored, OPTIONS).shape == (2, 2)
+    assert table_of("a.mat", stored, OPTIONS).shape == (2, 2)
 
 
 def of_structures(path):

@@ -16,7 +16,7 @@ def test_times_that_increase_are_left_alone():
 def test_a_time_within_the_jitter_puts_its_frame_in_its_place():
     found = order(np.array([0.0, 0.1, 0.2, 0.16, 0.3]), "a.csv")
     assert found.kept.tolist() == [0, 1, 3, 2, 4]
-    assert found.text == "1 times went back within the jitter"
+    assert found.text == "1 time went back within the jitter"
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_of_few_frames_at_one_time_the_later_counts():
     found = order(t, "a.bag")
     assert 49 not in found.kept.tolist()
     assert len(found.kept) == 199
-    assert found.text == "1 frames were left out, as later ones have their times"
+    assert found.text == "1 frame left out, as later ones have their times"
 
 
 def test_two_frames_in_a_hundred_at_one_time_stand_still():

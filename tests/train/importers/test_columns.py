@@ -1,7 +1,6 @@
 """What the columns of a table are taken for, and what is asked instead of guessed."""
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ COUNTS = np.arange(5)
 
 def table(*names, **columns):
     data = pd.DataFrame(dict.fromkeys(names, COUNTS) | columns)
-    return Table(Path("a.csv"), data)
+    return Table("a.csv", data)
 
 
 def options(**words):

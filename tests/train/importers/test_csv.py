@@ -201,12 +201,12 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n\n3\n"},
             RATE,
-            "1.txt: row 2 has 1 value, and the first row 2",
+            "1.txt: line 3 has 1 value, and the first row 2",
         ),
         (
             {"1.csv": "a,b\n1,2\n1,2,3\n"},
             RATE,
-            "1.csv: row 3 has 3 values, and the first row 2",
+            "1.csv: line 3 has 3 values, and the first row 2",
         ),
         ({"1.txt": ""}, RATE, f"1.txt: {EMPTY}"),
         ({"1.txt": "\n \n"}, RATE, f"1.txt: {EMPTY}"),
@@ -245,7 +245,7 @@ RATE = ("--rate", "1")
         (
             {"1.csv": "p1,p2\n9,1,2\n9,3,4\n"},
             RATE,
-            "1.csv: row 2 has 3 values, and the first row 2",
+            "1.csv: line 2 has 3 values, and the first row 2",
         ),
         (
             {"1.csv": "s1,s2\n1,2\n"},
@@ -255,7 +255,7 @@ RATE = ("--rate", "1")
         (
             {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
             ("--time", "1"),
-            "all.csv: column trial holds no values of a frame",
+            "all.csv: trial a: column trial holds no values of a frame",
         ),
         ({}, (), "in: holds no file .csv"),
         (
@@ -303,7 +303,7 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n,cup\n"},
             RATE,
-            "labels.csv: row 2 has no trial; enter it",
+            "labels.csv: line 3 has no trial; enter it",
         ),
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
@@ -458,19 +458,19 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
         ),
         (
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
-            "object changes within trial a, from 'box' to 'cup'",
+            "trial a: object changes, from 'box' to 'cup'",
         ),
         (
             text([("a", "", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
-            "object changes within trial a, from '' to 'cup'",
+            "trial a: object changes, from '' to 'cup'",
         ),
         (
             text([("a", 0, 1), ("", 1, 1), ("", 2, 1)], head="trial,t,p1"),
-            "all.csv: row 2 has no trial; enter it, or leave the row out",
+            "all.csv: line 3 has no trial; enter it, or leave the row out",
         ),
         (
             text([("a", 0, 1, 5), ("a", 1, "", 6)], head="trial,t,taxel,value"),
-            "all.csv: row 2 has no taxel; enter it, or leave the row out",
+            "all.csv: line 3 has no taxel; enter it, or leave the row out",
         ),
     ],
 )
