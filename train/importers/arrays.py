@@ -217,8 +217,9 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
     """The labels and arrays of each trial of a file that holds several.
 
     Trials are the groups or structures of the file, the entries of a cell array or of a
-    structure, or the first axis that all arrays share. What is a text or a number for each trial is a label, named by its
-    array; one that is called label or labels is the label of `task`.
+    structure, or the first axis that all arrays share. What is a text or a number for
+    each trial is a label, named by its array; one that is called label or labels is the
+    label of `task`.
 
     Raises:
         InputError: the arrays do not share an axis of trials.

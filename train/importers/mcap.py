@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from edge.errors import printable
+from edge.errors import InputError, printable
 from edge.files import open_regular, parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
@@ -48,9 +48,14 @@ def trials(
             elif encoding != "cdr":
                 unread[encoding].add(channel.topic)
             elif log.takes(channel.topic, kind):
-                define(types, schema)
-                data = types.deserialize_cdr(message.data, kind)
-                log.ros(channel.topic, kind, data, logged_s)
+                try:
+                    with parsing(f"is {kind}", "readable"):
+                        define(types, schema)
+                        data = types.deserialize_cdr(message.data, kind)
+                except InputError as reason:
+                    log.leave_out(channel.topic, str(reason))
+                else:
+                    log.ros(channel.topic, kind, data, logged_s)
     for encoding, topics in unread.items():
         say(
             f"{path}: left out {', '.join(sorted(topics))}, in the encoding "

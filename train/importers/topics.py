@@ -21,6 +21,7 @@ the ones to use: `frames_topic` and `joints_topic`. Other topics are not read.
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -33,7 +34,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, parse_json, shown
+from edge.commands.output import counted
+from edge.config import ConfigTable, shown
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
@@ -53,6 +55,7 @@ ARRAYS = tuple(
     f"std_msgs/msg/{name}MultiArray"
     for name in "UInt8 Int8 UInt16 Int16 UInt32 Int32 Float32 Float64".split()
 )
+JSON = "json"
 JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
 CLOCKS = ["stamp", "logged"]
@@ -136,31 +139,42 @@ class Log:
             angles = np.asarray(message.position, dtype=np.float64)
             self._pose(topic, (t, logged_s), names, angles)
             return
-        try:
-            values = self._values(kind, message)
-        except Unusable as reason:
-            self._left_out[topic].append(str(reason))
-            return
-        self._frames[topic].append((t, logged_s, values))
+        self._frame(topic, (t, logged_s), kind, message)
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
         where = f"{self.path}: a message of {topic}"
-        with parsing(where, "usable"):
-            message = ConfigTable(parse_json(data, where), where)
-            t = message.number("t", logged_s)
-            if message.has("q") and self.takes(topic, JOINTS):
-                angles = np.asarray(message.get("q"), dtype=np.float64)
+        try:
+            message = json.loads(data)
+        except (ValueError, RecursionError):
+            message = None
+        if not isinstance(message, dict):
+            self.leave_out(topic, "has a message that is no JSON table")
+        elif "q" in message and self.takes(topic, JOINTS):
+            with parsing(where, "usable"):
+                t = ConfigTable(message, where).number("t", logged_s)
+                angles = np.asarray(message["q"], dtype=np.float64)
                 names = list(map(str, message.get("names", ())))
                 self._pose(topic, (t, logged_s), names, angles)
-            elif message.has("counts") and self.takes(topic, IMAGE):
-                values = np.asarray(message.get("counts"))
-                if values.ndim != 2 or values.dtype.kind not in "iuf":
-                    raise InputError(
-                        f"{where}: counts must be numbers in rows and columns, not "
-                        f"{values.dtype} {values.shape}"
-                    )
-                self._frames[topic].append((t, logged_s, values.astype(np.float64)))
+        elif "counts" in message and self.takes(topic, IMAGE):
+            t = ConfigTable(message, where).number("t", logged_s)
+            self._frame(topic, (t, logged_s), JSON, message["counts"])
+
+    def leave_out(self, topic: str, reason: str) -> None:
+        """Note why a message of a topic that may hold frames is not read."""
+        if self.beside.get("frames_topic", topic) == topic:
+            self._left_out[topic].append(reason)
+
+    def _frame(
+        self, topic: str, times: tuple[float, float], kind: str, message: Any
+    ) -> None:
+        """Take in a message's values, or leave it out where it has none."""
+        try:
+            values = self._values(kind, message)
+        except Unusable as reason:
+            self.leave_out(topic, str(reason))
+        else:
+            self._frames[topic].append((*times, values))
 
     def _pose(
         self,
@@ -197,14 +211,17 @@ class Log:
             return image_values(message)
         if kind in ARRAYS:
             return array_values(message)
+        if kind == JSON:
+            return json_values(message)
         name = self.options.field
         if name is None:
             raise Unusable(f"is {kind}; give --field, the name of the values in it")
         if self.axes is None:
             return field_values(message, name)
-        with suppress(Unusable):
-            three = [field_values(message, f"{name}.{letter}") for letter in "xyz"]
-            return np.stack(three, axis=-1)
+        for axes in (".x .y .z", "x y z", "X Y Z"):
+            with suppress(Unusable):
+                parts = [field_values(message, name + axis) for axis in axes.split()]
+                return np.stack(parts, axis=-1)
         return field_values(message, name)
 
     def recording(self) -> Recording:
@@ -255,6 +272,8 @@ class Log:
                 count = len(reasons)
                 messages = f"{count + len(frames)} messages of {topic}"
                 part = f"{count} of {messages}, the first of"
+            elif topic in self._joints:
+                part = f"{counted(len(reasons), 'message')} of {topic}, the first of"
             say(f"{self.path}: left out {part} which {reasons[0]}")
         shapes = {values.shape for values in frames["values"]}
         if len(shapes) > 1:
@@ -422,11 +441,31 @@ def field_values(message: Any, name: str) -> NDArray[np.float64]:
     value: Any = message
     for part in name.split("."):
         value = _part(value, part)
+    return np.atleast_1d(numbers_in(value, name))
+
+
+def json_values(counts: Any) -> NDArray[np.float64]:
+    """(rows, columns) values of a JSON message.
+
+    Raises:
+        Unusable: they are no numbers in rows and columns.
+    """
+    values = numbers_in(counts, "counts")
+    if values.ndim != 2:
+        raise Unusable(f"has counts of {values.shape} instead of rows and columns")
+    return values
+
+
+def numbers_in(value: Any, name: str) -> NDArray[np.float64]:
+    """Numbers in lists of any depth.
+
+    Raises:
+        Unusable: they are no numbers, or of no shape; the sentence names them.
+    """
     try:
-        values = np.asarray(value, dtype=np.float64)
+        return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise Unusable(f"has no numbers in {name}") from None
-    return values if values.ndim else values[None]
 
 
 def _part(value: Any, name: str) -> Any:

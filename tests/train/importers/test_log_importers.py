@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -169,7 +170,7 @@ def write_bag(path, *topics, version=2):
     return path
 
 
-def write_mcap(path, *topics, protobuf=(), **options):
+def write_mcap(path, *topics, protobuf=(), unreadable=(), **options):
     """An MCAP file of topics of ROS messages, or of dicts as JSON."""
     with path.open("wb") as file:
         writer = McapWriter(file, **options)
@@ -186,6 +187,10 @@ def write_mcap(path, *topics, protobuf=(), **options):
                 writer.add_message(channel, nanoseconds(t), data, nanoseconds(t))
         for topic in protobuf:
             channel = writer.register_channel(topic, "protobuf", 0)
+            writer.add_message(channel, nanoseconds(T[0]), b"", nanoseconds(T[0]))
+        for topic in unreadable:
+            schema = writer.register_schema("other/msg/Kind", "ros2msg", b"%%%")
+            channel = writer.register_channel(topic, "cdr", schema)
             writer.add_message(channel, nanoseconds(T[0]), b"", nanoseconds(T[0]))
         writer.finish()
     return path
@@ -335,11 +340,31 @@ def test_an_mcap_file_of_ros_or_json_messages(tmp_path, imported, topics):
     assert differences(imported(path)) == []
 
 
-def test_a_json_message_that_is_no_table_is_named_with_its_topic(tmp_path):
-    with pytest.raises(
-        InputError, match=r"grasp: a message of /skin must be a table, not \[\]"
-    ):
-        Log.of(tmp_path / "grasp", None, OPTIONS).json("/skin", b"[]", 0.0)
+@pytest.mark.parametrize("data", [b"[]", b"{", b'"ready"', b"[" * 100_000])
+def test_a_json_message_that_is_no_table_is_named_with_its_topic(tmp_path, data):
+    log = Log.of(tmp_path / "grasp", None, OPTIONS)
+    log.json("/skin", data, 0.0)
+    with pytest.raises(InputError, match="frames: /skin has a message that is no JSON"):
+        log.recording()
+
+
+def status():
+    """JSON messages of a topic that is no skin, with a time of its own."""
+    return "/status", [(T[0], {"t": "noon", "state": "ok"}), (T[1], {"t": [1]})]
+
+
+def test_other_json_messages_are_not_read(tmp_path, imported):
+    path = write_mcap(tmp_path / "grasp.mcap", *json_topics(), status())
+    assert differences(imported(path)) == []
+
+
+def test_counts_without_a_shape_are_left_out_and_counted(tmp_path, imported, capsys):
+    topic, frames = json_topics()[0]
+    frames[3][1]["counts"] = [[1, 2], [3]]
+    path = write_mcap(tmp_path / "grasp.mcap", (topic, frames))
+    assert len(imported(path).t) == N - 1
+    said = f"left out 1 of {N} messages of /skin, the first of which has no numbers in"
+    assert said in capsys.readouterr().out
 
 
 def test_a_colour_camera_beside_the_skin_is_left_out_and_said(bag, imported, capsys):
@@ -400,6 +425,34 @@ def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
     recording = imported(sensor_log, "--field", "taxels.z", *SHAPE)
     assert np.array_equal(recording.frames, FRAMES >> 1)
     assert recording.shear is None
+
+
+def test_a_topic_without_a_readable_definition_is_left_out_and_said(
+    tmp_path, imported, capsys
+):
+    path = write_mcap(tmp_path / "grasp.mcap", sensor(), unreadable=("/tf",))
+    recording = imported(path, "--field", "taxels.z", *SHAPE)
+    assert np.array_equal(recording.frames, FRAMES >> 1)
+    assert (
+        "left out /tf, which is other/msg/Kind: not readable" in capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize("letters", ["xyz", "XYZ"])
+def test_axes_may_be_letters_at_the_end_of_fields(tmp_path, letters):
+    options = argparse.Namespace(
+        **{**vars(OPTIONS), "field": "taxels.f", "axes": "xyz"}
+    )
+    log = Log.of(tmp_path / "grasp", None, options)
+    values = dict(zip([f"f{letter}" for letter in letters], (1, 2, 3), strict=True))
+    message = SimpleNamespace(taxels=[SimpleNamespace(**values)])
+    log.ros("/hub", "maker/msg/State", message, 0.0)
+    options.shape = (1, 1)
+    options.falls = options.signed = False
+    options.scale = 1.0
+    recording = log.recording()
+    assert recording.frames.ravel().tolist() == [3]
+    assert recording.shear.ravel().tolist() == [1, 2]
 
 
 def test_its_three_axes_are_shear(sensor_log, imported):
