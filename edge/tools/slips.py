@@ -11,8 +11,11 @@ RARE_SHARE = 0.1
 """A task that fewer of the recordings have is named."""
 FEW_SHARE = 0.25
 """A label is a slip of another one if it is at most so frequent in comparison."""
-ALIKE = 0.85
-"""Similarity of two spellings, from 0 to 1, from which one is a slip of the other."""
+SHORT = 3
+"""Letters of a name that others resemble by chance, so that only a rare one is a
+slip."""
+LETTERS_PER_SLIP = 7
+"""Letters of a name for each wrong one, of which one is always allowed."""
 SPACES = re.compile(r"[\s_-]+")
 MOST = 8
 """Sentences of a kind."""
@@ -74,21 +77,31 @@ def _rare_labels(task: str, labels: Labels) -> list[str]:
 
 
 def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
-    """The frequent name that a rare one is probably a slip of."""
+    """The more frequent name that one is probably a slip of."""
+    plain = _plain(name)
     for other, frequent in counts.items():
-        if other != name and count <= FEW_SHARE * frequent and _alike(name, other):
+        share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
+        is_rare = count <= share * frequent
+        if is_rare and other != name and _alike(plain, _plain(other)):
+            return other
+        if _plain(other) == plain and (frequent, other) > (count, name):
             return other
     return None
 
 
-def _alike(name: str, other: str) -> bool:
-    plain = SPACES.sub("", name.casefold())
-    plain_other = SPACES.sub("", other.casefold())
-    if plain == plain_other:
-        return True
-    if any(part.isdigit() for part in plain + plain_other) or len(plain) < 4:
+def _plain(name: str) -> str:
+    """A name without case and spaces."""
+    return SPACES.sub("", name.casefold())
+
+
+def _alike(plain: str, other: str) -> bool:
+    """Whether two names without case and spaces differ by few letters."""
+    longest = max(len(plain), len(other))
+    if any(part.isdigit() for part in plain + other) or longest < SHORT:
         return False
-    return SequenceMatcher(None, plain, plain_other).ratio() >= ALIKE
+    matcher = SequenceMatcher(None, plain, other)
+    equal = sum(block.size for block in matcher.get_matching_blocks())
+    return longest - equal <= max(1, longest // LETTERS_PER_SLIP)
 
 
 def _contradictions(labels: Labels) -> list[str]:

@@ -48,19 +48,25 @@ def joints_between(
 
 def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
     """The element `robot` of a URDF file."""
-    data = read_bytes(path)
-    if os.fspath(path).endswith(".xacro") or b"${" in data or b"xacro:" in data:
+    with parsing(os.fspath(path), "a URDF file"):
+        root = ElementTree.fromstring(read_bytes(path))
+    name = os.path.basename(path)
+    if str(name).lower().endswith(".xacro") or any(map(_is_macro, root.iter())):
         raise InputError(
             f"{path}: is a xacro macro, not a URDF file; expand it by "
-            f"`xacro {os.path.basename(path)} > arm.urdf`"
+            f"`xacro {name} > expanded.urdf`"
         )
-    with parsing(os.fspath(path), "a URDF file"):
-        root = ElementTree.fromstring(data)
     if root.tag != "robot":
         raise InputError(
             f"{path}: not a URDF file: its root is <{root.tag}> instead of <robot>"
         )
     return root
+
+
+def _is_macro(element: ElementTree.Element) -> bool:
+    """Whether xacro has yet to expand an element."""
+    texts = [element.tag, *element.attrib.values()]
+    return any(mark in text for text in texts for mark in ("/xacro}", "${", "$(arg"))
 
 
 def _parents(

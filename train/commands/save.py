@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from edge.commands.output import counted
 from edge.errors import InputError
 from edge.recording import Recording, load
 from edge.saving import find
@@ -53,7 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     write = write_parquet if arguments.form == "parquet" else write_hdf5
     long = Long.of(names, recordings)
     write(out, long)
-    print(f"{out}: {len(long.t)} frames of {len(recordings)} recordings")
+    count = counted(len(recordings), "recording")
+    print(f"{out}: {len(long.t)} frames of {count}")
     return 0
 
 

@@ -38,8 +38,8 @@ EPOCHS = {"ns": 9e17, "us": 9e14, "ms": 9e11, "s": 9e8}
 LONGEST_STEP = 0.25
 DOUBTFUL_BELOW = 3.0
 """Median steps that are certainly in a unit, and that may be in the next smaller one."""
-TAXELS = re.compile(r"(taxels?|tactile)\b|(taxels?|tactile)[\d_]", re.I)
-"""Names that are a taxel's beside those of other running numbers."""
+TAXELS = re.compile("taxel|tactile", re.I)
+"""How a name begins that is a taxel's even beside others with running numbers."""
 
 
 @dataclass(frozen=True)
@@ -218,11 +218,8 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
     grids = list(_grids(rest))
-    for is_likely in (
-        lambda names: len(names) > 1,
-        lambda names: TAXELS.match(names[0]),
-    ):
-        grids = [grid for grid in grids if is_likely(grid[0])] or grids
+    grids = [grid for grid in grids if TAXELS.match(grid[0][0])] or grids
+    grids = [grid for grid in grids if len(grid[0]) > 1] or grids
     if len(grids) > 1:
         spans = " or ".join(spanned(names) for names, _ in grids)
         raise InputError(

@@ -40,7 +40,7 @@ HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
 COMMENTS = ("#", "%")
 ABOVE = re.compile(r"[#%]|\s*\Z", re.A)
 """How a comment or blank line before the first row begins."""
-COMMAS = re.compile(r"\s*[+-]?\d*(?:,\d+)?(?:\s+[+-]?\d*,\d+)+\s*")
+COMMAS = re.compile(r"(?:\s*[+-]?\d+(?:,\d+)?(?!\S)){2,}\s*")
 """A row of numbers with decimal commas, separated by blanks."""
 FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
 """A cell with a fraction after a sign, where commas separate no cells."""

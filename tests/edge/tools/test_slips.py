@@ -33,6 +33,26 @@ def test_labels_that_differ_by_a_number_or_are_short_are_no_slips(label, other):
     assert slips(labels) == []
 
 
+@pytest.mark.parametrize(
+    ("label", "meant"), [("pem", "pen"), ("bx", "box"), ("Tin", "tin")]
+)
+def test_a_short_label_is_a_slip_of_a_far_more_frequent_one(label, meant):
+    labels = [{"object": meant}] * 20 + [{"object": label}] * 2
+    assert slips(labels) == [
+        f"object={label!r} on 2 of 22 recordings; is it {meant!r}?"
+    ]
+
+
+def test_letters_are_no_slips_of_each_other():
+    assert slips(trials(a=30, b=2)) == []
+
+
+def test_labels_that_differ_in_case_alone_are_one_however_frequent():
+    assert slips(trials(box=4, Box=4)) == [
+        "object='Box' on 4 of 8 recordings; is it 'box'?"
+    ]
+
+
 def test_a_label_with_one_trial_is_named():
     assert slips(trials(box=5, tree=1)) == ["object='tree' on a single recording"]
 

@@ -98,6 +98,8 @@ def test_a_urdf_that_is_not_there_is_one_sentence(tmp_path):
     ("name", "text"),
     [
         ("arm.urdf.xacro", ARM),
+        ("ARM.XACRO", ARM),
+        ("arm.urdf", ARM.replace("0.3 0 -1e-3", "$(arg length) 0 0")),
         ("arm.urdf", ARM.replace("0.3 0 -1e-3", "${length} 0 0")),
     ],
 )
@@ -108,7 +110,13 @@ def test_a_xacro_macro_is_called_one_with_the_command_that_expands_it(
     path.write_text(text)
     with pytest.raises(InputError, match="is a xacro macro") as caught:
         Chain.from_urdf(path, "base", "tool")
-    assert f"`xacro {name} > arm.urdf`" in str(caught.value)
+    assert f"`xacro {name} > expanded.urdf`" in str(caught.value)
+
+
+def test_a_macro_in_a_comment_is_none(urdf):
+    chain = Chain.from_urdf(urdf, "base", "tool")
+    urdf.write_text(ARM.replace("<link", "<!-- xacro: ${x} --><link", 1))
+    assert Chain.from_urdf(urdf, "base", "tool").to_dict() == chain.to_dict()
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,9 @@ def test_the_axis_of_time_is_that_of_the_other_arrays(stored, form):
         ({"a": np.ones((6, 4)), "b": np.ones((4, 6))}, "which axis is the time"),
         ({"t": np.ones(7), "a": np.ones((6, 4))}, "no axis of 7 frames"),
         ({"a": np.ones((6, 4, 2, 2))}, "has 4 dimensions"),
+        ({"a": np.ones((4, 6))}, "which axis is the time"),
+        ({"": np.ones((3, 6, 2))}, "arrays are {'the array'"),
+        ({"a": np.array([1, "x"], dtype=object)}, "cells or structures; give --trials"),
         ({"a": np.array(["x"])}, "holds no values"),
         ({"a": FRAMES, "a.1": FRAMES[:, 0]}, "two columns are named a.1; rename one"),
     ],
@@ -53,6 +56,12 @@ def test_an_axis_that_is_named_is_taken():
     named = argparse.Namespace(axis=2, taxels="a", joints=None, time=None)
     table = table_of("a.mat", stored, named)
     assert table.data.to_numpy().tolist() == square.T.tolist()
+
+
+def test_the_array_that_is_named_as_the_time_tells_the_frames():
+    stored = {"clock": np.arange(6.0), "a": np.ones((6, 4)), "b": np.ones((4, 6))}
+    named = argparse.Namespace(axis=None, taxels=None, joints=None, time="clock")
+    assert len(table_of("a.mat", stored, named).data) == 6
 
 
 def test_an_array_of_rows_and_columns_tells_the_shape():
@@ -86,6 +95,68 @@ def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
     assert [labels for labels, _ in trials] == [{"object": "cup"}, {"object": "pen"}]
     frames = [arrays["frames"].tolist() for _, arrays in trials]
     assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
+
+
+def several_structures(path):
+    trials = {"frames": FRAMES, "label": "cup"}, {"frames": FRAMES + 1, "label": "pen"}
+    savemat(path, {"trial_1": trials[0], "trial_2": trials[1]})
+
+
+def of_groups(path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        for name, frames, label in ("1", FRAMES, "cup"), ("2", FRAMES + 1, "pen"):
+            file[f"trials/{name}/frames"] = frames
+            file[f"trials/{name}/label"] = np.array([label], dtype="S")
+
+
+def of_cells_in_matlab_7_3(path):
+    """As MATLAB writes them: columns first, characters as numbers, cells elsewhere."""
+    h5py = pytest.importorskip("h5py")
+    columns = {"frames": [FRAMES, FRAMES + 1], "label": ["cup", "pen"]}
+    with h5py.File(path, "w") as file:
+        for name, cells in columns.items():
+            references = []
+            for i, cell in enumerate(cells):
+                is_text = isinstance(cell, str)
+                stored = [[ord(letter)] for letter in cell] if is_text else cell.T
+                part = file.create_dataset(f"#refs#/{name}{i}", data=stored)
+                part.attrs["MATLAB_class"] = np.bytes_("char" if is_text else "double")
+                references.append([part.ref])
+            shape = file.create_dataset(name, data=references, dtype=h5py.ref_dtype)
+            shape.attrs["MATLAB_class"] = np.bytes_("cell")
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("a.mat", several_structures),
+        ("a.h5", of_groups),
+        ("a.h5", of_cells_in_matlab_7_3),
+    ],
+)
+def test_trials_are_structures_groups_or_cells(tmp_path, name, write):
+    write(tmp_path / name)
+    trials = list(trials_of(read_arrays(tmp_path / name), "object"))
+    assert [list(labels) for labels, _ in trials] == [["object"], ["object"]]
+    frames = [arrays["frames"].tolist() for _, arrays in trials]
+    assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
+
+
+def test_a_grid_in_matlab_7_3_keeps_its_rows_and_columns(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    grid = np.arange(24).reshape(4, 3, 2)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["skin"] = grid.T
+        file["skin"].attrs["MATLAB_class"] = np.bytes_("double")
+    assert read_arrays(tmp_path / "a.h5")["skin"].tolist() == grid.tolist()
+
+
+def test_fields_of_one_name_in_two_structures_are_refused(tmp_path):
+    skin = {"frames": FRAMES, "name": "x"}
+    savemat(tmp_path / "a.mat", {"skin": skin, "info": {"name": "y", "place": "z"}})
+    with pytest.raises(InputError, match="two columns are named name"):
+        list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
 
 
 def test_a_structure_within_a_trial_is_left_out(tmp_path):

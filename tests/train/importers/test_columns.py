@@ -62,11 +62,20 @@ def test_any_further_column_is_left_out_and_named(name):
         (("thumb", "index"), "no columns are named as taxels"),
         (("s1", "s3"), "no columns are named as taxels"),
         (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
+        (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],
 )
 def test_what_would_be_guessed_is_asked(names, sentence):
     with pytest.raises(InputError, match=sentence):
         taken(table(*names), rate=10)
+
+
+@pytest.mark.parametrize("names", [["taxel_0_0"], ["tactile1", "tactile2"]])
+def test_columns_that_are_called_taxels_are_taken_beside_other_running_numbers(names):
+    joints = ["joint_1", "joint_2"]
+    found = taken(table(*joints, *names), rate=10)
+    assert found.taxels == names
+    assert found.left_out == joints
 
 
 @pytest.mark.parametrize(
@@ -143,10 +152,23 @@ def test_iso_dates_are_times_whatever_their_column_is_called():
     assert times_of(given, found, options()) == pytest.approx(0.1 * COUNTS)
 
 
-def test_steps_that_may_be_seconds_or_milliseconds_are_asked_for():
-    with pytest.raises(InputError, match="give --time-unit s or ms"):
-        taken(table("t", "s1"))
+@pytest.mark.parametrize(
+    ("step", "units"),
+    [(0.5, "s or ms"), (1, "s or ms"), (2.5e3, "ms or us"), (1e6, "us or ns")],
+)
+def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
+    with pytest.raises(InputError, match=f"give --time-unit {units}"):
+        taken(table("s1", t=COUNTS * step))
+
+
+def test_a_unit_that_is_named_is_taken():
     assert taken(table("t", "s1"), time_unit="ms").unit == "ms"
+
+
+def test_what_is_no_date_is_named():
+    given = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
+    with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):
+        times_of(given, taken(given, time_unit="iso"), options())
 
 
 def test_a_line_says_what_was_taken():

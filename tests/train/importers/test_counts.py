@@ -52,6 +52,17 @@ def test_values_that_fall_are_subtracted_from_the_quietest_start():
     assert recorded(rest, quiet).frames[3].tolist() == [[40, 0]]
 
 
+def test_values_that_rise_where_they_should_fall_are_said(capsys):
+    rest_of([trial([100], [100], [100], [140])], options(falls=True))
+    said = "values above those at rest, by up to 40, count as 0; see --signed"
+    assert said in capsys.readouterr().out
+
+
+def test_missing_values_are_counted_and_said(capsys):
+    rest_of([trial([1, NAN], [NAN, 2]), trial([1, NAN])], options())
+    assert "missing: 3 values" in capsys.readouterr().out
+
+
 def test_signed_values_count_their_distance_with_all_their_digits():
     counted = signed(trial([0.5, -1.0], [0.5, -1.0], [0.5, -1.0], [0.25, -1.5]))
     assert counted.frames[3].tolist() == [[25, 50]]

@@ -39,6 +39,9 @@ def rows_of(table):
         PLAIN.replace(".", ",")
         .replace("t,p1,p2", "t;p1;p2")
         .replace("0,01,3", "0,01;3"),
+        PLAIN.replace(",", "|"),
+        PLAIN.replace(",", " ").replace(".", ","),
+        "% by me\n" + PLAIN,
         "\ufeff" + PLAIN,
         PLAIN.encode("utf-16"),
         "# by me\n" + PLAIN,
@@ -92,6 +95,17 @@ def test_how_a_file_was_read_is_said(tmp_path):
     assert "Windows-1252" in read(tmp_path, "t,größe\n0,1\n".encode("cp1252")).form
 
 
+def test_decimal_commas_may_begin_in_any_row(tmp_path):
+    table = read(tmp_path, "t;p1\n0;1\n1;2\n2;3,5\n")
+    assert rows_of(table) == [[0, 1], [1, 2], [2, 3.5]]
+
+
+def test_decimal_commas_between_blanks_need_no_header(tmp_path):
+    table = read(tmp_path, "0 1,5 2\n0,5 -2,5 3\n")
+    assert rows_of(table) == [[0, 1.5, 2], [0.5, -2.5, 3]]
+    assert table.form == ("decimal commas", "no header")
+
+
 def test_a_first_row_that_counts_the_columns_is_a_header(tmp_path):
     table = read(tmp_path, "1,2,3\n7,8,9\n4,5,6\n")
     assert rows_of(table) == [[7, 8, 9], [4, 5, 6]]
@@ -114,6 +128,7 @@ def test_an_empty_cell_is_missing(tmp_path):
     ("content", "sentence"),
     [
         ("", "holds no values"),
+        ("t;p1\n0,5;1.234\n", "with a comma and with a point, such as 0,5 and 1.234"),
         ("t,p1\n", "holds no values"),
         ("p1,p1\n1,2\n", "two columns are named p1"),
         (",p1,,column 3\n0,1,2,3\n", "two columns are named column 3"),
@@ -131,8 +146,14 @@ def test_what_is_no_table_is_refused(tmp_path, content, sentence):
 
 def test_a_text_among_numbers_is_named(tmp_path):
     table = read(tmp_path, "t,p1\n0,1\n1,off\n")
-    with pytest.raises(InputError, match="'off' in column p1 is no number"):
+    with pytest.raises(InputError, match=r"'off' in column p1 is no number \(line 3\)"):
         numbers_of(table, "p1")
+
+
+def test_lines_count_comments_blank_lines_and_lines_within_a_cell(tmp_path):
+    table = read(tmp_path, '# me\n\nt,note,p1\n0,"a\nb",1\n\n# a pause\n1,c,off\n')
+    assert table.data.index.tolist() == [5, 8]
+    assert table.data.index.name == "line"
 
 
 def test_a_frame_has_no_header(tmp_path):
@@ -148,9 +169,18 @@ def test_parquet_is_read_where_its_reader_is_installed(tmp_path):
     assert rows_of(read_parquet(path)) == ROWS
 
 
+def test_the_index_of_a_parquet_table_is_a_column(tmp_path):
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "a.parquet"
+    pd.DataFrame(ROWS, columns=["t", "p1", "p2"]).set_index("t").to_parquet(path)
+    assert rows_of(read_parquet(path)) == ROWS
+
+
 def test_a_number_beyond_measure_is_named(tmp_path):
     table = read(tmp_path, "t,p1\n0,1\n1," + "9" * 400 + "\n")
-    with pytest.raises(InputError, match="column p1"):
+    with pytest.raises(
+        InputError, match="column p1 has a number beyond measure in line 3"
+    ):
         numbers_of(table, "p1")
 
 
