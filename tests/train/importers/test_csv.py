@@ -375,13 +375,94 @@ TRIAL = "t,p1\n0,1\n0.1,2\n"
 
 
 @pytest.mark.parametrize(
-    "name", ["cup/trial_1/x.csv", "cup/1/x.csv", "cup/x_1.csv", "cup_1.csv"]
+    "name",
+    [
+        "{}/trial_1/x.csv",
+        "{}/1/x.csv",
+        "{}/x_1.csv",
+        "{}_1.csv",
+        "{}/exp3/day_2/x.csv",
+        "{}/2024-03-01/x.csv",
+    ],
 )
 def test_a_label_is_no_folder_that_counts_trials(folder, name):
-    put(folder, {name: TRIAL})
+    put(folder, {name.format(label): TRIAL for label in ("cup", "pen")})
     _, recordings = imported(folder)
-    (recording,) = recordings.values()
-    assert recording.labels == {"object": "cup"}
+    labels = [recording.labels["object"] for recording in recordings.values()]
+    assert labels == ["cup", "pen"]
+
+
+def test_numbered_folders_are_labels_where_none_is_above_them(folder, capsys):
+    put(folder, {"box_1/a.csv": TRIAL, "box_2/a.csv": TRIAL})
+    _, recordings = imported(folder)
+    assert recordings["box_2_a"].labels == {"object": "box_2"}
+    said = capsys.readouterr().out
+    assert 'label: the folder\'s name, such as "box_1"' in said
+
+
+def test_files_that_are_only_numbered_have_no_label(folder, capsys):
+    put(folder, {"001.csv": TRIAL, "002.csv": TRIAL})
+    _, recordings = imported(folder)
+    assert recordings["001"].labels == {}
+    assert "label: none, as the files' names only count" in capsys.readouterr().out
+
+
+def test_hidden_files_are_not_read_and_other_formats_are_said(folder, capsys):
+    hidden = {"._cup_1.csv": b"\0", ".cache/cup_2.csv": TRIAL}
+    others = {"cup_3.xlsx": b"PK", "skin.json": "{}"}
+    put(folder, {"cup_1.csv": TRIAL} | hidden | others)
+    status, recordings = imported(folder)
+    assert status == 0
+    assert list(recordings) == ["cup_1"]
+    said = capsys.readouterr().out
+    assert f"left out 1 file of another format, such as {folder / 'cup_3.xlsx'}" in said
+
+
+def test_the_columns_are_those_of_most_files(folder, capsys):
+    files = {f"cup_{i}.csv": TRIAL for i in range(3)}
+    put(folder, {"a_1.csv": TRIAL.replace("p1", "u1")} | files)
+    status, recordings = imported(folder)
+    assert status == 1
+    assert list(recordings) == ["cup_0", "cup_1", "cup_2"]
+    assert "a_1.csv: its taxels are ['u1'], and those of" in capsys.readouterr().err
+
+
+ROWS = range(8)
+UNNAMED = {
+    "rows": [[f"{i} {7 - i % 2}\n" for i in ROWS]],
+    "times": [[f"{7 - i % 2} {20 * i}\n" for i in ROWS]],
+    "class": [[f"{7 - i % 2} {label}\n" for i in ROWS] for label in (1, 2)],
+}
+
+
+@pytest.mark.parametrize("kind", UNNAMED)
+def test_a_column_without_a_name_that_may_be_no_taxel_is_asked_for(
+    folder, refusal, kind
+):
+    files = {f"{i}.txt": "".join(rows) for i, rows in enumerate(UNNAMED[kind])}
+    put(folder, files)
+    words = ("import", "csv", folder, "--out", folder.parent / "out", *RATE)
+    column = 1 if kind == "rows" else 2
+    said = f"column {column} counts up, or tells the trials apart; name the taxels by"
+    assert said in refusal(*words)
+    assert main([*map(str, words), "--taxels", "1-2"]) == 0
+
+
+def test_a_column_that_stays_the_same_in_all_trials_is_a_taxel(folder):
+    rows = "".join(f"{7 - i % 2} 5\n" for i in ROWS)
+    put(folder, {"1.txt": rows, "2.txt": rows + "3 5\n"})
+    status, recordings = imported(folder, *RATE)
+    assert status == 0
+    assert recordings["1"].frames.shape == (8, 1, 2)
+
+
+def test_jitter_in_many_files_is_one_warning(folder, capsys):
+    table = text([(t, t) for t in (0, 10, 20, 19, 30)], head="t,p1")
+    put(folder, {f"cup_{i}.csv": table for i in range(9)})
+    imported(folder)
+    lines = capsys.readouterr().err.splitlines()
+    (said,) = [line for line in lines if "jitter" in line]
+    assert said.endswith("1 time went back within the jitter (and 8 more like it)")
 
 
 def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
@@ -432,6 +513,40 @@ def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
     assert recordings["a"].frames[-1].tolist() == [[51, 62]]
 
 
+def test_numbers_are_labels_in_the_column_of_the_task(folder):
+    rows = [(trial, trial, t, t) for trial in (1, 2) for t in (0, 10)]
+    put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
+    _, recordings = imported(folder)
+    assert recordings["2"].labels == {"object": "2"}
+
+
+def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder):
+    pytest.importorskip("pyarrow")
+    rows = [("a", "1", t, t) for t in (0, 10)]
+    table = pd.DataFrame(rows, columns=["trial", "softness", "t", "p1"])
+    table.to_parquet(folder / "all.parquet")
+    _, recordings = imported(folder)
+    assert recordings["a"].labels == {"softness": "1"}
+
+
+def test_one_value_in_a_row_has_the_time_that_is_called_one(folder, capsys):
+    rows = [("a", 3, t, taxel, t) for t in (0, 10, 20) for taxel in (0, 1)]
+    put(folder, {"all.csv": text(rows, head="trial,class,t,taxel,value")})
+    _, recordings = imported(folder)
+    assert recordings["a"].t.tolist() == [0.0, 0.01, 0.02]
+    assert 'left out: "class"' in capsys.readouterr().out
+
+
+def test_a_bad_trial_of_a_long_table_stops_none_of_the_others(folder, capsys):
+    rows = [("a", 0, 1), ("a", 10, 2), ("b", 0, 1), ("b", 10, 2), ("b", 0, 3)]
+    put(folder, {"all.csv": "# me\n" + text(rows, head="trial,t,p1")})
+    status, recordings = imported(folder)
+    assert status == 1
+    assert list(recordings) == ["a"]
+    said = "all.csv: trial b: its time goes back by 0.01 s at line 7; split it there"
+    assert said in capsys.readouterr().err
+
+
 def test_dates_that_run_within_a_trial_are_its_times(folder):
     day = "2024-02-01T00:00"
     rows = [("a", day, f"2024-03-01T10:00:00.{n}", n) for n in range(3)]
@@ -455,6 +570,10 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
         (
             text([("a", 1, 1)], head="trial,taxel,value"),
             "needs the columns value and a time beside taxel",
+        ),
+        (
+            text([("a", 1, 2, 1, 1)], head="trial,frame,step,taxel,value"),
+            "needs the columns value and a time beside taxel, which --time names",
         ),
         (
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
