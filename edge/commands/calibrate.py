@@ -29,6 +29,9 @@ FEWEST_FRAMES = 20
 MOST_FRAMES = 1_000_000
 FEWEST_TOGETHER = 2
 """Taxels side by side that have moved as under a touch."""
+SPREADS = 6.0
+"""Without a former calibration, a taxel stands out from the others of its kind by the
+onset and so many median deviations from their median."""
 MIN_SHARE = 0.5
 """Smallest share of the frames in which a taxel must be valid."""
 NOISY = 10.0
@@ -166,23 +169,45 @@ def moved_together(
     """Taxels (row, col) that rest as if they were touched.
 
     They form a region, of which each has moved by more than the onset against the
-    former calibration; or, without one, rests above the onset though its chip rests at
-    zero.
+    former calibration, or, without one, stands out. A single taxel is named.
     """
+    if file.layout.onset == 0:  # any noise would be above it
+        return []
     if former is not None:
         change = np.abs(baseline.astype(np.int64) - former.baseline)
     else:
-        change = np.zeros(baseline.shape, dtype=np.int64)
-        for chip in file.chips:
-            if chip.kind.rests_at_zero:
-                change.ravel()[chip.served] = baseline.ravel()[chip.served]
-    if file.layout.onset == 0:  # any noise would be above it
-        return []
+        change = standing_out(file, baseline)
     taxels: list[tuple[int, int]] = []
     for region in find_regions(change, file.layout.onset, wraps=file.layout.wraps):
         if region.area >= FEWEST_TOGETHER:
             taxels += places(region.mask)
+        else:
+            LOG.warning(
+                f"taxel {list(places(region.mask)[0])} rests {region.peak} counts "
+                f"{_apart(former)}: if something touches it, calibrate again"
+            )
     return taxels
+
+
+def _apart(former: TaxelCalibration | None) -> str:
+    return "beyond the others" if former is None else "off the former calibration"
+
+
+def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int64]:
+    """Counts (rows, cols) by which working taxels rest above zero, where their chip
+    rests there, or beyond the usual differences to others of their kind, in the
+    direction of a touch."""
+    change = np.zeros(baseline.size, dtype=np.int64)
+    for kind in {chip.kind for chip in file.chips}:
+        chips = [chip for chip in file.chips if chip.kind is kind]
+        taxels = [taxel for chip in chips for taxel in chip.served]
+        rest = baseline.ravel()[taxels].astype(np.int64)
+        if not kind.rests_at_zero:
+            signs = [chip.sign for chip in chips for _ in chip.served]
+            rest = (rest - int(np.median(rest))) * signs
+            rest -= int(SPREADS * np.median(np.abs(rest)))
+        change[taxels] = np.maximum(rest, 0)
+    return np.where(file.layout.alive, change.reshape(baseline.shape), 0)
 
 
 def check_rest(
@@ -195,11 +220,10 @@ def check_rest(
     """
     touched = moved_together(file, calibration.baseline, former)
     if touched:
-        against = "against the former calibration" if former else "above zero"
         raise InputError(
-            f"{counted(len(touched), 'taxel')} side by side moved by more than the onset "
-            f"of {file.layout.onset} counts {against}, such as {list(touched[0])}, as if "
-            "something leant on the skin; keep everything off it, or use --force"
+            f"{counted(len(touched), 'taxel')} side by side rest more than the onset of "
+            f"{file.layout.onset} counts {_apart(former)}, such as {list(touched[0])}, "
+            "as if something leant on the skin; keep everything off it, or use --force"
         )
     deaf = deaf_taxels(replace(file, calibration=calibration))
     if deaf:

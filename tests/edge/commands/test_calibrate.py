@@ -15,6 +15,7 @@ from edge.commands.calibrate import (
     Sums,
     measure,
     noisiest_taxels,
+    standing_out,
     unusable,
 )
 from edge.commands.options import NOISE_COUNTS
@@ -201,7 +202,7 @@ def test_a_skin_that_something_leans_on_steadily_is_refused(edge, calibrated, tm
     words = ("calibrate", "--skin", calibrated, "--fake", leant, "--frames", 50)
     status, _, err = edge(*words)
     assert status == 2
-    assert "6 taxels side by side moved by more than the onset" in err
+    assert "6 taxels side by side rest more than the onset" in err
     assert calibrated.read_text() == before
     assert edge(*words, "--force")[0] == 0
 
@@ -212,7 +213,31 @@ def test_a_single_taxel_or_a_small_drift_is_calibrated(
 ):
     drifted = shifted(calibrated, tmp_path, counts, taxels)
     words = ("calibrate", "--skin", calibrated, "--fake", drifted, "--frames", 50)
-    assert edge(*words)[0] == 0
+    status, _, err = edge(*words)
+    assert status == 0
+    named = "taxel [5, 5] rests 120 counts off the former calibration" in err
+    assert named == (len(taxels) == 1)
+
+
+def test_a_first_calibration_under_a_contact_is_refused(edge, skin, quiet, tmp_path):
+    saving.save(tmp_path / "rest.npz", recording.load(quiet))
+    before = skin.read_text()
+    leant = shifted(skin, tmp_path, 120, SIX)
+    words = ("calibrate", "--skin", skin, "--fake", leant, "--frames", 50)
+    status, _, err = edge(*words)
+    assert status == 2
+    assert "6 taxels side by side rest more than the onset" in err
+    assert "beyond the others" in err
+    assert skin.read_text() == before
+
+
+def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
+    pad = skinfile.load(skinfile.shipped("electrodes"))
+    rest = np.array([600, 612, 575, 590, 640, 605, 566, 597, 621, 580, 615, 599])
+    assert not standing_out(pad, rest.reshape(4, 3).astype(np.uint16)).any()
+    rest[[4, 7]] -= 200  # a touch lowers the values of an MPR121
+    touched = standing_out(pad, rest.reshape(4, 3).astype(np.uint16))
+    assert np.argwhere(touched > pad.layout.onset).tolist() == [[1, 1], [2, 1]]
 
 
 def test_a_calibration_that_would_make_taxels_deaf_is_refused(
