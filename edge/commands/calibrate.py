@@ -194,19 +194,27 @@ def _apart(former: TaxelCalibration | None) -> str:
 
 
 def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Counts (rows, cols) by which working taxels rest above zero, where their chip
-    rests there, or beyond the usual differences to others of their kind, in the
-    direction of a touch."""
+    """Counts (rows, cols) by which working taxels rest beyond the usual differences to
+    others of their kind, in the direction of a touch.
+
+    A skin that is covered as a whole is not noticed; of chips that can rest at 0, a
+    warning says that they do not.
+    """
     change = np.zeros(baseline.size, dtype=np.int64)
     for kind in {chip.kind for chip in file.chips}:
         chips = [chip for chip in file.chips if chip.kind is kind]
         taxels = [taxel for chip in chips for taxel in chip.served]
         rest = baseline.ravel()[taxels].astype(np.int64)
-        if not kind.rests_at_zero:
-            signs = [chip.sign for chip in chips for _ in chip.served]
-            rest = (rest - int(np.median(rest))) * signs
-            rest -= int(SPREADS * np.median(np.abs(rest)))
-        change[taxels] = np.maximum(rest, 0)
+        signs = [chip.sign for chip in chips for _ in chip.served]
+        middle = int(np.median(rest))
+        if kind.rests_at_zero and min(signs) > 0 and middle > file.layout.onset:
+            LOG.warning(
+                f"the skin rests at about {middle} counts, not at 0; that is wrong if "
+                "something covers it"
+            )
+        above = (rest - middle) * signs
+        usual = int(SPREADS * np.median(np.abs(above)))
+        change[taxels] = np.maximum(above - usual, 0)
     return np.where(file.layout.alive, change.reshape(baseline.shape), 0)
 
 

@@ -30,6 +30,8 @@ from edge.touch.layout import SkinLayout
 Counts = NDArray[np.uint16]
 """Counts or raw values of taxels."""
 Integers = NDArray[np.int64]
+WIRE_FRAMES = 20
+"""Frames whose bits are counted together, as some transactions are rare."""
 NOISE_FRAMES = 97
 NOISE_STEP_S = 0.001
 """The noise is this many frames, repeated, each of which lasts for this many
@@ -333,6 +335,12 @@ def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
     """
     slowest_s = max(count / hz for count, hz in zip(bits, clocks, strict=True))
     return 1.0 / slowest_s
+
+
+def carried_hz(file: SkinFile) -> float:
+    """Frames a second that a skin's wires carry, from the drivers' own transactions."""
+    clocks = [bus.clock_hz for bus in file.buses]
+    return frame_rate(frame_bits(file, WIRE_FRAMES), clocks)
 
 
 def skin_file(layout: SkinLayout) -> SkinFile:

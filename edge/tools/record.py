@@ -61,9 +61,6 @@ LENGTH_S = 2.0
 KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
 DIGITS = "123456789"
 
-WIRE_FRAMES = 20
-"""Frames whose bits are counted together, as some transactions are rare."""
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -361,12 +358,10 @@ def _joint_names(
 
 
 def wire_s(file: SkinFile) -> float:
-    """Seconds that a frame takes on the skin's wires, from the drivers' own
-    transactions."""
-    from edge.fake.player import frame_bits, frame_rate  # counts the bits on a fake bus
+    """Seconds that a frame takes on the skin's wires."""
+    from edge.fake.player import carried_hz  # counts the bits on a fake bus
 
-    clocks = [bus.clock_hz for bus in file.buses]
-    return round(1.0 / frame_rate(frame_bits(file, WIRE_FRAMES), clocks), 6)
+    return round(1.0 / carried_hz(file), 6)
 
 
 def _status(arguments: argparse.Namespace, recorder: Recorder, skin: Skin) -> int:

@@ -19,6 +19,7 @@ from edge.commands.calibrate import (
     unusable,
 )
 from edge.commands.options import NOISE_COUNTS
+from edge.fake.touches import still
 from edge.skin import file as skinfile
 from edge.skin.decoder import dead_band
 
@@ -229,6 +230,20 @@ def test_a_first_calibration_under_a_contact_is_refused(edge, skin, quiet, tmp_p
     assert "6 taxels side by side rest more than the onset" in err
     assert "beyond the others" in err
     assert skin.read_text() == before
+
+
+def test_a_microcontrollers_skin_may_rest_above_0_which_is_said(edge, tmp_path):
+    skin = tmp_path / "matrix.toml"
+    skin.write_text(skinfile.shipped("matrix").read_text())
+    file = skinfile.load(skin)
+    saving.save(tmp_path / "still.npz", still(file, 1.0))
+    words = ("calibrate", "--skin", skin, "--fake", tmp_path / "still.npz")
+    status, _, err = edge(*words, "--frames", 50)
+    assert status == 0
+    assert "the skin rests at about 2048 counts, not at 0" in err
+    zero = np.zeros(file.layout.shape, np.uint16)
+    zero[3:6, 3:6] = 300
+    assert np.count_nonzero(standing_out(file, zero)) == 9
 
 
 def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
