@@ -182,6 +182,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_writable(arguments.out)
     former = Model(arguments.compare) if arguments.compare else None
     held_out = find(arguments.test or [])
+    _check_apart(arguments.data, held_out)
     for file in held_out:
         load(file)
     fitted = _fit(arguments)
@@ -191,6 +192,8 @@ def run(arguments: argparse.Namespace) -> int:
     labels = [trial.labels for trial in fitted.dataset.trials]
     print("\n".join(counts_text(labels)), end="\n\n", file=sys.stderr)
     print(summary(fitted, prices), file=sys.stderr)
+    for line in by_folder(fitted, arguments.data):
+        print(line, file=sys.stderr)
     print(f"{path} ({size / 1024:.0f} kB)\n{path.with_name('golden.npz')}")
     if held_out:
         print(held_out_text(Model(path), former, held_out), file=sys.stderr)
@@ -199,6 +202,44 @@ def run(arguments: argparse.Namespace) -> int:
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0
+
+
+def _check_apart(data: list[str], held_out: Sequence[Path]) -> None:
+    """Refuse held-out recordings that are fitted.
+
+    Raises:
+        InputError: one of them is in the data too.
+    """
+    if not held_out:
+        return
+    fitted = {file.resolve() for file in find(data)}
+    for file in held_out:
+        if file.resolve() in fitted:
+            raise InputError(
+                f"{file}: is in --data and in --test; what is scored must not be fitted: "
+                "move it out of the folder of --data"
+            )
+
+
+def by_folder(fitted: Fitted, data: Sequence[str]) -> list[str]:
+    """A line for each task: the trials of each folder that are answered right by models
+    fitted without them. Empty where the data are no more than one folder."""
+    folders = {name: Path(name).resolve() for name in data if Path(name).is_dir()}
+    if len(folders) < 2:
+        return []
+    lines = []
+    for task, chosen in fitted.chosen.items():
+        judged = (chosen.folds >= 0) & (fitted.dataset.labels(task) != "")
+        trials = [fitted.dataset.trials[i] for i in judged.nonzero()[0]]
+        hits = chosen.accuracy.hits
+        assert hits is not None
+        parts = []
+        for name, folder in folders.items():
+            inside = [trial.path.resolve().is_relative_to(folder) for trial in trials]
+            if any(inside):
+                parts.append(f"{name} {hits[inside].sum()} of {sum(inside)}")
+        lines.append(f"{task} by folder: {', '.join(parts)}")
+    return lines
 
 
 def _fit(arguments: argparse.Namespace) -> Fitted:

@@ -1,6 +1,7 @@
 """`make export` as a user meets it."""
 
 import io
+import re
 import shutil
 from contextlib import redirect_stderr, redirect_stdout
 from types import SimpleNamespace
@@ -184,11 +185,39 @@ def test_trials_that_span_few_components_get_a_warning(recordings, tmp_path, cap
     assert "span 5 components, 15 fewer than asked for" in err
 
 
+@pytest.fixture
+def held_out(recordings, tmp_path):
+    """The recordings in another folder."""
+    return shutil.copytree(recordings, tmp_path / "held-out")
+
+
+def test_what_is_held_out_must_not_be_fitted(recordings, capsys):
+    one = sorted(recordings.iterdir())[0]
+    assert main(["--data", str(recordings), "--test", str(one)]) == 2
+    assert f"{one}: is in --data and in --test" in capsys.readouterr().err
+
+
+def test_the_accuracy_of_each_folder_is_printed(recordings, tmp_path, capsys):
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+    for file in recordings.iterdir():
+        shutil.copy(file, tmp_path / ("first" if "hard" in file.name else "second"))
+    words = "--features paper --projection pca --decision-points none".split()
+    data = [str(tmp_path / "first"), str(tmp_path / "second")]
+    export(tmp_path, "--data", *data, *words)
+    err = capsys.readouterr().err
+    share = float(re.search(r"object: ([\d.]+)% of 16 trials", err)[1])
+    (line,) = re.findall("object by folder: .*", err)
+    first, second = re.findall(r"(\d+) of 8", line)
+    assert (int(first) + int(second)) / 16 == pytest.approx(share / 100, abs=1e-3)
+    assert line.index(data[0]) < line.index(data[1])
+
+
 def test_recordings_that_are_held_out_are_scored_by_both_models(
-    exported, recordings, tmp_path, capsys
+    exported, recordings, held_out, tmp_path, capsys
 ):
     words = "--quick --features paper --decision-points none".split()
-    words += ["--test", recordings, "--compare", exported / "model.onnx"]
+    words += ["--test", held_out, "--compare", exported / "model.onnx"]
     export(tmp_path, "--data", recordings, *words)
     err = capsys.readouterr().err
     assert "on recordings that it was not fitted on:" in err
@@ -197,14 +226,14 @@ def test_recordings_that_are_held_out_are_scored_by_both_models(
 
 
 def test_a_former_model_in_the_same_place_is_compared_as_it_was(
-    exported, recordings, tmp_path, capsys
+    exported, recordings, held_out, tmp_path, capsys
 ):
     path = shutil.copy(exported / "model.onnx", tmp_path)
     words = "--features max_force --projection pca --decision-points none".split()
-    held_out = ["--test", recordings, "--compare", path]
-    export(tmp_path, "--data", recordings, *words, *held_out)
+    words += ["--test", held_out, "--compare", path]
+    export(tmp_path, "--data", recordings, *words)
     comparison = capsys.readouterr().err.splitlines()[-2:]
-    files = sorted(recordings.iterdir())
+    files = sorted(held_out.iterdir())
     text = held_out_text(Model(path), Model(exported / "model.onnx"), files)
     assert text.splitlines()[-2:] == comparison
     assert "0 gained, 0 lost" not in comparison[-1]
