@@ -47,6 +47,19 @@ def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, said):
     assert got == status
 
 
+def test_several_muxes_on_a_bus_are_advised_against(edge, tmp_path):
+    text = skinfile.shipped("mpr121").read_text()
+    (tmp_path / "one.toml").write_text(text)
+    (tmp_path / "two.toml").write_text(
+        text.replace("{ channel = 1,", "{ mux = 0x71, channel = 1,")
+    )
+    for name, advised in (("one", False), ("two", True)):
+        status, (event,), _ = edge("check", tmp_path / f"{name}.toml")
+        assert status == 0
+        remarks = " ".join(event["remarks"])
+        assert ("use one mux, and wire its reset line" in remarks) == advised
+
+
 def test_check_counts_what_the_wire_carries(edge, skin):
     status, (event,), err = edge("check", skin)
     assert status == 0
