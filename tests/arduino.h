@@ -2,6 +2,9 @@
 #pragma once
 #include <stddef.h>
 #include <stdint.h>
+#ifndef __AVR__
+#include <unistd.h>  // as newlib's cores do: its `link` is a function
+#endif
 
 constexpr uint8_t A0 = 14, OUTPUT = 1;
 void pinMode(uint8_t pin, uint8_t mode);

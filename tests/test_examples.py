@@ -101,6 +101,47 @@ def test_a_skin_is_watched(monkeypatch, run):
     assert {event.task for event in decided} == set(edge.Model(demo.MODEL).info.tasks)
 
 
+FIELDS = {
+    "Classification": {"header": object, "results": list},
+    "DiagnosticArray": {"header": object, "status": list},
+    "DiagnosticStatus": {
+        "level": bytes,
+        "name": str,
+        "message": str,
+        "hardware_id": str,
+        "values": list,
+    },
+    "Header": {"stamp": str, "frame_id": str},
+    "JointState": {"header": object, "name": list, "position": list},
+    "KeyValue": {"key": str, "value": str},
+    "ObjectHypothesis": {"class_id": str, "score": float},
+    "ParameterDescriptor": {"dynamic_typing": bool},
+    "String": {"data": str},
+}
+"""The fields of the messages, as their .msg files declare them, with their types."""
+
+
+class Message:
+    """A message that takes its own fields alone, each of its own type, as those of
+    rosidl do."""
+
+    def __init__(self, **fields):
+        if "header" in FIELDS[type(self).__name__]:
+            fields.setdefault("header", MESSAGES["Header"]())
+        for name, value in fields.items():
+            setattr(self, name, value)
+
+    def __setattr__(self, name, value):
+        kind = FIELDS[type(self).__name__][name]
+        assert isinstance(value, kind), f"{name} is {kind}, not {value!r}"
+        super().__setattr__(name, value)
+
+
+MESSAGES = {name: type(name, (Message,), {}) for name in FIELDS}
+MESSAGES["DiagnosticStatus"].OK = b"\0"
+MESSAGES["DiagnosticStatus"].WARN = b"\1"
+
+
 class Ros:
     """The part of rclpy and its messages that the node uses: one node, spun until it
     has ended."""
@@ -135,18 +176,8 @@ class Ros:
             def destroy_node(self):
                 ros.destroyed = self
 
-        class Message(SimpleNamespace):
-            def __init__(self, **fields):
-                super().__init__(header=SimpleNamespace(), **fields)
-
-        class DiagnosticStatus(Message):
-            OK = "ok"
-            WARN = "warn"
-
-        kinds = "String JointState Classification ObjectHypothesis DiagnosticArray"
-        others = dict.fromkeys(f"{kinds} KeyValue ParameterDescriptor".split(), Message)
-        messages = SimpleNamespace(DiagnosticStatus=DiagnosticStatus, **others)
-        spin = SimpleNamespace(spin=self.spin)
+        messages = SimpleNamespace(**MESSAGES)
+        spin = SimpleNamespace(spin=self.spin, ok=lambda: True)
         spin.init = spin.try_shutdown = lambda: None
         stopped = type("ExternalShutdownException", (Exception,), {})
         self.modules = {
@@ -229,6 +260,19 @@ def test_the_ros_node_ends_with_the_error_that_ended_its_reading(monkeypatch, ca
     assert ros.destroyed.name == "edge_classify"
 
 
+def test_the_ros_node_that_is_interrupted_has_not_failed(monkeypatch):
+    """What is published after Ctrl-C raises an error of its own."""
+
+    def interrupted(self, skin, **more):
+        raise RuntimeError("publisher's context is invalid")
+        yield
+
+    monkeypatch.setattr(edge.Classifier, "watch", interrupted)
+    ros = Ros()
+    ros.modules["rclpy"].ok = lambda: False
+    assert ros.run(monkeypatch) == 0
+
+
 def test_the_ros_node_without_a_model_says_so(monkeypatch, capsys):
     assert Ros("no.onnx").run(monkeypatch) == 2
     assert "no.onnx: no such model" in capsys.readouterr().err
@@ -250,7 +294,7 @@ def test_the_ros_node_tells_whether_its_chips_are_read(monkeypatch):
     assert ros.run(monkeypatch) == 0
     (told,) = ros.topics["/diagnostics"]
     (status,) = told.status
-    assert status.level == "ok"
+    assert status.level == status.OK
     assert status.message == "all chips are read"
     values = {pair.key: pair.value for pair in status.values}
     tasks = len(edge.Model(demo.MODEL).info.tasks)
@@ -270,7 +314,7 @@ def test_the_ros_node_names_the_chips_that_are_not_read(monkeypatch):
     ros.modules["rclpy"].spin = spin
     ros.run(monkeypatch)
     (status,) = ros.topics["/diagnostics"][0].status
-    assert status.level == "warn"
+    assert status.level == status.WARN
     assert status.message.startswith("not read: ")
     assert status.message.count("0x") >= 1
 

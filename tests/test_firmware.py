@@ -172,10 +172,30 @@ def test_the_sketch_agrees_with_the_example_skin():
     assert f"Serial.begin({bus.clock_hz})" in sketch
 
 
-@pytest.mark.parametrize("board", ["-D__AVR__", "-DARDUINO_ARCH_RP2040"])
-def test_the_sketch_uses_only_what_its_board_has(tmp_path, board):
-    """Checked against the declarations of Arduino's core, without a board's compiler."""
+@pytest.fixture
+def core(tmp_path):
+    """The declarations of Arduino's core."""
     shutil.copy(ROOT / "tests" / "arduino.h", tmp_path / "Wire.h")
-    command = [*GPP, "-fsyntax-only", board, f"-I{tmp_path}", "-xc++"]
+    return f"-I{tmp_path}"
+
+
+@pytest.mark.parametrize("board", ["-D__AVR__", "-DARDUINO_ARCH_RP2040"])
+def test_the_sketch_uses_only_what_its_board_has(core, board):
+    """Checked against the declarations of Arduino's core, without a board's compiler."""
+    command = [*GPP, "-fsyntax-only", board, core, "-xc++"]
     compiled = ended(*command, MATRIX / "matrix.ino")
     assert compiled.returncode == 0, compiled.stderr
+
+
+@pytest.mark.skipif(
+    shutil.which("avr-g++") is None,
+    reason="there is no avr-g++ (apt: gcc-avr avr-libc)",
+)
+def test_the_sketch_fits_an_uno(core, tmp_path):
+    """Its numbers take half of the 2 kB of memory, so that the stack has the rest."""
+    program = tmp_path / "matrix.o"
+    command = ["avr-g++", "-mmcu=atmega328p", "-Os", *GPP[1:], core, "-c", "-xc++"]
+    compiled = ended(*command, MATRIX / "matrix.ino", "-o", program)
+    assert compiled.returncode == 0, compiled.stderr
+    sizes = ended("avr-size", program).stdout.splitlines()[1].split()
+    assert int(sizes[1]) + int(sizes[2]) < 1024

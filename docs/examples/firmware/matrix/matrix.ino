@@ -3,8 +3,8 @@
 // 10 bits and an I2C buffer of 32 bytes: read it over the serial port.
 //
 // One CD74HC4067 connects the row under test to 3.3 V, another connects the column under test to
-// the analogue input, which a resistor of 10 kOhm pulls to ground. The skin file is
-// edge/skins/matrix.toml.
+// the analogue input, which a resistor of 10 kOhm pulls to ground. Choose pins that your board leaves
+// free: on an ESP32, 6 to 11 belong to its flash. The skin file is edge/skins/matrix.toml.
 #include <Wire.h>
 
 #include "protocol.h"
@@ -21,7 +21,7 @@ constexpr uint32_t kPeriodUs = 10000;  // 100 frames a second
 constexpr uint32_t kSettleUs = 5;
 
 taxels::Registers<kRows * kCols, 12> registers;
-taxels::Link<kRows * kCols, 12> link(registers);
+taxels::Link<kRows * kCols, 12> serialLink(registers);
 volatile uint8_t pointer = 0;
 
 void select(const uint8_t (&pins)[4], uint8_t number) {
@@ -51,7 +51,7 @@ void setup() {
 void loop() {
   static uint32_t due = micros();
   static uint16_t values[kRows * kCols];
-  while (Serial.available()) link.feed(Serial.read(), [](uint8_t byte) { Serial.write(byte); });
+  while (Serial.available()) serialLink.feed(Serial.read(), [](uint8_t byte) { Serial.write(byte); });
   if (static_cast<int32_t>(micros() - due) < 0) return;
   due += kPeriodUs;
   for (uint8_t row = 0; row < kRows; row++) {

@@ -125,7 +125,8 @@ class ClassifyNode(Node):
         try:
             self._watch()
         except Exception as error:  # whatever it is, `main` tells it
-            self.failure = error
+            # After Ctrl-C nothing can be published, which is no failure.
+            self.failure = error if rclpy.ok() else None
         finally:
             rclpy.try_shutdown()
 
