@@ -5,7 +5,7 @@ import io
 import math
 import zipfile
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -224,19 +224,16 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
     Raises:
         InputError: the arrays do not share an axis of trials.
     """
-    groups = _groups(arrays)
-    fields = {tuple(sorted(group)) for group in groups.values()}
-    if len(groups) > 1 and len(fields) == 1:
-        of_trials = list(groups.values())
-    else:
+    trials = list(map(_parts, _groups(arrays).values()))
+    if len(trials) < 2 or len({frozenset(dict(parts)) for parts in trials}) > 1:
         entries = _entries(arrays)
         columns = zip(*entries.values(), strict=True)
-        of_trials = [dict(zip(entries, values, strict=True)) for values in columns]
-    for trial in of_trials:
+        trials = [_parts(dict(zip(entries, column, strict=True))) for column in columns]
+    for parts in trials:
+        require_unique(name for name, _ in parts)
         labels: dict[str, str] = {}
         of_trial: Arrays = {}
-        for path, stored in trial.items():
-            value = np.asarray(stored)
+        for path, value in parts:
             if value.dtype.names:  # a structure within it is no value
                 continue
             if value.size == 1:  # without the array that MATLAB puts around a value
@@ -255,26 +252,30 @@ def _groups(arrays: Arrays) -> dict[str, Arrays]:
     groups: dict[str, Arrays] = defaultdict(dict)
     for path, array in arrays.items():
         group, _, name = path.rpartition(".")
-        if array.dtype.names and array.size == 1:
-            fields = zip(array.dtype.names, array.item(), strict=True)
-            groups[path] = {field: np.asarray(value) for field, value in fields}
-        else:
-            groups[group][name] = array
+        is_structure = array.dtype.names and array.size == 1
+        groups[path if is_structure else group][name] = array
     return groups
 
 
-def _entries(arrays: Arrays) -> Arrays:
-    """The entries of each array or field, one for each trial."""
-    entries: Arrays = {}
-    for name, stored in arrays.items():
-        array = _of_structures(stored) if stored.dtype == object else stored
-        if array.dtype.names:
-            require_unique([*entries, *array.dtype.names])
-            entries |= {field: array[field].ravel() for field in array.dtype.names}
-        elif array.dtype == object or _is_vector(array):
-            entries[name] = array.ravel()
+def _parts(trial: Mapping[str, Any]) -> list[tuple[str, NDArray[Any]]]:
+    """The names and values of a trial, with the fields of its structures."""
+    parts = []
+    for name, stored in trial.items():
+        value = np.asarray(stored)
+        if value.dtype.names and value.size == 1:
+            fields = value.dtype.names
+            parts += [(field, np.asarray(value[field].item())) for field in fields]
         else:
-            entries[name] = array
+            parts.append((name, value))
+    return parts
+
+
+def _entries(arrays: Arrays) -> Arrays:
+    """The entries of each array, one for each trial."""
+    entries = {}
+    for name, array in arrays.items():
+        is_list = array.dtype.hasobject or _is_vector(array)
+        entries[name] = array.ravel() if is_list else array
     sizes = {name: len(values) for name, values in entries.items()}
     if not any(sizes.values()):
         raise InputError(EMPTY)
@@ -284,12 +285,3 @@ def _entries(arrays: Arrays) -> Arrays:
             "have one entry for each trial"
         )
     return entries
-
-
-def _of_structures(cells: NDArray[Any]) -> NDArray[Any]:
-    """Cells as one array of structures, where each is a structure of equal fields."""
-    structures = [np.ravel(cell) for cell in cells.flat]
-    kinds = {(structure.dtype.names, len(structure)) for structure in structures}
-    if len(kinds) == 1 and structures[0].dtype.names and len(structures[0]) == 1:
-        return np.concatenate(structures)
-    return cells

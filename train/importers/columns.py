@@ -4,8 +4,9 @@ out."""
 import argparse
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -217,7 +218,7 @@ def _taxels(
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
     """The taxels by a common stem with running numbers, in the order of the numbers;
     and their shape, where they have two."""
-    grids = list(_grids(rest))
+    grids = _grids(*rest)
     grids = [grid for grid in grids if TAXELS.match(grid[0][0])] or grids
     grids = [grid for grid in grids if len(grid[0]) > 1] or grids
     if len(grids) > 1:
@@ -235,20 +236,23 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
     return grids[0]
 
 
-def _grids(names: Sequence[str]) -> Iterator[tuple[list[str], tuple[int, ...]]]:
-    """The names of each stem whose numbers count up without a gap, the first from 0 or
-    1, in the order of their numbers; and their shape, where they have two."""
+@cache
+def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
+    """The names of each stem whose numbers run, in the order of these, and their shape
+    where they have two numbers."""
     parts = pd.Series(names, names, object).str.extract(RUNNING)
     parts = parts.dropna(subset="first")
     is_flat = parts["second"].isna()
     places = parts[["first", "second"]].fillna(0).astype(int)
+    grids = []
     for (_, flat), group in places.groupby([parts["stem"], is_flat], sort=False):
         low = group.min()
         shape = group.max() - low + 1
         is_grid = len(group) == len(group.drop_duplicates()) == shape.prod()
         if is_grid and low["first"] <= 1:
             ordered = group.sort_values(["first", "second"]).index
-            yield list(ordered), () if flat else tuple(shape.tolist())
+            grids.append((list(ordered), () if flat else tuple(shape.tolist())))
+    return grids
 
 
 def _unit(

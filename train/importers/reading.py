@@ -38,8 +38,8 @@ MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
 HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
 COMMENTS = ("#", "%")
-ABOVE = re.compile(r"[#%]|\s*\Z", re.A)
-"""How a comment or blank line before the first row begins."""
+ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
+"""How a comment, blank line or separator (of Excel) before the first row begins."""
 COMMAS = re.compile(r"(?:\s*[+-]?\d+(?:,\d+)?(?!\S)){2,}\s*")
 """A row of numbers with decimal commas, separated by blanks."""
 FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
@@ -233,7 +233,8 @@ def _text(data: bytes) -> _Text:
     if COMMAS.fullmatch(first):
         mark = ""
     skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
-    numbers = [n for n, line in enumerate(lines, 1) if not skipped.match(line)]
+    below = enumerate(lines[len(above) :], len(above) + 1)
+    numbers = [number for number, line in below if not skipped.match(line)]
     kept = [lines[number - 1] for number in numbers]
     comments = [line for line in above if line.startswith(COMMENTS)]
     rows: list[list[str]] = []

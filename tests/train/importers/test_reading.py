@@ -42,6 +42,7 @@ def rows_of(table):
         PLAIN.replace(",", "|"),
         PLAIN.replace(",", " ").replace(".", ","),
         "% by me\n" + PLAIN,
+        "sep=;\n" + PLAIN.replace(",", ";"),
         "\ufeff" + PLAIN,
         PLAIN.encode("utf-16"),
         "# by me\n" + PLAIN,
