@@ -17,11 +17,11 @@ Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see 
 
 import argparse
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from statistics import mode
 from typing import Any
 
 import numpy as np
@@ -141,11 +141,6 @@ class Measured:
     source: Source
     meaning: Meaning
     numbers: Trial
-
-    @property
-    def kind(self) -> tuple[list[str], str]:
-        """The taxels and the unit of times, which are the same in all trials."""
-        return self.meaning.taxels, self.meaning.unit
 
 
 def trials(
@@ -293,7 +288,9 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     """The tables among paths; says how many files are none."""
     files = [path for path in paths if path.name not in (LABELS, SKIN)]
     tables = [path for path in files if suffix_of(path) in SUFFIXES]
-    others = [path for path in files if path.is_file() and path not in tables]
+    others = [
+        path for path in files if path.is_file() and suffix_of(path) not in SUFFIXES
+    ]
     if tables and others:
         count = counted(len(others), "file")
         say(f"left out {count} of another format, such as {others[0]}")
@@ -506,13 +503,16 @@ def _measured(
     for source in sources:
         with _skipping(options):
             measured.append(_understood(source, axes, options))
-    usual = Counter(str(trial.kind) for trial in measured).most_common(1)
+    if not measured:
+        return []
+    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in measured]
+    first = measured[kinds.index(mode(kinds))]
     alike = []
     for trial in measured:
         with _skipping(options):
-            _compare(trial, next(m for m in measured if str(m.kind) == usual[0][0]))
+            _compare(trial, first)
             alike.append(trial)
-    if alike and alike[0].meaning.are_all:
+    if first.meaning.are_all:
         _require_taxels(alike)
     return alike
 
@@ -521,8 +521,10 @@ def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
     path = trial.numbers.where
     first_path = first.numbers.where
-    taxels, unit = trial.kind
-    first_taxels, first_unit = first.kind
+    taxels = trial.meaning.taxels
+    first_taxels = first.meaning.taxels
+    unit = trial.meaning.unit
+    first_unit = first.meaning.unit
     if len(taxels) != len(first_taxels):
         raise InputError(
             f"{path}: has {len(taxels)} taxels, and {first_path} {len(first_taxels)}; "
