@@ -331,8 +331,8 @@ STEP_S = 0.02
 
 @st.composite
 def tables(draw):
-    """Values, and a text of them: any order of the columns, separator, unit, sign, and
-    columns that are no taxels."""
+    """Values, and a text of them: any order of the columns, separator, decimal sign,
+    unit, sign, and columns that are no taxels."""
     rows = draw(st.integers(4, 12))
     taxels = draw(st.integers(1, 12))
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))
@@ -344,9 +344,12 @@ def tables(draw):
     table["t"] = STEP_S * draw(st.sampled_from([1.0, 1e3, 1e6])) * np.arange(rows)
     for name in draw(st.sets(st.sampled_from(["label", "", "temperature", "frame"]))):
         table[name] = rng.integers(0, 9, rows)
-    return values, draw(st.sampled_from(["", "\n", "# a comment\n"])) + table.to_csv(
+    mark = draw(st.sampled_from([",", ";", "\t", "|"]))
+    above = draw(st.sampled_from(["", "\n", "# a comment\n", "% 1.5\n\n"]))
+    return values, above + table.to_csv(
         columns=draw(st.permutations(sorted(table))),
-        sep=draw(st.sampled_from([",", ";", "\t"])),
+        sep=mark,
+        decimal="." if mark == "," else draw(st.sampled_from([".", ","])),
         lineterminator=draw(st.sampled_from(["\n", "\r\n"])),
         index=False,
     )
