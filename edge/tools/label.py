@@ -134,7 +134,7 @@ def _relabel(
         if recording.labels != after:
             changes[path] = after
     if not changes:
-        output.text("every recording has these labels already")
+        output.text(f"none of {counted(len(recordings), 'recording')} would change")
         return 0
     for path, recording in recordings:
         if path in changes:
