@@ -428,7 +428,9 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
     """The labels in the rows of a trial."""
     labels = {}
     for task, column in rows.items():
-        first, *further = [_plain(cell) for cell in column.fillna("").unique()]
+        first, *further = [
+            _plain(cell) for cell in column.astype(object).fillna("").unique()
+        ]
         if further:
             raise InputError(
                 f"{where}: {task} changes, from {shown(first)} to {shown(further[0])}"

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from edge.commands.output import counted
 from edge.config import shown
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
@@ -37,7 +38,6 @@ PACKED = (*UNPACKERS, ".zip")
 MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
 HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
-COMMENTS = ("#", "%")
 ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
 COMMAS = re.compile(r"(?:\s*[+-]?\d+(?:,\d+)?(?!\S)){2,}\s*")
@@ -59,6 +59,7 @@ class Table:
             Its index is called `line`, and counts the lines of a text, or `row`.
         named: the file has a header.
         typed: the file tells numbers from texts.
+        decimal: the sign before a fraction, in cells that are text.
         shape: of the skin, where the file tells it.
         form: how the file was read, where that is worth saying.
         file_names: the names of all columns of the file, in its order, where they are
@@ -69,6 +70,7 @@ class Table:
     data: pd.DataFrame
     named: bool = True
     typed: bool = False
+    decimal: str = "."
     shape: tuple[int, ...] = ()
     form: tuple[str, ...] = ()
     file_names: tuple[str, ...] = ()
@@ -187,7 +189,13 @@ def read_text(path: Path) -> Table:
             form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
         data = _parsed(text, header, decimal=decimal)
-        return Table(str(path), data, header.named, form=(*form, *header.form))
+        return Table(
+            str(path),
+            data,
+            header.named,
+            decimal=decimal,
+            form=(*form, *header.form),
+        )
 
 
 def read_labels(path: Path) -> pd.DataFrame:
@@ -236,7 +244,7 @@ def _text(data: bytes) -> _Text:
     below = enumerate(lines[len(above) :], len(above) + 1)
     numbers = [number for number, line in below if not skipped.match(line)]
     kept = [lines[number - 1] for number in numbers]
-    comments = [line for line in above if line.startswith(COMMENTS)]
+    comments = [line for line in above if line[:1] in set("#%")]
     rows: list[list[str]] = []
     of_rows = []
     for place, row in _rows(kept, mark):
@@ -263,7 +271,7 @@ def _check_width(row: list[str], rows: list[list[str]], line: int) -> None:
     width = len(rows[0]) if rows else len(row)
     ends_in_mark = len(row) == width + 1 and not row[-1].strip()
     if len(row) != width and not ends_in_mark:
-        values = f"{len(row)} value{'s' * (len(row) != 1)}"
+        values = counted(len(row), "value")
         raise InputError(f"line {line} has {values}, and the first row {width}")
 
 
@@ -322,8 +330,8 @@ def _stated(text: _Text) -> _Header:
     heading = _names(heading)
     if len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
-    counted = numbered("", len(cells))
-    is_count = cells in (counted, ["0", *counted[:-1]])
+    running = numbered("", len(cells))
+    is_count = cells in (running, ["0", *running[:-1]])
     if is_count and len(cells) >= FEWEST_NAMES and len(text.rows) > 1:
         form = "the first row, which counts the columns, is a header"
         return _Header(cells, True, 1, (form,))
@@ -445,7 +453,10 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     Raises:
         InputError: a cell is no number.
     """
-    numbers = pd.to_numeric(table.data[name], errors="coerce").astype("float64")
+    column = table.data[name]
+    if table.decimal == "," and not pd.api.types.is_numeric_dtype(column):
+        column = column.str.replace(",", ".", n=1)
+    numbers = pd.to_numeric(column, errors="coerce").astype("float64")
     infinite = np.isinf(numbers)
     if infinite.any():
         raise InputError(

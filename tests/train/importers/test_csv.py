@@ -523,13 +523,16 @@ def test_numbers_are_labels_in_the_column_of_the_task(folder):
     assert recordings["2"].labels == {"object": "2"}
 
 
-def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder):
+@pytest.mark.parametrize("kind", ["object", "category"])
+def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder, kind):
     pytest.importorskip("pyarrow")
     rows = [("a", "1", t, t) for t in (0, 10)]
+    rows += [("b", None, t, t) for t in (0, 10)]
     table = pd.DataFrame(rows, columns=["trial", "softness", "t", "p1"])
-    table.to_parquet(folder / "all.parquet")
+    table.astype({"softness": kind}).to_parquet(folder / "all.parquet")
     _, recordings = imported(folder)
     assert recordings["a"].labels == {"softness": "1"}
+    assert recordings["b"].labels == {}
 
 
 def test_one_value_in_a_row_has_the_time_that_is_called_one(folder, capsys):

@@ -151,6 +151,12 @@ def test_a_text_among_numbers_is_named(tmp_path):
         numbers_of(table, "p1")
 
 
+def test_the_cell_that_is_named_is_the_text_among_numbers_with_decimal_commas(tmp_path):
+    table = read(tmp_path, "t;p1\n0;0,5\n1;off\n2;1,5\n")
+    with pytest.raises(InputError, match="'off' in column p1 is no number"):
+        numbers_of(table, "p1")
+
+
 def test_lines_count_comments_blank_lines_and_lines_within_a_cell(tmp_path):
     table = read(tmp_path, '# me\n\nt,note,p1\n0,"a\nb",1\n\n# a pause\n1,c,off\n')
     assert table.data.index.tolist() == [5, 8]
