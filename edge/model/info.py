@@ -261,7 +261,11 @@ def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]
     if not meta.has("usual"):
         return {}
     table = meta.table("usual")
-    return {name: table.numbers(name, 2) for name in names}
+    usual = {name: table.numbers(name, 2) for name in names}
+    for name, (least, greatest) in usual.items():
+        if least > greatest:
+            raise table.fail(name, "two numbers that rise")
+    return usual
 
 
 def _kernels(
@@ -313,8 +317,11 @@ def _contradictions(info: ModelInfo) -> Iterator[str]:
         yield f"names {len(info.trials)} of {info.rows} trials"
     if (info.motion_frame == "world") != (info.chain is not None):
         yield "its motion frame contradicts its arm"
-    if not "".join((info.name, *info.tasks)).isprintable():
-        yield "its name and its tasks' names must be printable"
+    without_contact = [task.no_contact or "" for task in info.tasks.values()]
+    if not "".join([info.name, *info.tasks, *without_contact]).isprintable():
+        yield "its name, its tasks' names and its answers must be printable"
+    if not "".join(info.trials).isprintable():
+        yield "its trials' names must be printable"
     yield from _contradictions_of_tasks(info)
 
 
@@ -346,8 +353,8 @@ def _points_fit(info: ModelInfo) -> bool:
 
 def _task(table: ConfigTable) -> Task:
     labels = table.texts("labels")
-    printable = all(label.strip() and label.isprintable() for label in labels)
-    if not labels or not printable or len(set(labels)) < len(labels):
+    bare = {label.strip() for label in labels} - {""}
+    if not bare or len(bare) < len(labels) or not "".join(labels).isprintable():
         raise table.fail("labels", "a list of different, printable texts")
     factors = table.table("factors")
     task = Task(

@@ -16,6 +16,8 @@ from edge.errors import InputError, about
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
+LONGEST_M = 1000.0
+"""Greatest coordinate of an arm's vectors."""
 STEPS = ("origin_xyz", "origin_rpy", "translate")
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -294,5 +296,6 @@ def _joint_from(table: ConfigTable, index: int) -> Joint:
 
 
 def _vector(table: ConfigTable, key: str) -> Vector:
-    x, y, z = table.numbers(key, 3)
+    """Three numbers. No link is a kilometre long, so that no product overflows."""
+    x, y, z = table.numbers(key, 3, low=-LONGEST_M, high=LONGEST_M)
     return x, y, z

@@ -198,7 +198,28 @@ REFUSED = {
     edited(lambda m: m["skin"].update(pitch_m=1e308)): "skin.pitch_m must be a number",
     meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 1000",
     meta(tracking={"debounce": 1001}): "debounce must be a whole number from 1",
-    meta(name="arm\n"): "its name and its tasks' names must be printable",
+    meta(name="arm\n"): "its name, its tasks' names and its answers must be printable",
+    edited(
+        lambda m: m["tasks"]["category"].update(no_contact="nothing\a")
+    ): "and its answers must be printable",
+    edited(
+        lambda m: m["trials"].__setitem__(0, "box\x1b[2J")
+    ): "its trials' names must be printable",
+    edited(
+        lambda m: m["tasks"]["category"].update(labels=["soft", "soft "])
+    ): "category.labels must be a list of different, printable texts",
+    edited(
+        lambda m: m.update(
+            usual={
+                "max_force": [2.0, 1.0],
+                "contact_area": [0, 1],
+                "contact_motion": [0, 1],
+            }
+        )
+    ): "usual.max_force must be two numbers that rise, not",
+    edited(
+        lambda m: m["arm"]["joint"][0].update(translate=[1e300, 0.0, 0.0])
+    ): "translate must be a number from -1000 to 1000, not 1e+300",
 }
 
 

@@ -77,7 +77,7 @@ def test_missing_extra_and_non_finite_angles_are_named(q, word):
         ("speed = 1\n[[joint]]\naxis = [0, 0, 1]", "unknown key speed"),
         ("[[joint]]\nname = 'j'", "axis is missing"),
         ("[[joint]]\naxis = [0, 0, 0]", "axis is zero"),
-        ("[[joint]]\naxis = [0, 0, inf]", "a finite number, not inf"),
+        ("[[joint]]\naxis = [0, 0, inf]", "a number from -1000 to 1000, not inf"),
         (
             "[[joint]]\naxis = [0, 0, 1]\nlimits_deg = [3, 1]",
             "lower limit 0.0523599 exceeds",
