@@ -261,10 +261,12 @@ def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]
     if not meta.has("usual"):
         return {}
     table = meta.table("usual")
-    usual = {name: table.numbers(name, 2) for name in names}
-    for name, (least, greatest) in usual.items():
+    usual: dict[str, Sequence[float]] = {}
+    for name in names:
+        least, greatest = table.numbers(name, 2)
         if least > greatest:
             raise table.fail(name, "two numbers that rise")
+        usual[name] = least, greatest
     return usual
 
 
