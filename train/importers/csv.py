@@ -51,7 +51,6 @@ from train.importers.reading import (
     TEXTS,
     Table,
     inner,
-    is_text,
     numbered,
     read_frame,
     read_labels,
@@ -412,16 +411,22 @@ def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
 
 
 def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
-    """The columns of labels of a long table: those of texts, apart from times that run
-    within a trial, and that of the task."""
-    by_trial = table.data.groupby("trial")
-    names = [name for name in table.names if name not in ("trial", "taxel")]
-    texts = [name for name in names if name == options.task or is_text(table, name)]
-    return [
-        name
-        for name in texts
-        if not is_date(table, name) or by_trial[name].nunique().max() == 1
-    ]
+    """The columns of labels of a long table: that of the task, and those of texts, apart
+    from times that run within a trial. A number among texts is a label if it stays the
+    same within its trial."""
+    tasks = []
+    for name in table.names:
+        column = table.data[name]
+        if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
+            is_task = name == options.task
+        else:
+            texts = column.astype(str).groupby(table.data["trial"])
+            words = pd.to_numeric(column, errors="coerce").isna().all()
+            runs = texts.nunique().max() > 1
+            is_task = not runs or (words and not is_date(table, name))
+        if is_task:
+            tasks.append(name)
+    return tasks
 
 
 def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:

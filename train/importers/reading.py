@@ -58,7 +58,6 @@ class Table:
         data: a column for each; columns without a header are named "1", "2" and so on.
             Its index is called `line`, and counts the lines of a text, or `row`.
         named: the file has a header.
-        typed: the file tells numbers from texts.
         decimal: the sign before a fraction, in cells that are text.
         shape: of the skin, where the file tells it.
         form: how the file was read, where that is worth saying.
@@ -69,7 +68,6 @@ class Table:
     where: str
     data: pd.DataFrame
     named: bool = True
-    typed: bool = False
     decimal: str = "."
     shape: tuple[int, ...] = ()
     form: tuple[str, ...] = ()
@@ -439,7 +437,7 @@ def read_parquet(path: Path, **options: Any) -> Table:
         raise InputError(f"{path}: {EMPTY}")
     if not isinstance(data.index, pd.RangeIndex):
         data = data.reset_index()
-    return Table(str(path), data.rename(columns=str), typed=True)
+    return Table(str(path), data.rename(columns=str))
 
 
 def place_of(mask: pd.Series) -> str:
@@ -504,11 +502,3 @@ def require_filled(path: object, data: pd.DataFrame, name: str) -> None:
         raise InputError(
             f"{path}: {place_of(empty)} has no {name}; enter it, or leave the row out"
         )
-
-
-def is_text(table: Table, name: str) -> bool:
-    """Whether a column holds texts that are no numbers."""
-    column = table.data[name]
-    if pd.api.types.is_numeric_dtype(column):
-        return False
-    return table.typed or bool(pd.to_numeric(column, errors="coerce").isna().all())

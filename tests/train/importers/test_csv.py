@@ -516,6 +516,14 @@ def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
     assert recordings["a"].frames[-1].tolist() == [[51, 62]]
 
 
+def test_a_number_among_words_is_a_label_where_it_stays_the_same(folder):
+    rows = [(trial, trial, t, t) for trial in ("7", "cup") for t in (0, 10)]
+    put(folder, {"all.csv": text(rows, head="trial,kind,t,p1")})
+    _, recordings = imported(folder)
+    assert recordings["7"].labels == {"kind": "7"}
+    assert recordings["cup"].labels == {"kind": "cup"}
+
+
 def test_numbers_are_labels_in_the_column_of_the_task(folder):
     rows = [(trial, trial, t, t) for trial in (1, 2) for t in (0, 10)]
     put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
