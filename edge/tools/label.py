@@ -152,7 +152,7 @@ def _delete(
 ) -> int:
     """Show what is deleted, ask, and delete it."""
     for path in paths:
-        output.text(f"{path}: is deleted")
+        output.text(f"{path}: to be deleted")
     if not _agreed(arguments, output, len(paths)):
         return 1
     delete(paths)

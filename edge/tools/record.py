@@ -352,7 +352,8 @@ def _joint_names(
     if arm is not None and opened.dof != arm.dof:
         raise InputError(
             f"{opened.source} gives {opened.dof or 'no'} joint angles, but "
-            f"{arguments.arm} has {arm.dof} joints; name another source with --joints"
+            f"{arguments.arm or arguments.model} has {arm.dof} joints; name another source "
+            "with --joints"
         )
     return names if opened.playback is None else opened.playback.recording.joint_names
 

@@ -345,3 +345,7 @@ def test_a_model_brings_the_arm_that_it_needs(refused, tmp_path):
     arm.write_text((ROOT / "edge/arms/cody.toml").read_text())
     said = refused("record", "--model", demo.MODEL, *given, "--arm", arm)
     assert "leave --arm out" in said
+    save(tmp_path / "unposed.npz", replace(load(touch), joints=None))
+    words = ("--fake", tmp_path / "unposed.npz", *given[2:])
+    said = refused("record", "--model", demo.MODEL, *words)
+    assert f"no joint angles, but {demo.MODEL} has 5 joints" in said
