@@ -184,6 +184,10 @@ def write(
         f"{model.info.window_s:g} s after the onset of a contact. Its version is "
         f"{model.version}; "
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
+        "The intervals are for the exported model on other trials: Wilson's for two "
+        "fifths of the trials, because that model differs from those of the folds. "
+        "Where entire groups are left out they count groups, whose trials are right or "
+        "wrong together.",
         *(
             line[0].upper() + line[1:] + "."
             for line in (*fitted.notes, *warnings(fitted))
@@ -206,12 +210,6 @@ def _accuracy(exported: Exported, task: str) -> Section:
     text = f"{accuracy(chosen)}."
     if untouched:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
-    text += (
-        " The intervals are for the exported model on other trials: Wilson's for two "
-        "fifths of the trials, because that model differs from those of the folds. "
-        "Where entire groups are left out they count groups, whose trials are right or "
-        "wrong together."
-    )
     labels = sorted(set(truth))
     scores: Any = precision_recall_fscore_support(
         truth, answers, labels=labels, zero_division=0.0
@@ -232,7 +230,7 @@ def _accuracy(exported: Exported, task: str) -> Section:
     return Section(
         f"Accuracy: {task}",
         [text],
-        [Table(f"recall_{_file(task)}", "Scores of each class", rows)],
+        [Table(f"recall_{_file(task)}", f"{task}: scores of each class", rows)],
         [
             confusion(
                 f"confusion_{_file(task)}",

@@ -43,6 +43,12 @@ def table(page, name):
     return rows_of(page.parent / f"{name}.csv")
 
 
+def test_what_holds_for_every_task_stands_once_before_them(written):
+    text = written[1].read_text()
+    assert text.index("Wilson's for two fifths") < text.index("Accuracy: category")
+    assert 'aria-label="category: scores of each class"' in text
+
+
 def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
     fitted, page = written
     result = fitted.chosen["category"].accuracy

@@ -40,6 +40,8 @@ PHONE = 3.6
 """Inches."""
 MATRIX_TEXT = 20
 """A confusion matrix of more classes does not show its numbers."""
+MOST_NAMES = 40
+"""One of more classes numbers its columns."""
 MATRIX_SHARES = 4
 """One of at most so many classes shows shares too."""
 MANY_CLASSES = 6
@@ -124,16 +126,32 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         small = phone and many
-        places = np.arange(0, n, -(-n // MATRIX_TEXT))
-        numbered = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
-        axes.set_xticks(places, places + 1, fontsize=6 if small else None)
-        axes.set_yticks(range(n), numbered, fontsize=7 if small else None)
-        axes.set(xlabel="answer, as a row's number", ylabel="label")
+        _name_sides(axes, classes, phone)
         _draw_matrix(axes, counts, fontsize=7 if small else None)
 
-    height = 1.2 + 0.3 * n if many else 2.0 + 0.45 * n
-    heights = height, 0.9 + 0.16 * n if many else 2.8
+    height = 2.4 + 0.3 * n if many else 2.6 + 0.45 * n
+    heights = height, 1.8 + 0.16 * n if many else 3.4
     return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
+
+
+def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
+    """Name the rows and the columns of a confusion matrix; of very many columns, only
+    some, by their row's number."""
+    n = len(classes)
+    many = n > MANY_CLASSES
+    small = 7 if (phone and many) or n > MATRIX_TEXT else None
+    answer = "answer"
+    if n > MOST_NAMES:
+        answer = "answer, as a row's number"
+        places = np.arange(0, n, -(-n // MATRIX_TEXT))
+        axes.set_xticks(places, places + 1, fontsize=small)
+        names = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
+    else:
+        names = list(classes)
+        style = {"rotation": 90} if many or phone else {"rotation": 30, "ha": "right"}
+        axes.set_xticks(range(n), names, fontsize=small, **style)
+    axes.set_yticks(range(n), names, fontsize=small)
+    axes.set(xlabel=answer, ylabel="label")
 
 
 def _draw_matrix(axes: Any, counts: Integers, fontsize: int | None) -> None:
