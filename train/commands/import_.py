@@ -113,12 +113,19 @@ def write(
     without_threshold: list[tuple[Path, Recording]] = []
     paths: set[Path] = set()
     frames: dict[str, list[str]] = {}
+    skipped: list[str] = []
     for name, recording in bar(trials, desc="importing", unit=" trials"):
         if arm is not None and recording.joints is None:
             raise InputError(
                 f"{arguments.file}: holds no joint angles; leave --arm out"
             )
-        path = _path(arguments, name, paths)
+        try:
+            path = _path(arguments, name, paths)
+        except InputError as error:
+            if getattr(arguments, "strict", True):
+                raise
+            skipped.append(str(error))
+            continue
         paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
         digest = hashlib.sha256(recording.frames.tobytes()).hexdigest()
@@ -127,12 +134,14 @@ def write(
             save(path, recording)
         else:
             without_threshold.append((path, recording))
+    skipped += getattr(arguments, "skipped", [])
+    if skipped and not paths:
+        raise InputError(skipped[0])
     report = [set_thresholds(without_threshold)] if without_threshold else []
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
     warn_of_copies(list(frames.values()))
     for warning in former_recordings.warnings(arguments.out, paths):
         say(warning)
-    skipped = getattr(arguments, "skipped", [])
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)
     return 1 if skipped else 0

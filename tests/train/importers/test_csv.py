@@ -310,7 +310,11 @@ RATE = ("--rate", "1")
             RATE,
             "labels.csv: 1 has two rows; remove one of them",
         ),
-        ({"1.txt": "1 2\n", "1.csv": "1 2\n"}, RATE, "in: two trials are named 1"),
+        (
+            {"1.txt": "1 2\n", "1.csv": "1 2\n"},
+            (*RATE, "--strict"),
+            "in: two trials are named 1",
+        ),
         (
             {"all.csv": "trial,p1\n../1,2\n"},
             RATE,
@@ -477,6 +481,24 @@ def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
     assert sorted(recordings) == ["cup_0", "cup_1", "cup_2"]
     assert "pen_1.csv: 'x' in column p1 is no number" in err
     assert "pen_2.csv: its taxels are ['s1'], and those of" in err
+
+
+def test_a_name_that_no_file_can_have_stops_none_of_the_others(folder, capsys):
+    rows = [(trial, t, t) for trial in ("../a", "b") for t in (0, 10)]
+    put(folder, {"all.csv": text(rows, head="trial,t,p1")})
+    status, recordings = imported(folder)
+    assert status == 1
+    assert list(recordings) == ["b"]
+    said = "left out: " + str(folder / "all.csv: the trial '../a' needs a name that a")
+    assert said in capsys.readouterr().err
+
+
+def test_of_two_trials_of_one_name_the_first_is_imported(folder, capsys):
+    put(folder, {"cup_1.csv": TRIAL, "cup_1.txt": TRIAL, "cup_2.csv": TRIAL})
+    status, recordings = imported(folder)
+    assert status == 1
+    assert list(recordings) == ["cup_1", "cup_2"]
+    assert "two trials are named cup_1; rename one" in capsys.readouterr().err
 
 
 def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
