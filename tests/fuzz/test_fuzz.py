@@ -112,7 +112,7 @@ DIGITS = "has 5000 digits; use sys.set_int_max_str_digits() to increase the limi
 BROKE = {
     "arm-deep.toml": "it is nested too deeply",
     "arm-digits.toml": DIGITS,
-    "csv_frames-utf8.one": "row 2 has 1 value, and the first row 2",
+    "csv_frames-utf8.one": "line 2 has 1 value, and the first row 2",
     "mcap-key.mcap": "255 is missing; copy it again",
     "mcap-lz4.mcap": "ERROR_decompressionFailed; copy it again",
     "mcap-short.mcap": "unpack requires a buffer of 8 bytes; copy it again",

@@ -253,7 +253,12 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
     if options.signed:
         usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
         unrest = np.abs(unrest + usual)
-    values = starts[np.nansum(unrest, axis=1).argmin()]
+    unknown = ~np.isfinite(starts).all(axis=2)
+    order = np.lexsort([np.nansum(unrest, axis=1), unknown.sum(axis=1)])
+    values = starts[order[0]]
+    lost = int(unknown[order[0]].sum())
+    if lost:
+        say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
     deviations = [(trial.values - values)[..., 0] for trial in trials]
     scale = options.scale
     if options.signed and scale == 1.0:

@@ -63,6 +63,21 @@ def test_missing_values_are_counted_and_said(capsys):
     assert "missing: 3 values" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("kind", ["falls", "signed"])
+def test_a_start_with_a_missing_value_is_not_the_quietest(kind, capsys):
+    incomplete = trial([100, NAN], [100, 90], [100, 90])
+    complete = trial([90, 80], [90, 80], [90, 80])
+    rest = rest_of([incomplete, complete], options(**{kind: True}))
+    assert rest.values.tolist() == [[90], [80]]
+    assert "at rest, which is never" not in capsys.readouterr().out
+
+
+def test_taxels_without_a_value_at_rest_are_said(capsys):
+    rest_of([trial([100, NAN], [100, 90], [100, 90])], options(falls=True))
+    said = "1 taxel without a value at rest, which is never valid"
+    assert said in capsys.readouterr().out
+
+
 def test_signed_values_count_their_distance_with_all_their_digits():
     counted = signed(trial([0.5, -1.0], [0.5, -1.0], [0.5, -1.0], [0.25, -1.5]))
     assert counted.frames[3].tolist() == [[25, 50]]
