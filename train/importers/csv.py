@@ -228,7 +228,8 @@ def _labelled(
     """
     trials = [source.name for source in sources]
     rows = _label_rows(path, trials)
-    unknown = [row for row in rows if row not in trials]
+    files = {_name(file, path.parent) for file in _visible(path.parent)}
+    unknown = [row for row in rows if row not in trials and row not in files]
     options.skipped += [f"{path}: {row} names no file" for row in unknown]
     for source in sources:
         if source.name not in rows:
@@ -339,8 +340,12 @@ def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[
         with parsing(str(file), "a table of trials"):
             yield from _trials_in(table, options)
     else:
-        place = inner(file.relative_to(folder)).with_suffix("")
-        yield Source("_".join(place.parts), table)
+        yield Source(_name(file, folder), table)
+
+
+def _name(file: Path, folder: Path) -> str:
+    """The name of the trial in a file."""
+    return "_".join(inner(file.relative_to(folder)).with_suffix("").parts)
 
 
 def _of_arrays(
@@ -398,7 +403,7 @@ def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
     for name in {"trial", "taxel"} & set(table.names):
         require_filled(table.where, table.data, name)
     tasks = _tasks_in(table, options)
-    label = f"columns {', '.join(tasks)}" if tasks else "none"
+    label = f"column {', column '.join(tasks)}" if tasks else "none"
     for trial, rows in table.data.groupby("trial", sort=False):
         where = f"{table.where}: trial {trial}"
         with _skipping(options):

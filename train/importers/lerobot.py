@@ -88,6 +88,9 @@ def trials(
         f'time: "timestamp" in s, taxels: "{options.taxels}" ({taxels}, as '
         f"{shape[0]} x {shape[1]}), label: the episode's task"
     )
+    axes = Axes.of(options)
+    if axes is not None:
+        say(axes.text)
     for episode in episodes:
         meta: dict[str, Any] = {"source": path.name, "trial": episode.number}
         if episode.label:

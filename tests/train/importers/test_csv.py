@@ -513,6 +513,16 @@ def test_labels_of_no_file_and_files_without_labels_are_named(folder, capsys):
     assert "has no row for r1" in err
 
 
+def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
+    files = {"r0.csv": TRIAL, "r1.csv": b"\0", "r2.csv": "t,p1\n0,x\n"}
+    labels = "trial,object\nr0,box\nr1,cup\nr2,cup\n"
+    put(folder, files | {"labels.csv": labels})
+    imported(folder)
+    assert "names no file" not in capsys.readouterr().err
+    out = str(folder.parent / "one")
+    assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
+
+
 def test_trials_with_the_same_frames_are_named(folder, capsys):
     put(folder, {"cup_1.csv": TRIAL, "cup_2.csv": TRIAL})
     imported(folder)

@@ -89,10 +89,12 @@ def test_joints_come_with_their_names(tmp_path):
     assert first.frames.shape[1:] == (1, TAXELS)
 
 
-def test_three_axes_are_shear(tmp_path):
+def test_three_axes_are_shear(tmp_path, capsys):
     folder = data_set(tmp_path / "set", "v3.0", axes=3)
     options = ("--axes", "xyz", "--flip", "y", "--shape", "2x3")
     second = imported(folder, tmp_path / "out", *options)[1]
+    said = "shear: x along the rows, y around the columns, y turned round"
+    assert said in capsys.readouterr().out
     counts = second.frames.astype(int)
     assert counts[0].ravel().tolist() == [100, 110, 120, 130, 140, 150]
     assert (second.shear[..., 0] == counts // 2).all()
