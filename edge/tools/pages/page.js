@@ -179,12 +179,9 @@ function drawContact(picture) {
 function drawDecisions(picture) {
   const box = $("decisions");
   $("decision-part").hidden = !picture.decides && !picture.decisions.length;
-  if (!picture.decisions.length) {
-    say("decisions", picture.contact && !picture.contact.ended
-      ? "Waiting for the window to end." : "No decision yet.");
-    box.dataset.shown = "";
-    return;
-  }
+  $("waiting").hidden = picture.decisions.length > 0;
+  say("waiting", picture.contact && !picture.contact.ended
+    ? "Waiting for the window to end." : "No decision yet.");
   const shown = JSON.stringify(picture.decisions);
   if (box.dataset.shown === shown) return;
   box.dataset.shown = shown;

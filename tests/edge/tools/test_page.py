@@ -433,6 +433,8 @@ class TestInABrowser:
                 raise AssertionError("it never came")
 
             comes("return document.querySelector('.decision') !== null")
+            legend = browser.find_element("css selector", "#choices legend").text
+            assert legend == "softness, decided: hard (80 %)"
             names = browser.execute_script(f"{regions}.map(node => node.id)")
             assert names == ["decisions"]
             browser.execute_script("document.querySelector('.decision').marked = true")
