@@ -149,6 +149,7 @@ class WebServer:
 
     async def _listen(self) -> None:
         """Serve until the server is closed."""
+        asyncio.get_running_loop().set_exception_handler(_unless_of_the_system)
         server = await asyncio.start_server(
             self._serve,
             sock=self._listener,
@@ -259,6 +260,15 @@ class WebServer:
                 await _send(writer, f"data: {data}\n\n".encode())
                 former = latest
             await asyncio.sleep(PICTURE_S / 2)
+
+
+def _unless_of_the_system(
+    loop: asyncio.AbstractEventLoop, context: dict[str, Any]
+) -> None:
+    """Pass over a connection for which the system has no descriptor left; asyncio
+    would print each with a traceback."""
+    if not isinstance(context.get("exception"), OSError):
+        loop.default_exception_handler(context)
 
 
 async def _send(writer: StreamWriter, data: bytes) -> None:

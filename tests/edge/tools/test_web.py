@@ -3,6 +3,7 @@ the loop."""
 
 import http.client
 import json
+import resource
 import socket
 import time
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -215,6 +216,20 @@ def test_one_address_has_eight_connections(server):
         time.sleep(0.2)
         ninth = stack.enter_context(socket.create_connection(place, timeout=1.0))
         assert ninth.recv(1) == b""
+
+
+def test_a_connection_without_a_descriptor_left_is_passed_over_quietly(server, caplog):
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with ExitStack() as stack:
+        clients = [stack.enter_context(socket.socket()) for _ in range(4)]
+        # The first number that is free is beyond the limit.
+        resource.setrlimit(resource.RLIMIT_NOFILE, (clients[-1].fileno(), limits[1]))
+        stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+        for client in clients:
+            client.connect(("127.0.0.1", server.server_port))
+        time.sleep(0.3)
+    assert caplog.text == ""
+    assert ask(server)[0] == 200
 
 
 def test_a_wrong_token_explains_itself(server):
