@@ -10,6 +10,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.errors import printable
 from edge.touch import measures
+from edge.touch.doubts import LIMIT_TOLERANCE
 from train.choose import Chosen
 from train.dataset import DataSet
 from train.feature_sets import SETS, expand, moves
@@ -124,6 +125,7 @@ def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that make a model worse, or make it look better than it is."""
     dataset = fitted.dataset
     lines = [*_untouched(dataset), *_left_out(dataset)]
+    lines += _beyond_limits(fitted.measured)
     longest = max(
         float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
     )
@@ -168,6 +170,28 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
             f"{_files(dataset.unused)}; `python -m train split` makes a recording of "
             "each contact"
         )
+
+
+def _beyond_limits(dataset: DataSet) -> Iterator[str]:
+    """A sentence on each recording with a joint angle beyond its limits."""
+    if dataset.chain is None:
+        return
+    unlimited = (-np.inf, np.inf)
+    limits = np.array([pair or unlimited for pair in dataset.chain.limits])
+    for path, joints in {t.path: t.recording.joints for t in dataset.trials}.items():
+        if joints is None:
+            continue
+        excess = np.maximum(limits[:, 0] - joints, joints - limits[:, 1])
+        frames, of_joint = np.nonzero(excess > LIMIT_TOLERANCE)
+        if len(frames):
+            frame = frames[0]
+            joint = of_joint[0]
+            low, high = limits[joint]
+            yield (
+                f"warning: {path}: at frame {frame} joint {dataset.chain.names[joint]} "
+                f"is at {joints[frame, joint]:g}, beyond its limits of {low:g} and "
+                f"{high:g}; leave the recording out if it is wrong"
+            )
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

@@ -142,3 +142,17 @@ def test_coarseness_is_the_median_gap_of_neighbours_in_units(rows, steps):
 def test_rows_that_are_equal_but_for_rounding_are_not_equal():
     rows = np.array([[0.0], [1.0], [0.0], [1.0 + 1e-15], [2.0], [2.0]])
     assert tied_across_labels(rows, np.array([0, 1, 1, 0, 1, 1])) == 2
+
+
+def test_a_joint_angle_beyond_its_limits_is_named_with_file_and_frame(fitted):
+    trial = fitted.measured.trials[1]
+    joints = trial.recording.joints.copy()
+    joints[7, 2] = 1e4
+    recording = replace(trial.recording, joints=joints)
+    trials = list(fitted.measured.trials)
+    trials[1] = replace(trial, recording=recording)
+    wrong = replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
+
+    (line,) = said(wrong, "beyond its limits")
+    assert f"{trial.path}: at frame 7 joint upper_arm_roll is at 10000" in line
+    assert said(fitted, "beyond its limits") == []
