@@ -248,17 +248,7 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
         )
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
-    starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
-    unrest = -starts[..., 0]
-    if options.signed:
-        usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
-        unrest = np.abs(unrest + usual)
-    unknown = ~np.isfinite(starts).all(axis=2)
-    order = np.lexsort([np.nansum(unrest, axis=1), unknown.sum(axis=1)])
-    values = starts[order[0]]
-    lost = int(unknown[order[0]].sum())
-    if lost:
-        say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
+    values = _quietest(trials, options)
     deviations = [(trial.values - values)[..., 0] for trial in trials]
     scale = options.scale
     if options.signed and scale == 1.0:
@@ -267,6 +257,23 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
     if options.falls and rise > 0.0:
         say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
     return Rest(values, options.falls, scale)
+
+
+def _quietest(
+    trials: Sequence[Trial], options: argparse.Namespace
+) -> NDArray[np.float64]:
+    """(taxels, axes) the values of the quietest start, of those that lack fewest."""
+    starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
+    unrest = -starts[..., 0]
+    if options.signed:
+        usual = pd.DataFrame(starts[..., 0]).median().to_numpy()
+        unrest = np.abs(unrest + usual)
+    unknown = ~np.isfinite(starts).all(axis=2)
+    first = np.lexsort([np.nansum(unrest, axis=1), unknown.sum(axis=1)])[0]
+    lost = int(unknown[first].sum())
+    if lost:
+        say(f"{counted(lost, 'taxel')} without a value at rest, which is never valid")
+    return np.asarray(starts[first])
 
 
 def _finest(deviations: Sequence[NDArray[np.float64]]) -> float:
