@@ -193,6 +193,15 @@ def _apart(former: TaxelCalibration | None) -> str:
     return "beyond the others" if former is None else "off the former calibration"
 
 
+def _warn_of_rest(middle: int, onset: int) -> None:
+    """Warn of a skin that rests above 0, though it can rest at 0."""
+    if middle > onset:
+        LOG.warning(
+            f"the skin rests at about {middle} counts, not at 0; that is wrong if "
+            "something covers it"
+        )
+
+
 def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int64]:
     """Counts (rows, cols) by which working taxels rest beyond the usual differences to
     others of their kind, in the direction of a touch.
@@ -203,15 +212,12 @@ def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int
     change = np.zeros(baseline.size, dtype=np.int64)
     for kind in {chip.kind for chip in file.chips}:
         chips = [chip for chip in file.chips if chip.kind is kind]
-        taxels = [taxel for chip in chips for taxel in chip.served]
+        taxels = np.concatenate([chip.served for chip in chips])
+        signs = np.repeat([c.sign for c in chips], [len(c.served) for c in chips])
         rest = baseline.ravel()[taxels].astype(np.int64)
-        signs = [chip.sign for chip in chips for _ in chip.served]
         middle = int(np.median(rest))
-        if kind.rests_at_zero and min(signs) > 0 and middle > file.layout.onset:
-            LOG.warning(
-                f"the skin rests at about {middle} counts, not at 0; that is wrong if "
-                "something covers it"
-            )
+        if kind.rests_at_zero and signs.min() > 0:
+            _warn_of_rest(middle, file.layout.onset)
         above = (rest - middle) * signs
         usual = int(SPREADS * np.median(np.abs(above)))
         change[taxels] = np.maximum(above - usual, 0)

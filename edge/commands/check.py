@@ -91,14 +91,7 @@ def remarks(file: SkinFile) -> Iterator[str]:
         )
     if file.uncovered:
         yield f"taxels without a chip, which are never valid: {file.uncovered}"
-    for bus in file.buses:
-        muxes = {chip.mux for chip in bus.chips} - {None}
-        if len(muxes) > 1:
-            yield (
-                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
-                "channel open, nothing behind the others is valid; use one mux, and wire "
-                "its reset line"
-            )
+    yield from _remarks_of_muxes(file)
     if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
         yield "pyserial is not installed: run `pip install pyserial`"
     if file.calibration is None:
@@ -110,6 +103,17 @@ def remarks(file: SkinFile) -> Iterator[str]:
             f"{counted(hidden, 'chip')} could freeze unseen: their noise is hidden by "
             "whole counts, so that equal readings prove nothing"
         )
+
+
+def _remarks_of_muxes(file: SkinFile) -> Iterator[str]:
+    for bus in file.buses:
+        muxes = {chip.mux for chip in bus.chips} - {None}
+        if len(muxes) > 1:
+            yield (
+                f"{bus.device} has {len(muxes)} muxes: while one of them may have a "
+                "channel open, nothing behind the others is valid; use one mux, and wire "
+                "its reset line"
+            )
 
 
 def check_board(output: Output) -> int:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -228,8 +228,8 @@ def reading(
     if model is not None and dof is None:
         arm = model.info.chain
         dof = model.info.dof
-    if arguments.fake is not None and (real_time or arguments.web is not None):
-        arguments.real_time = True
+    if arguments.fake is not None:
+        arguments.real_time |= real_time or arguments.web is not None
     played_arm = arm if arguments.joints is None else None
     with ExitStack() as stack:
         opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
@@ -241,12 +241,16 @@ def reading(
         loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
-            from edge.tools.page import open_page  # few runs have a page
-
-            layout = opened.skin.layout
-            shown = open_page(arguments.web, layout, title=opened.source, **page)
-            live = stack.enter_context(shown)
+            live = stack.enter_context(_page(arguments.web, opened, page))
         yield Reading(opened, loop, stop, live, Output.of(arguments))
+
+
+def _page(
+    address: str, opened: Opened, options: Mapping[str, Any]
+) -> AbstractContextManager[Page]:
+    from edge.tools.page import open_page  # few runs have a page
+
+    return open_page(address, opened.skin.layout, title=opened.source, **options)
 
 
 @contextmanager

@@ -319,12 +319,16 @@ def _contradictions(info: ModelInfo) -> Iterator[str]:
         yield f"names {len(info.trials)} of {info.rows} trials"
     if (info.motion_frame == "world") != (info.chain is not None):
         yield "its motion frame contradicts its arm"
+    yield from _unprintable(info)
+    yield from _contradictions_of_tasks(info)
+
+
+def _unprintable(info: ModelInfo) -> Iterator[str]:
     without_contact = [task.no_contact or "" for task in info.tasks.values()]
     if not "".join([info.name, *info.tasks, *without_contact]).isprintable():
         yield "its name, its tasks' names and its answers must be printable"
     if not "".join(info.trials).isprintable():
         yield "its trials' names must be printable"
-    yield from _contradictions_of_tasks(info)
 
 
 def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:

@@ -217,8 +217,7 @@ class Page:
             labels = {**self.labels, **_labels(action)}
             self.labels = _labels({"labels": labels})
         elif kind == "unlabel":
-            removed = action.get("task")
-            self.labels = {t: name for t, name in self.labels.items() if t != removed}
+            self.labels = _without(self.labels, action.get("task"))
             self.recording &= bool(self.labels)
         elif kind == "record":
             self._switch(bool(action.get("on")))
@@ -290,6 +289,10 @@ def _accepted(name: str, trial: Recording) -> dict[str, str]:
     if not labels:
         raise InputError(f"{name}: no decision names a label to accept")
     return labels
+
+
+def _without(labels: Mapping[str, str], task: object) -> dict[str, str]:
+    return {name: label for name, label in labels.items() if name != task}
 
 
 def _labels(action: Json) -> dict[str, str]:

@@ -13,7 +13,7 @@ import math
 import os
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
@@ -220,7 +220,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = None if arguments.out.suffix == ".npz" else arguments.out
     labels = _labels(arguments, folder, by_key)
     check_writable(trial_path(arguments.out, labels).parent)
-    model = None if arguments.model is None else Model(arguments.model)
+    model = _model(arguments.model)
     arm = _arm(arguments, model)
     dof = _dof(arguments, arm)
     with (
@@ -248,17 +248,14 @@ def run(arguments: argparse.Namespace) -> int:
             live.page,
             arguments.label if by_key else [],
         )
-        LOG.info("waiting for a contact" + (KEYS if by_key else ""))
-        for digit, (task, label) in zip(DIGITS, recorder.choices, strict=False):
-            LOG.info(f"  {digit}  {task}={label}")
+        _announce(recorder.choices, by_key)
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         most = arguments.trials if folder else 1
         for frame, faults in live.frames():
             events = [] if classifier is None else classifier.push(frame)
             lines.write([*faults, *(event.to_dict() for event in events)])
-            for key in typed():
-                recorder.press(key)
+            recorder.press_all(typed())
             live.show(frame, faults, events)
             recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
@@ -266,6 +263,16 @@ def run(arguments: argparse.Namespace) -> int:
                 break
         recorder.save(trials.rest(), complete=False)
     return _status(arguments, recorder, live.skin)
+
+
+def _model(path: Path | None) -> Model | None:
+    return None if path is None else Model(path)
+
+
+def _announce(choices: Sequence[tuple[str, str]], by_key: bool) -> None:
+    LOG.info("waiting for a contact" + (KEYS if by_key else ""))
+    for digit, (task, label) in zip(DIGITS, choices, strict=False):
+        LOG.info(f"  {digit}  {task}={label}")
 
 
 def _arm(arguments: argparse.Namespace, model: Model | None) -> Chain | None:
@@ -414,6 +421,11 @@ class Recorder:
     def __post_init__(self) -> None:
         self.held = self.labels
 
+    def press_all(self, keys: Iterable[str]) -> None:
+        """Do what each of some keys asks for."""
+        for key in keys:
+            self.press(key)
+
     def press(self, key: str) -> None:
         """Take a key: a number chooses its label, d deletes the last trial."""
         if self.page is not None:
@@ -477,21 +489,27 @@ class Recorder:
                 break
         self.paths.append(path)
         self.any_joints |= trial.joints is not None
+        self.lines.write([self._saved_event(path, trial, unposed)])
+        if self.page is not None:
+            self.page.saved(path, trial)
+
+    def _saved_event(
+        self, path: Path, trial: Recording, unposed: int
+    ) -> dict[str, Any]:
+        """The event of a saved trial, some frames of which have no joint angles."""
         event = {
             "event": "saved",
             "file": str(path),
             "labels": self.held,
-            "frames": len(frames),
-            "seconds": round(frames[-1].t - frames[0].t, 3),
+            "frames": len(trial.t),
+            "seconds": round(float(trial.t[-1] - trial.t[0]), 3),
             "joints": trial.joints is not None,
             "missing_taxels": trial.valid is not None,
-            "complete": complete,
+            "complete": trial.meta["complete"],
         }
         if trial.joints is not None and unposed:
             LOG.warning(
-                f"{path}: {unposed} of {len(frames)} frames have no joint angles"
+                f"{path}: {unposed} of {len(trial.t)} frames have no joint angles"
             )
             event["frames_without_joints"] = unposed
-        self.lines.write([event])
-        if self.page is not None:
-            self.page.saved(path, trial)
+        return event

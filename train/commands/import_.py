@@ -115,10 +115,7 @@ def write(
     frames: dict[str, list[str]] = {}
     skipped: list[str] = []
     for name, recording in bar(trials, desc="importing", unit=" trials"):
-        if arm is not None and recording.joints is None:
-            raise InputError(
-                f"{arguments.file}: holds no joint angles; leave --arm out"
-            )
+        _require_joints(recording, arm, arguments.file)
         try:
             path = _path(arguments, name, paths)
         except InputError as error:
@@ -142,9 +139,19 @@ def write(
     warn_of_copies(list(frames.values()))
     for warning in former_recordings.warnings(arguments.out, paths):
         say(warning)
+    return _status(skipped)
+
+
+def _status(skipped: Sequence[str]) -> int:
+    """Print what was left out; 1 if anything was."""
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)
-    return 1 if skipped else 0
+    return int(bool(skipped))
+
+
+def _require_joints(recording: Recording, arm: Chain | None, file: Path) -> None:
+    if arm is not None and recording.joints is None:
+        raise InputError(f"{file}: holds no joint angles; leave --arm out")
 
 
 def warn_of_copies(groups: Sequence[Sequence[str]]) -> None:

@@ -5,7 +5,7 @@ import io
 import math
 import zipfile
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -119,11 +119,6 @@ def table_of(where: str, arrays: Arrays, options: argparse.Namespace) -> Table:
         InputError: no axis, or more than one, can be the time's.
     """
     numbers = _numbers(arrays, options)
-    if not numbers:
-        has_parts = any(array.dtype.hasobject for array in arrays.values())
-        raise InputError(
-            "holds cells or structures; give --trials" * has_parts or EMPTY
-        )
     axis = None if options.axis is None else options.axis - 1
     frames = _frames(numbers, axis, options.time)
     names: list[str] = []
@@ -150,16 +145,29 @@ def table_of(where: str, arrays: Arrays, options: argparse.Namespace) -> Table:
 
 
 def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
-    """The arrays of numbers that are used."""
+    """The arrays of numbers that are used.
+
+    Raises:
+        InputError: there is none.
+    """
     words = filter(None, (options.taxels, options.joints, options.time))
     named = set(",".join(words).split(",")) & set(arrays)
+    if not options.taxels or not named:
+        named = set(arrays)
+    named.add("trial")
     numbers = {}
     for name, array in arrays.items():
-        by_name = name in named or name == "trial" or TIME.fullmatch(name)
-        is_used = by_name or not options.taxels or not named
+        is_used = name in named or TIME.fullmatch(name)
         if is_used and array.dtype.kind in "iufb" and array.size:
             numbers[name] = array.ravel() if _is_vector(array) else array
+    if not numbers:
+        raise _without_numbers(arrays)
     return numbers
+
+
+def _without_numbers(arrays: Arrays) -> InputError:
+    has_parts = any(array.dtype.hasobject for array in arrays.values())
+    return InputError("holds cells or structures; give --trials" * has_parts or EMPTY)
 
 
 def _is_vector(array: NDArray[Any]) -> bool:
@@ -174,21 +182,25 @@ def _frames(arrays: Arrays, axis: int | None, time: str | None) -> int:
     for name, array in arrays.items():
         if array.ndim == 1 and (name == time or TIME.fullmatch(name)):
             return array.size
-    largest = max(arrays.values(), key=np.size)
     if axis is not None:
-        if axis >= largest.ndim:
-            raise InputError(f"--axis must be 1 to {largest.ndim}")
-        return int(largest.shape[axis])
+        return _frames_along(axis, max(arrays.values(), key=np.size))
     sizes = {name or "the array": array.shape for name, array in arrays.items()}
     shared = set.intersection(*map(set, sizes.values()))
     if len(arrays) == 1:
-        shared = {len(largest)} & {max(largest.shape)}
+        (shape,) = sizes.values()
+        shared = {shape[0]} & {max(shape)}
     if len(shared) == 1:
         return int(shared.pop())
     raise InputError(
         f"which axis is the time? The arrays are {shown(sizes)}; give --axis, or name "
         "those to be used by --taxels and --joints"
     )
+
+
+def _frames_along(axis: int, largest: NDArray[Any]) -> int:
+    if axis >= largest.ndim:
+        raise InputError(f"--axis must be 1 to {largest.ndim}")
+    return int(largest.shape[axis])
 
 
 def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -> int:
@@ -231,20 +243,27 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
         trials = [_parts(dict(zip(entries, column, strict=True))) for column in columns]
     for parts in trials:
         require_unique(name for name, _ in parts)
-        labels: dict[str, str] = {}
-        of_trial: Arrays = {}
-        for path, value in parts:
-            if value.dtype.names:  # a structure within it is no value
-                continue
-            if value.size == 1:  # without the array that MATLAB puts around a value
-                value = np.asarray(value.item())
-            name = path.rpartition(".")[2]
-            if value.ndim == 0 or value.dtype.kind in "US":
-                is_label = name.lower() in ("label", "labels")
-                labels[task if is_label else name] = str(value)
-            else:
-                of_trial[name] = value
-        yield labels, of_trial
+        yield _labels_and_arrays(parts, task)
+
+
+def _labels_and_arrays(
+    parts: Sequence[tuple[str, NDArray[Any]]], task: str
+) -> tuple[dict[str, str], Arrays]:
+    """A trial's texts and single numbers, and its arrays."""
+    labels: dict[str, str] = {}
+    of_trial: Arrays = {}
+    for path, value in parts:
+        if value.dtype.names:  # a structure within it is no value
+            continue
+        if value.size == 1:  # without the array that MATLAB puts around a value
+            value = np.asarray(value.item())
+        name = path.rpartition(".")[2]
+        if value.ndim == 0 or value.dtype.kind in "US":
+            is_label = name.lower() in ("label", "labels")
+            labels[task if is_label else name] = str(value)
+        else:
+            of_trial[name] = value
+    return labels, of_trial
 
 
 def _groups(arrays: Arrays) -> dict[str, Arrays]:

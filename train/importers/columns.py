@@ -147,15 +147,13 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
     time = _time_column(table, joints, options)
     rest = [name for name in table.names if name != time and name not in joints]
     taxels, shape = _taxels(table, rest, options)
-    for name in taxels:
-        if name not in rest:
-            raise InputError(
-                f"{table.where}: column {name} is named both as a taxel and as time or "
-                "joint"
-            )
+    for name in set(taxels).difference(rest):
+        raise InputError(
+            f"{table.where}: column {name} is named both as a taxel and as time or joint"
+        )
     left_out = [name for name in rest if name not in taxels]
     unit, source = _unit(table, time, options)
-    is_told = table.named or table.shape or table.file_names or options.taxels
+    is_told = any((table.named, table.shape, table.file_names, options.taxels))
     shape = table.shape or shape
     return Meaning(taxels, joints, left_out, shape, time, unit, source, not is_told)
 

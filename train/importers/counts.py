@@ -240,23 +240,32 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
     """
     if options.falls and options.signed:
         raise InputError("--falls and --signed exclude each other; give one")
+    _say_missing(trials)
+    if not (options.falls or options.signed):
+        return Rest(scale=options.scale)
+    values = _quietest(trials, options)
+    deviations = [(trial.values - values)[..., 0] for trial in trials]
+    if options.falls:
+        _say_lost(deviations)
+        return Rest(values, falls=True, scale=options.scale)
+    scale = _finest(deviations) if options.scale == 1.0 else options.scale
+    return Rest(values, scale=scale)
+
+
+def _say_missing(trials: Sequence[Trial]) -> None:
     missing = sum(int(trial.missing.sum()) for trial in trials)
     if missing:
         say(
             f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
             "frame"
         )
-    if not (options.falls or options.signed):
-        return Rest(scale=options.scale)
-    values = _quietest(trials, options)
-    deviations = [(trial.values - values)[..., 0] for trial in trials]
-    scale = options.scale
-    if options.signed and scale == 1.0:
-        scale = _finest(deviations)
+
+
+def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:
+    """Say how far values rise that only count as they fall."""
     rise = max(np.fmax.reduce(d, axis=None, initial=0.0) for d in deviations)
-    if options.falls and rise > 0.0:
+    if rise > 0.0:
         say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
-    return Rest(values, options.falls, scale)
 
 
 def _quietest(

@@ -378,15 +378,20 @@ def _of_frames(
     values = np.reshape(frames, (len(files), -1))
     data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
     if options.rate is None:
-        kind = "a folder of files that are named by their times"
-        with parsing(str(inside), kind, "; give --rate"):
-            t = [float(inner(file).stem) for file in files]
-            if not np.isfinite(t).all():
-                raise ValueError("a time is not finite")
-        data.insert(0, "time_s", t)
+        data.insert(0, "time_s", _times_in_names(inside, files))
         data = data.sort_values("time_s", kind="stable", ignore_index=True)
     table = Table(str(inside), data, named=False, shape=shape)
     yield Source("_".join(inside.relative_to(folder).parts), table)
+
+
+def _times_in_names(inside: Path, files: Sequence[Path]) -> list[float]:
+    """The times that the names of a folder's files are."""
+    kind = "a folder of files that are named by their times"
+    with parsing(str(inside), kind, "; give --rate"):
+        t = [float(inner(file).stem) for file in files]
+        if not np.isfinite(t).all():
+            raise ValueError("a time is not finite")
+    return t
 
 
 def _frame(file: Path) -> NDArray[np.float64]:
@@ -453,31 +458,10 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
 def _pivoted(table: Table, options: argparse.Namespace) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
-    data = table.data
     further = [name for name in table.names if name not in ("taxel", "value")]
-    times = named_times(table) or further
-    if options.time:
-        times = columns(table, options.time)
-    if "value" not in data or len(times) != 1:
-        raise InputError(
-            f"{table.where}: needs the columns value and a time beside taxel, which "
-            "--time names"
-        )
-    (time,) = times
-    repeated = data[data.duplicated([time, "taxel"])]
-    if len(repeated):
-        row = repeated.iloc[0]
-        raise InputError(
-            f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
-            f"{row[time]}"
-        )
-    cells = data[time].nunique() * data["taxel"].nunique()
-    if cells > SPARSEST * len(data):
-        raise InputError(
-            f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
-            "of a table; the taxels need times in common"
-        )
-    wide = data.pivot(index=time, columns="taxel", values="value")
+    time = _time_of_long(table, further, options)
+    _check_long(table, time)
+    wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
     if not wide.columns.is_unique or time in wide:
         raise InputError(
@@ -491,6 +475,38 @@ def _pivoted(table: Table, options: argparse.Namespace) -> Table:
         form=(*table.form, *form),
         file_names=tuple(wide.columns),
     )
+
+
+def _time_of_long(
+    table: Table, further: Sequence[str], options: argparse.Namespace
+) -> str:
+    times = named_times(table) or further
+    if options.time:
+        times = columns(table, options.time)
+    if "value" not in table.data or len(times) != 1:
+        raise InputError(
+            f"{table.where}: needs the columns value and a time beside taxel, which "
+            "--time names"
+        )
+    return times[0]
+
+
+def _check_long(table: Table, time: str) -> None:
+    """Refuse two values of a taxel at one time, and taxels without times in common."""
+    data = table.data
+    repeated = data[data.duplicated([time, "taxel"])]
+    if len(repeated):
+        row = repeated.iloc[0]
+        raise InputError(
+            f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
+            f"{row[time]}"
+        )
+    cells = data[time].nunique() * data["taxel"].nunique()
+    if cells > SPARSEST * len(data):
+        raise InputError(
+            f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
+            "of a table; the taxels need times in common"
+        )
 
 
 def _plain(name: Any) -> str:

@@ -235,12 +235,7 @@ def _text(data: bytes) -> _Text:
     above = list(takewhile(ABOVE.match, lines))
     if len(above) == len(lines):
         raise InputError(EMPTY)
-    first = lines[len(above)]
-    if len(first) > LONGEST_LINE:
-        raise InputError(f"has a line of {len(first) >> 20} MB, too long for a frame")
-    mark = next(filter(first.__contains__, MARKS), "")
-    if COMMAS.fullmatch(first):
-        mark = ""
+    mark = _mark(lines[len(above)])
     skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
     below = enumerate(lines[len(above) :], len(above) + 1)
     # An array takes a quarter of a list's memory.
@@ -255,6 +250,15 @@ def _text(data: bytes) -> _Text:
         if len(rows) < 2:
             rows.append(row)
     return _Text(kept, of_rows, mark, rows, "".join(comments[-1:]), form)
+
+
+def _mark(line: str) -> str:
+    """The sign between the cells of a line; empty where blanks stand there."""
+    if len(line) > LONGEST_LINE:
+        raise InputError(f"has a line of {len(line) >> 20} MB, too long for a frame")
+    if COMMAS.fullmatch(line):
+        return ""
+    return next(filter(line.__contains__, MARKS), "")
 
 
 def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
