@@ -7,13 +7,14 @@ import gzip
 import io
 import lzma
 import re
+import warnings
 import zipfile
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +137,7 @@ class _Text:
     """A text, taken apart.
 
     Attributes:
-        lines: from the first row on, without comments and blank lines.
+        body: from the first row on, without comments and blank lines.
         numbers: the line in the file of each row.
         mark: the separator; empty for blanks.
         rows: the cells of the first row, and of the second if there is one.
@@ -144,7 +145,7 @@ class _Text:
         form: how it was encoded, if not as UTF-8.
     """
 
-    lines: list[str]
+    body: str
     numbers: Sequence[int]
     mark: str
     rows: list[list[str]]
@@ -232,6 +233,7 @@ def _text(data: bytes) -> _Text:
     if "\0" in text:
         raise ValueError("it is not text")
     lines = re.sub("\r\n?", "\n", text).split("\n")
+    del text  # each copy of a long one counts
     above = list(takewhile(ABOVE.match, lines))
     if len(above) == len(lines):
         raise InputError(EMPTY)
@@ -239,17 +241,33 @@ def _text(data: bytes) -> _Text:
     skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
     below = enumerate(lines[len(above) :], len(above) + 1)
     # An array takes a quarter of a list's memory.
-    numbers = array("q", (n for n, line in below if not skipped.match(line)))
+    numbers: Sequence[int] = array(
+        "q", (n for n, line in below if not skipped.match(line))
+    )
     kept = [lines[number - 1] for number in numbers]
+    del lines
     comments = [line for line in above if line[:1] in set("#%")]
-    rows: list[list[str]] = []
+    body = "\n".join(kept)
+    if not mark or '"' in body or len({line.count(mark) for line in kept}) > 1:
+        numbers = _lines_of_rows(kept, numbers, mark)
+    rows = [row for _, row in islice(_rows(kept, mark), 2)]
+    return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
+
+
+def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
+    """The line in the file of each row, whose cells may be quoted, by that of each line
+    kept.
+
+    Raises:
+        InputError: a row has another width than the first.
+    """
+    first: list[str] | None = None
     of_rows = array("q")
     for place, row in _rows(kept, mark):
+        first = first or row
         of_rows.append(numbers[place - 1])
-        _check_width(row, rows, of_rows[-1])
-        if len(rows) < 2:
-            rows.append(row)
-    return _Text(kept, of_rows, mark, rows, "".join(comments[-1:]), form)
+        _check_width(row, first, of_rows[-1])
+    return of_rows
 
 
 def _mark(line: str) -> str:
@@ -271,10 +289,10 @@ def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
         yield reader.line_num, row
 
 
-def _check_width(row: list[str], rows: list[list[str]], line: int) -> None:
-    """Refuse a row of another width than the first of some rows, but for a separator
-    at the end."""
-    width = len(rows[0]) if rows else len(row)
+def _check_width(row: list[str], first: list[str], line: int) -> None:
+    """Refuse a row of another width than the first one, but for a separator at the
+    end."""
+    width = len(first)
     ends_in_mark = len(row) == width + 1 and not row[-1].strip()
     if len(row) != width and not ends_in_mark:
         values = counted(len(row), "value")
@@ -289,9 +307,8 @@ def _decimal(text: _Text) -> str:
     """
     if text.mark == ",":
         return "."
-    body = "\n".join(text.lines)
-    comma = re.search(FRACTION % ",", body)
-    point = re.search(FRACTION % r"\.", body)
+    comma = re.search(FRACTION % ",", text.body)
+    point = re.search(FRACTION % r"\.", text.body)
     if comma and point:
         raise InputError(
             f"has numbers with a comma and with a point, such as {comma[0]} and "
@@ -357,7 +374,10 @@ def _parsed(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
     trial 007 is not trial 7. In a column of numbers such words are empty cells.
     """
-    table = _cells(text, header, low_memory=False, **options)
+    with warnings.catch_warnings():
+        # Columns that hold texts in a part of a long table are read anew below.
+        warnings.simplefilter("ignore", pd.errors.DtypeWarning)
+        table = _cells(text, header, **options)
     altered = []
     for i, name in enumerate(header.names):
         is_number = pd.api.types.is_numeric_dtype(table[i])
@@ -383,7 +403,7 @@ def _cells(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
     lines = pd.Index(text.numbers[header.rows :], name="line")
     return pd.read_csv(
         # As bytes, for a `StringIO` takes four for each character.
-        io.BytesIO("\n".join(text.lines).encode()),
+        io.BytesIO(text.body.encode()),
         sep=text.mark or r"\s+",
         header=None,
         skiprows=header.rows,
