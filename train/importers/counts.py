@@ -138,8 +138,9 @@ class Trial:
             InputError: a time is missing, goes back or stands still.
         """
         order = clock.order(self.t, self.where, frame, numbers)
-        if order.text:
-            LOG.warning(f"{self.where}: {order.text}")
+        if not order.text:
+            return self
+        LOG.warning(f"{self.where}: {order.text}")
         kept = order.kept
         joints = None if self.joints is None else self.joints[kept]
         return replace(self, t=self.t[kept], values=self.values[kept], joints=joints)

@@ -608,4 +608,10 @@ def _understood(
     if np.isnan(numbers.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
-    return Measured(source, sense, numbers.in_order(str(rows.name), rows))
+    # The values stand in the numbers now; a long table would fill the memory twice.
+    emptied = replace(source.table, data=source.table.data.iloc[:0])
+    return Measured(
+        replace(source, table=emptied),
+        sense,
+        numbers.in_order(str(rows.name), rows),
+    )

@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import lzma
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -194,3 +195,23 @@ def test_a_number_beyond_measure_is_named(tmp_path):
 def test_columns_without_a_name_are_told_apart_by_their_places(tmp_path):
     table = read(tmp_path, ",t,,p1,\n0,0,7,1,\n1,1,8,2,\n")
     assert table.names == ["", "t", "column 3", "p1"]
+
+
+def test_a_long_text_is_held_once():
+    rows = "\n".join(f"{i / 100:.2f}{',1234' * 12}" for i in range(20_000))
+    data = f"t,{','.join(f's{i}' for i in range(1, 13))}\n{rows}\n".encode()
+    tracemalloc.start()
+    try:
+        text = reading._text(data)
+        held, highest = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(text.numbers) == 20_001
+    assert held < 1.5 * len(data)
+    assert highest < 4.0 * len(data)
+
+
+def test_a_column_that_holds_words_only_at_its_end_is_text(tmp_path):
+    rows = "\n".join(f"{i},7" for i in range(300_000))
+    table = read(tmp_path, f"t,object\n{rows}\n300000,cup\n")
+    assert table.data["object"].iloc[[0, -1]].tolist() == ["7", "cup"]
