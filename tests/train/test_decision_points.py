@@ -37,7 +37,7 @@ def test_a_model_has_the_decision_points_that_keep_it_small(
         chosen={"object": SimpleNamespace(choice=choice)},
         folds=np.zeros(trials),
         without=[],
-        tried=(),
+        candidates=(),
         window_s=1.2,
         notes=[],
     )

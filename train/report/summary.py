@@ -10,7 +10,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from edge.errors import printable
 from edge.touch import measures
-from edge.touch.doubts import LIMIT_TOLERANCE
+from train import outliers
 from train.choose import Chosen
 from train.dataset import DataSet
 from train.feature_sets import SETS, expand, moves
@@ -125,7 +125,7 @@ def warnings(fitted: Fitted) -> list[str]:
     """Sentences on data that make a model worse, or make it look better than it is."""
     dataset = fitted.dataset
     lines = [*_untouched(dataset), *_left_out(dataset)]
-    lines += _beyond_limits(fitted.measured)
+    lines += _outliers(fitted)
     longest = max(
         float(trial.recording.t[-1]) - trial.onset_s for trial in dataset.trials
     )
@@ -172,26 +172,21 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
         )
 
 
-def _beyond_limits(dataset: DataSet) -> Iterator[str]:
-    """A sentence on each recording with a joint angle beyond its limits."""
-    if dataset.chain is None:
+def _outliers(fitted: Fitted) -> Iterator[str]:
+    """Sentences on recordings far outside all others.
+
+    Features of single taxels are left out: most trials do not touch a taxel, so that
+    any touch of it lies far outside.
+    """
+    measured = fitted.measured
+    yield from outliers.by_joints(measured)
+    names = [n for n in measured.names if not measures.feature(n).wide]
+    names = [name for name in names if "kernels" not in name]
+    if not names:
         return
-    unlimited = (-np.inf, np.inf)
-    limits = np.array([pair or unlimited for pair in dataset.chain.limits])
-    for path, joints in {t.path: t.recording.joints for t in dataset.trials}.items():
-        if joints is None:
-            continue
-        excess = np.maximum(limits[:, 0] - joints, joints - limits[:, 1])
-        frames, of_joint = np.nonzero(excess > LIMIT_TOLERANCE)
-        if len(frames):
-            frame = frames[0]
-            joint = of_joint[0]
-            low, high = limits[joint]
-            yield (
-                f"warning: {path}: at frame {frame} joint {dataset.chain.names[joint]} "
-                f"is at {joints[frame, joint]:g}, beyond its limits of {low:g} and "
-                f"{high:g}; leave the recording out if it is wrong"
-            )
+    whole = measured.of(names)
+    X = whole.features(fitted.window_s, fitted.samples)
+    yield from outliers.by_features(whole, X, whole.widths(fitted.samples))
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

@@ -374,7 +374,7 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     ).sum(axis=0)
     assert (np.ptp(elastic, axis=0) > 0.1).all()
     np.testing.assert_allclose(t.bed.row_force, elastic, atol=1e-3)
-    np.testing.assert_allclose(viscous.given, viscous.ratio * elastic, atol=1e-3)
+    np.testing.assert_allclose(viscous.before, viscous.ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
