@@ -129,10 +129,10 @@ class ConfigTable:
         """The name of a key in errors."""
         return f"{self.where}: {self.prefix}{key}"
 
-    def fail(self, key: str, wanted: str, value: object = REQUIRED) -> InputError:
+    def fail(self, key: str, expected: str, value: object = REQUIRED) -> InputError:
         """Build the error for a bad value."""
         value = self.raw.get(key) if value is REQUIRED else value
-        return InputError(f"{self.called(key)} must be {wanted}, not {shown(value)}")
+        return InputError(f"{self.called(key)} must be {expected}, not {shown(value)}")
 
     def has(self, key: str) -> bool:
         """Whether a key is given; null counts as absent."""

@@ -66,6 +66,6 @@ def _text(check: Check, width: int) -> str:
     text = f"{verdict:<8} {check.name:<{width}} {check.rows:>6} rows"
     if check.passed:
         return text
-    seen = " ".join(check.seen.split())
+    value = " ".join(check.seen.split())
     expected = " ".join(check.expected.split())
-    return f"{text}; the worst is row {check.row}: {seen} instead of {expected}"
+    return f"{text}; the worst is row {check.row}: {value} instead of {expected}"

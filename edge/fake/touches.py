@@ -92,8 +92,8 @@ def _shear(counts: Floats, number: int) -> NDArray[np.int16]:
     grows = np.linspace(0.0, LARGEST_RATIO, len(counts))[:, None, None]
     pull = np.minimum(grows * counts, 32767.0)
     angle = (number + 0.5) * GOLDEN_ANGLE
-    parts = [pull * math.cos(angle), pull * math.sin(angle)]
-    return np.rint(np.stack(parts, axis=3)).astype(np.int16)
+    shear = [pull * math.cos(angle), pull * math.sin(angle)]
+    return np.rint(np.stack(shear, axis=3)).astype(np.int16)
 
 
 def still(file: SkinFile, seconds: float) -> Recording:

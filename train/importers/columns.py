@@ -147,7 +147,7 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
     time = _time_column(table, joints, options)
     rest = [name for name in table.names if name != time and name not in joints]
     taxels, shape = _taxels(table, rest, options)
-    for name in set(taxels).difference(rest):
+    for name in sorted(set(taxels).difference(rest)):
         raise InputError(
             f"{table.where}: column {name} is named both as a taxel and as time or joint"
         )

@@ -269,9 +269,10 @@ def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[
     for place in places:
         with _skipping(options):
             for source in read(place, folder, options):
-                labels, label = _label(place.relative_to(folder), counting, options)
                 if source.label:
-                    labels, label = source.labels, source.label
+                    yield source
+                    continue
+                labels, label = _label(place.relative_to(folder), counting, options)
                 yield replace(source, labels=labels, label=label)
 
 

@@ -102,7 +102,7 @@ UNUSABLE = pytest.mark.parametrize(
         (65535, 1.0, "rests at 65535; check the chips"),
     ],
 )
-"""Values and shares of a taxel that cannot be calibrated, and what is said of it."""
+"""Values and shares of a taxel that cannot be calibrated, and the sentence on it."""
 
 
 @pytest.fixture
@@ -197,10 +197,15 @@ def calibrated(edge, skin, quiet, tmp_path):
 SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
 
 
+def leant_on(skin, folder):
+    """The command that calibrates a skin on which something leans steadily."""
+    leant = shifted(skin, folder, 120, SIX)
+    return ("calibrate", "--skin", skin, "--fake", leant, "--frames", 50)
+
+
 def test_a_skin_that_something_leans_on_steadily_is_refused(edge, calibrated, tmp_path):
     before = calibrated.read_text()
-    leant = shifted(calibrated, tmp_path, 120, SIX)
-    words = ("calibrate", "--skin", calibrated, "--fake", leant, "--frames", 50)
+    words = leant_on(calibrated, tmp_path)
     status, _, err = edge(*words)
     assert status == 2
     assert "6 taxels side by side rest more than the onset" in err
@@ -223,9 +228,7 @@ def test_a_single_taxel_or_a_small_drift_is_calibrated(
 def test_a_first_calibration_under_a_contact_is_refused(edge, skin, quiet, tmp_path):
     saving.save(tmp_path / "rest.npz", recording.load(quiet))
     before = skin.read_text()
-    leant = shifted(skin, tmp_path, 120, SIX)
-    words = ("calibrate", "--skin", skin, "--fake", leant, "--frames", 50)
-    status, _, err = edge(*words)
+    status, _, err = edge(*leant_on(skin, tmp_path))
     assert status == 2
     assert "6 taxels side by side rest more than the onset" in err
     assert "beyond the others" in err
