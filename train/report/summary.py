@@ -179,7 +179,11 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     any touch of it lies far outside.
     """
     measured = fitted.measured
-    yield from outliers.by_joints(measured)
+    by_joints = list(outliers.by_joints(measured))
+    yield from by_joints[:NAMED]
+    more = len(by_joints) - NAMED
+    if more > 0:  # angles in degrees are beyond the limits in every recording
+        yield f"warning: {counted(more, 'further recording')} with such joint angles"
     names = [n for n in measured.names if not measures.feature(n).wide]
     names = [name for name in names if "kernels" not in name]
     if not names:

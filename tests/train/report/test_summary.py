@@ -156,3 +156,20 @@ def test_a_joint_angle_beyond_its_limits_is_named_with_file_and_frame(fitted):
     (line,) = said(wrong, "beyond its limits")
     assert f"{trial.path}: at frame 7 joint upper_arm_roll is at 10000" in line
     assert said(fitted, "beyond its limits") == []
+
+
+def test_angles_in_degrees_name_some_recordings_and_count_the_others(fitted):
+    trials = [
+        replace(
+            trial,
+            recording=replace(
+                trial.recording, joints=trial.recording.joints * 180.0 / np.pi
+            ),
+        )
+        for trial in fitted.measured.trials
+    ]
+    wrong = replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
+
+    assert len(said(wrong, "beyond its limits")) == 3
+    (line,) = said(wrong, "further recordings with such joint angles")
+    assert line.startswith(f"warning: {len(trials) - 3} ")
