@@ -35,6 +35,7 @@ FRAME = (
     "reach_along",  # further Jacobians
 )
 STEP = (
+    "follow",  # the contact's coordinates anew, within a frame
     "predict",  # the arm and the object without load
     "drag",  # the forces that hold the object
     "give_way",  # the object's compliance
