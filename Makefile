@@ -44,7 +44,7 @@ help:
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
-	@echo "  make soak          ten minutes of the loop in virtual time: memory and schedule"
+	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
 	@echo "  make soak-day      24 hours of the same at 15 Hz"
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
@@ -268,6 +268,7 @@ faults: $(DEV)
 
 soak: $(DEV)
 	$(BIN)/python -m tests.bench.soak
+	$(BIN)/python -m tests.bench.page_load
 
 soak-day: $(DEV)
 	$(BIN)/python -m tests.bench.soak --minutes 1440 --every 60 --rate 15

@@ -1,8 +1,8 @@
 """A small web server for one live page: it sends pictures and takes actions.
 
 It is made for a loop that must not be late. The loop leaves its latest picture with
-`show`, which never waits for a browser. One thread serves all browsers. It rests after
-every few steps, so that no number of requests holds the loop up. The page, its pictures
+`show`, which never waits for a browser. One thread serves all browsers. It rests longer
+than it works, so that no number of requests holds the loop up. The page, its pictures
 and its actions need the token of the link, so that no other site, user or machine can
 see them or act; the token is looked at before all else.
 """
@@ -56,9 +56,12 @@ MOST_CONNECTIONS = 32
 MOST_OF_ONE = 8
 """Connections of one address."""
 STEPS = 4
-"""Sockets that are served for each rest of the thread."""
-REST_S = 0.003
-SWITCH_S = 0.0005
+"""Connections that are accepted between two rests of the thread."""
+RESTS = 9.0
+"""The thread rests so many times as long as it has worked: it takes a tenth of a
+processor at most."""
+LONGEST_REST_S = 0.1
+SWITCH_S = 0.0001
 """The loop waits at most about so long for this thread."""
 PIECE = 1 << 18
 """Bytes that a browser has to take within `SLOW_S`."""
@@ -66,15 +69,20 @@ TEXT = "text/plain; charset=utf-8"
 
 
 class RestingSelector(selectors.DefaultSelector):
-    """Rests whenever sockets are ready, the longer the more they are."""
+    """Rests after all work, the longer the longer this took."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._rested = time.thread_time()
 
     def select(
         self, timeout: float | None = None
     ) -> list[tuple[selectors.SelectorKey, int]]:
         """The sockets that are ready."""
-        ready = super().select(timeout)
-        time.sleep(REST_S * -(-len(ready) // STEPS))
-        return ready
+        worked = time.thread_time() - self._rested
+        time.sleep(min(RESTS * worked, LONGEST_REST_S))
+        self._rested = time.thread_time()
+        return super().select(timeout)
 
 
 class WebServer:
@@ -102,6 +110,8 @@ class WebServer:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._listener = socket.socket(family, socket.SOCK_STREAM)
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # So that no client has megabytes taken that nobody reads.
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 * LARGEST_HEAD)
         try:
             with refusing(f"--web {address}: cannot be listened at"):
                 self._listener.bind((host, port))
@@ -154,8 +164,10 @@ class WebServer:
             self._serve,
             sock=self._listener,
             limit=LARGEST_HEAD,
-            backlog=MOST_CONNECTIONS,
+            backlog=STEPS,
         )
+        # asyncio accepts as many connections between two rests as it was told may wait.
+        self._listener.listen(MOST_CONNECTIONS)
         while not self._closing:
             await asyncio.sleep(PICTURE_S / 2)
         server.close()

@@ -50,6 +50,8 @@ class Convergence:
             whose error is at most `LITTLE_GAIN` times the smallest.
         error: the error of that step.
         within: whether it is within the tolerance.
+        error_as_given: the distance from the reference run at the step that the trials
+            had.
     """
 
     steps_s: tuple[float, ...]
@@ -58,6 +60,7 @@ class Convergence:
     step_s: float
     error: float
     within: bool
+    error_as_given: float
 
 
 def kinds(
@@ -153,7 +156,9 @@ def measure(
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
-    judged = [_judged(kind, tolerance) for kind in kinds]
+    as_given = [_Kind(kind.specs) for kind in kinds]
+    _run(scene, [(kind, kind.specs[0].step_s) for kind in as_given])
+    judged = [_judged(*pair, tolerance) for pair in zip(kinds, as_given, strict=True)]
     return dict(zip(trials_by_kind, judged, strict=True))
 
 
@@ -194,8 +199,9 @@ def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
     return np.split(values, np.cumsum([len(kind.specs) for kind in kinds])[:-1])
 
 
-def _judged(kind: _Kind, tolerance: float) -> Convergence:
+def _judged(kind: _Kind, as_given: _Kind, tolerance: float) -> Convergence:
     reference = kind.forces.pop()
+    error_as_given = _distance(as_given.forces[0], reference)
     distances = [_distance(force, reference) for force in kind.forces]
     errors = (*map(max, distances, kind.errors()), distances[-1])
     smallest = min(errors)
@@ -205,7 +211,13 @@ def _judged(kind: _Kind, tolerance: float) -> Convergence:
     )
     order = _order(kind.changes())
     return Convergence(
-        tuple(kind.steps_s), errors, order, step_s, error, error <= tolerance
+        tuple(kind.steps_s),
+        errors,
+        order,
+        step_s,
+        error,
+        error <= tolerance,
+        error_as_given,
     )
 
 

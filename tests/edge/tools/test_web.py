@@ -248,3 +248,15 @@ def test_a_stream_gets_every_new_picture_and_ends_quietly(server, caplog):
     assert caplog.text == ""
     assert received.startswith(b"HTTP/1.1 200 OK\r\n")
     assert b"Content-Type: text/event-stream" in received
+
+
+def test_requests_take_a_tenth_of_a_processor_at_most(server):
+    clock = time.pthread_getcpuclockid(server._thread.ident)
+    ask(server, token="x")  # loads what the first request needs
+    began = time.monotonic()
+    worked = -time.clock_gettime(clock)
+    for _ in range(40):
+        ask(server, token="x")
+    worked += time.clock_gettime(clock)
+    # One rest of ten may still be due.
+    assert 0.0 < worked < 0.12 * (time.monotonic() - began)
