@@ -140,12 +140,23 @@ class FitOptions(Fixed):
         )
 
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
-        """The choice of the settings of some trials."""
+        """The choice of the settings of some trials.
+
+        Raises:
+            InputError: `k` is not possible where some of them are left out.
+        """
+        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
+        most = divisions.fewest_left
+        if self.k is not None and not 1 <= self.k <= most:
+            raise InputError(
+                f"k must be 1 to {most}, the trials that remain of "
+                f"{len(divisions.folds)} where some are left out, not {self.k}"
+            )
         return Choosing(
             dataset,
             y,
             self.candidates_for(dataset, y, drawn=drawn),
-            Divisions.of(dataset, y, self.leave_out, self.quick),
+            divisions,
             self.samples,
             self.processes,
             self.progress,
@@ -216,7 +227,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     y = _labels(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
-    _check_size(len(loaded.dataset.trials), fixed.k)
+    _check_size(len(loaded.dataset.trials))
     settings = choose(loaded, y, fixed)
     if loaded.dataset.is_own is not None:
         y = {task: y[task] for task in settings.chosen}
@@ -371,12 +382,10 @@ def _labels(dataset: DataSet, tasks: Sequence[str] | None) -> Labels:
     return {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
 
 
-def _check_size(trials: int, k: int | None) -> None:
+def _check_size(trials: int) -> None:
     if trials < FEWEST_TRIALS:
         number = "1 trial is" if trials == 1 else f"{trials} trials are"
         raise InputError(f"{number} too few to fit; record at least {FEWEST_TRIALS}")
-    if k is not None and not 1 <= k <= trials - 1:
-        raise InputError(f"k must be 1 to {trials - 1} with {trials} trials, not {k}")
 
 
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:

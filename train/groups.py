@@ -149,6 +149,15 @@ class Divisions:
     others: tuple[Integers, ...]
     groups: Groups | None
 
+    @property
+    def fewest_left(self) -> int:
+        """The smallest number of trials that remain where a fold is left out."""
+        divisions = [self.folds, *self.others]
+        if self.groups is not None:
+            divisions.append(self.groups.folds)
+        largest = max(np.bincount(folds[folds >= 0]).max() for folds in divisions)
+        return len(self.folds) - int(largest)
+
     @classmethod
     def of(
         cls,

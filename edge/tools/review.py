@@ -96,12 +96,15 @@ def kinds(meta: Mapping[str, Any]) -> list[str]:
 
 
 def accepted(meta: Mapping[str, Any]) -> dict[str, str]:
-    """{task: label} that accepts the decisions of a kept touch, where they name a
-    label."""
+    """{task: label} that accepts the decisions of a kept touch, where they name a label
+    and nobody has given one yet."""
+    labels = meta.get("labels", {})
     return {
         task: answer["label"]
         for task, answer in decisions(meta).items()
-        if isinstance(answer["label"], str) and answer["label"] != UNKNOWN
+        if task not in labels
+        and isinstance(answer["label"], str)
+        and answer["label"] != UNKNOWN
     }
 
 

@@ -57,7 +57,8 @@ class Chain:
         """Make a chain of joints; a joint of the kind "fixed" takes no angle.
 
         Raises:
-            InputError: a joint's axis has no direction, or its limits are swapped.
+            InputError: a joint's axis has no direction, or its limits are swapped; two
+                joints that move have one name.
         """
         self.joints = tuple(joints)
         self.base = base
@@ -67,6 +68,12 @@ class Chain:
         """Number of angles that `pose` takes."""
         self.names = tuple(joint.name for joint in moving)
         """The moving joints' names, in the order of the angles."""
+        for name in self.names:
+            if self.names.count(name) > 1:
+                raise InputError(
+                    f"two joints are named {name!r}; angles come by name, so each needs "
+                    "one of its own"
+                )
         self.limits = tuple(joint.limits for joint in moving)
         """(lower, upper) of each moving joint in radians, or metres if it slides; or
         None."""

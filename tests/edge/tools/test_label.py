@@ -187,13 +187,13 @@ def test_a_touch_is_listed_with_its_decisions_and_what_asks_for_a_look(kept, edg
     assert line["kinds"] == ["unsure", "unlabelled"]
 
 
-def test_a_decision_is_accepted_where_it_names_a_label(kept, edge):
+def test_a_decision_is_accepted_where_it_names_a_label_and_nobody_has(kept, edge):
     edge("label", kept, "--accept", "--yes")
     after = {path.stem: load(path).labels for path in find([str(kept)])}
     assert after == {
         "sure": {"softness": "soft"},
         "unsure": {"softness": "hard"},
-        "wrong": {"softness": "hard"},
+        "wrong": {"softness": "soft"},
         "unknown": {"softness": "soft"},
     }
 

@@ -36,6 +36,11 @@ def test_what_is_unknown_or_out_of_range_is_not_accepted():
     assert review.accepted(given) == {"a": "x"}
 
 
+def test_what_a_person_has_labelled_is_not_accepted_otherwise():
+    given = kept_meta({"a": "y"}, a=("x", 0.9), b=("z", 0.9))
+    assert review.accepted(given) == {"b": "z"}
+
+
 def test_a_recording_is_selected_by_all_words():
     given = kept_meta({"b": "z"}, a=("x", 0.5))
     assert review.selected(given, [])

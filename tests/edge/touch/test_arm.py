@@ -91,6 +91,7 @@ def test_missing_extra_and_non_finite_angles_are_named(q, word):
             "joint 'hip': axis must be a list of 3",
         ),
         ("[[joint]]\naxis = [0, 0, 1]\noffset = 1", "joint 0: unknown key offset"),
+        ("[[joint]]\nname = 'a'\naxis = [0, 0, 1]\n" * 2, "two joints are named 'a'"),
     ],
 )
 def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
