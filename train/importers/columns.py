@@ -225,6 +225,10 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
             f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
             "angles by --joints"
         )
+    if not rest:
+        raise InputError(
+            f"{table.where}: no column is left for taxels beside the time and the joints"
+        )
     if not grids:
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
         raise InputError(

@@ -101,7 +101,7 @@ def test_columns_are_named_by_names_ranges_and_places(wanted, names):
         ({"taxels": "s3"}, "has no column s3"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
-        ({"joints": "s1,s2"}, "no columns are named as taxels"),
+        ({"joints": "s1,s2"}, "no column is left for taxels"),
         ({"time": "s1,s2"}, "--time names several columns"),
     ],
 )
