@@ -68,6 +68,7 @@ SETS = (
 )
 """The features of the extra trees and of CALIMERA."""
 NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
+TREES_FIXED = "extra trees, fixed window"
 PEERS = ("extra trees", "their SPRT", "CALIMERA")
 MARGINS = np.linspace(0.0, 8.0, 33)
 """Leads of the log probabilities, for the ratio test."""
@@ -91,19 +92,20 @@ def once_certain(certainty, right, limits):
 
 
 def extra_trees(X, labels, folds):
-    """Extra trees at each decision point, X (points, n, p), that decide when sure, and
-    by the ratio test, which waits until the evidence for a class leads by a margin."""
+    """Extra trees at each decision point, X (points, n, p): at fixed windows, when sure,
+    and by the ratio test, which waits until the evidence for a class leads by a margin."""
     model = ExtraTreesClassifier(random_state=0)
     options = {"cv": PredefinedSplit(folds), "method": "predict_proba"}
     shares = np.stack([cross_val_predict(model, x, labels, **options) for x in X])
     classes = np.unique(labels)
     right = classes[shares.argmax(axis=2)] == labels
+    fixed = list(zip(SECONDS, 1.0 - right.mean(axis=1), strict=True))
     sure = once_certain(shares.max(axis=2), right, THRESHOLDS)
     evidence = np.log(np.maximum(shares, 1e-3)).cumsum(axis=0)
     right = classes[evidence.argmax(axis=2)] == labels
     ordered = np.sort(evidence, axis=2)
     lead = ordered[..., -1] - ordered[..., -2]
-    return sure, once_certain(lead, right, MARGINS)
+    return fixed, sure, once_certain(lead, right, MARGINS)
 
 
 def halts(known, new, waiting):
@@ -175,9 +177,10 @@ def of_aeon(make, series, labels, folds):
 def peers(by_set, series, labels, folds):
     """{peer: its curves on a task, one for each set of features}, and {rule of aeon:
     its point}."""
-    curves = {name: [] for name in PEERS}
+    curves = {name: [] for name in (TREES_FIXED, *PEERS)}
     for X in by_set:
-        sure, ratio = extra_trees(X, labels, folds)
+        fixed, sure, ratio = extra_trees(X, labels, folds)
+        curves[TREES_FIXED].append(fixed)
         curves["extra trees"].append(sure)
         curves["their SPRT"].append(ratio)
         curves["CALIMERA"].append(calimera(X, labels, folds))
@@ -298,8 +301,10 @@ def compare(judged, seconds):
     means = rivals.mean(axis=1)
     best = rivals[np.nan_to_num(means, nan=np.inf).argmin()]
     trials = judged[0].trials
+    trees = [at(of_set.rivals[TREES_FIXED], seconds) for of_set in judged]
     return {
         "fixed window, % wrong": cell(fixed.mean()),
+        TREES_FIXED: cell(np.mean(trees)),
         "when sure": cell(sure.mean()),
         "gain": difference(fixed, sure, trials),
         **dict(zip(PEERS, map(cell, means), strict=True)),
