@@ -109,6 +109,7 @@ class Touch:
         slope_rad: slope of the table along the push.
         taxel_n_m: stiffness of the pads.
         speed, stiffness: of the arm, in units of Cody's; its damping ratio stays.
+        elbow: speed of the elbow, in units of the shoulder's.
         noise: standard deviation in counts, and its stream.
     """
 
@@ -122,6 +123,7 @@ class Touch:
     taxel_n_m: float = 10e3
     speed: float = 1.0
     stiffness: float = 1.0
+    elbow: float = 0.0
     noise: tuple[float, np.random.Generator] | None = None
 
     @property
@@ -141,7 +143,8 @@ class Touch:
     @property
     def rate_rad_s(self):
         """(dof,) speed of the equilibrium point: the first joint swings."""
-        return np.eye(ARM.dof)[0] * math.radians(RATE_DEG_S * self.speed)
+        directions = np.array([1.0, 0.0, 0.0, self.elbow, 0.0])
+        return directions * math.radians(RATE_DEG_S * self.speed)
 
     @property
     def lag_rad(self):

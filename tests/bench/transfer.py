@@ -43,9 +43,12 @@ HABITS = {
     "arm stiffness x 2": {"stiffness": 2.0},
     "taxels x 0.4": {"taxel_n_m": 0.4},
     "taxels x 2.5": {"taxel_n_m": 2.5},
+    "elbow bends x 0.4": {"elbow": 0.4},
+    "elbow stretches x 0.4": {"elbow": -0.4},
+    "posture x 4": {"start_rad": 4.0},
     ODD: {},
 }
-"""Factors of what `draw_touch` draws. The objects take turns."""
+"""Factors of what `draw_touch` draws, and the elbow's speed. The objects take turns."""
 SLIDES_M = 0.02
 WINDOW_S = 1.2
 """A movable object has moved this far by the end of the window, as in the scenes and
@@ -120,9 +123,13 @@ def draw_touch(thing, fixed, rng, habit):
         slope_rad=math.radians(rng.normal(0.0, 0.7)),
         taxel_n_m=log_uniform(rng, 5e3, 1.5e4),
         noise=(6.0, rng),
+        elbow=HABITS[habit].get("elbow", 0.0),
     )
-    factors = HABITS[habit].items()
-    return replace(touch, **{name: getattr(touch, name) * by for name, by in factors})
+    changed = {}
+    for name, by in HABITS[habit].items():
+        if name != "elbow":
+            changed[name] = np.multiply(getattr(touch, name), by)
+    return replace(touch, **changed)
 
 
 def touch_object(index, seed, habit):
@@ -201,6 +208,6 @@ if __name__ == "__main__":
         __doc__,
         ("--model", Path, "model.onnx"),
         ("--out", Path("build/transfer"), "folder"),
-        ("--trials", 96, "two of each object"),
+        ("--trials", 132, "two of each object"),
         ("--seed", 1, "of the test set"),
     )
