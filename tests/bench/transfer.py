@@ -170,16 +170,29 @@ def judged_tasks(model):
     return {name: task for name, task in model.info.tasks.items() if name in TASKS}
 
 
+def right_rows(summaries, tasks):
+    """A row of right decisions for each {name: summary}."""
+    rows = []
+    for name, summary in summaries.items():
+        row = {"trials": name, "number": summary.recordings}
+        for task in tasks:
+            row[f"{task} right"] = summary.right(task)[0]
+        rows.append(row)
+    return rows
+
+
 def measure(model, out, trials, seed):
     """Make the trials, save them in a folder for each habit, and print how the model
     decides them.
 
-    The tables have right decisions by habit and in all, contacts called unknown, and
-    each task's confusion. A contact without a decision counts as wrong.
+    The tables have right decisions by habit, by kind of thing and in all, contacts
+    called unknown, and each task's confusion. A contact without a decision counts as
+    wrong.
     """
     loaded = Model(model)
     tasks = judged_tasks(loaded)
-    summaries = {habit: Summary(tasks) for habit in (*HABITS, "all")}
+    by_habit = {habit: Summary(tasks) for habit in (*HABITS, "all")}
+    by_kind = {}
     unknown = 0
     for number, habit, recording in touches(seed, trials):
         labels = recording.labels
@@ -189,16 +202,12 @@ def measure(model, out, trials, seed):
         save(path, recording)
         events = decide(loaded, recording, str(path))
         unknown += any(UNKNOWN in event.get("flags", ()) for event in events)
-        for name in (habit, "all"):
-            summaries[name].add(labels, events)
-    rows = []
-    for name, summary in summaries.items():
-        row = {"trials": name, "number": summary.recordings}
-        for task in tasks:
-            row[f"{task} right"] = summary.right(task)[0]
-        rows.append(row)
-    tables.write("transfer", [rows])
-    whole = summaries["all"]
+        by_habit[habit].add(labels, events)
+        by_habit["all"].add(labels, events)
+        by_kind.setdefault(labels["object"], Summary(tasks)).add(labels, events)
+    written = [right_rows(by_habit, tasks), right_rows(by_kind, tasks)]
+    tables.write("transfer", written)
+    whole = by_habit["all"]
     print(f"unknown: {unknown} of {whole.recordings}\n\n{whole.text()}")
 
 
