@@ -101,7 +101,7 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (["-k", "99"], "k must be 1 to 8, the trials that remain of 16"),
+        (["-k", "99"], "k must be 1 to 14, the trials that remain of 16"),
         (["--threshold", "200", "--onset", "100"], "onset_counts 100 is below"),
         (["--tasks", "colour"], "label 'colour'; all have category, object"),
         (["--data", "."], ".: no .npz recording in this folder"),
