@@ -208,9 +208,11 @@ def _taxels(
     whole = [names for names in arrays if len(names) == math.prod(table.shape)]
     if table.shape and len(whole) == 1:
         return whole[0], ()
-    if table.named or not rest:
-        return _running(table, rest)
-    return rest, ()
+    if not rest:
+        raise InputError(
+            f"{table.where}: no column is left for taxels beside the time and the joints"
+        )
+    return _running(table, rest) if table.named else (rest, ())
 
 
 def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, ...]]:
@@ -224,10 +226,6 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
         raise InputError(
             f"{table.where}: are the taxels {spans}? Name them by --taxels, and joint "
             "angles by --joints"
-        )
-    if not rest:
-        raise InputError(
-            f"{table.where}: no column is left for taxels beside the time and the joints"
         )
     if not grids:
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
