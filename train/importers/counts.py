@@ -205,16 +205,21 @@ class Rest:
             skin["axes"] = axes
         # A part at a time, as a long recording would else fill the memory several
         # times.
-        starts = range(0, len(valid), PART)
-        parts = [self._counts(trial, valid, slice(at, at + PART)) for at in starts]
-        counts = np.concatenate(parts).reshape(-1, *shape, axes)
+        frames = np.empty((len(valid), *shape), np.uint16)
+        shear = np.empty((*frames.shape, 2), np.int16) if axes == 3 else None
+        for at in range(0, len(valid), PART):
+            part = slice(at, at + PART)
+            counts = self._counts(trial, valid, part).reshape(-1, *shape, axes)
+            frames[part] = counts[..., 0]
+            if shear is not None:
+                shear[part] = counts[..., 1:]
         return Recording(
             t=trial.t - trial.t[0],
-            frames=counts[..., 0].astype(np.uint16),
+            frames=frames,
             joints=trial.joints,
             valid=None if valid.all() else valid.reshape(-1, *shape),
             meta={**meta, "skin": skin, **values},
-            shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
+            shear=shear,
         )
 
     def _counts(
