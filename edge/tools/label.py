@@ -74,8 +74,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             option, action="append", default=[], type=kind, metavar=metavar, help=text
         )
     for option, text in {
-        "--accept": "label kept touches as they were decided; labels stay that a person "
-        "has given",
+        "--accept": "label kept touches as they were decided, in tasks without a label",
         "--delete": "delete the recordings",
         "--undo": "take the last change in a folder back",
         "--yes": "change the recordings without a question",

@@ -287,7 +287,7 @@ def _accepted(name: str, trial: Recording) -> dict[str, str]:
     """
     labels = review.accepted(trial.meta)
     if not labels:
-        raise InputError(f"{name}: no decision names a label to accept that it lacks")
+        raise InputError(f"{name}: no decision names a label that it does not have yet")
     return labels
 
 

@@ -9,6 +9,7 @@ see them or act; the token is looked at before all else.
 
 import asyncio
 import json
+import math
 import secrets
 import selectors
 import socket
@@ -58,9 +59,11 @@ MOST_OF_ONE = 8
 STEPS = 4
 """Connections that are accepted between two rests of the thread."""
 RESTS = 9.0
-"""The thread rests so many times as long as it has worked: it takes a tenth of a
+"""The thread rests so many times as long as it has worked: requests take a tenth of a
 processor at most."""
 LONGEST_REST_S = 0.1
+"""After an action of the page that takes longer than a picture, nobody has to wait ten
+times as long."""
 SWITCH_S = 0.0001
 """The loop waits at most about so long for this thread."""
 PIECE = 1 << 18
@@ -73,14 +76,14 @@ class RestingSelector(selectors.DefaultSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        self._rested = time.thread_time()
+        self._rested = math.inf  # the thread has not worked yet
 
     def select(
         self, timeout: float | None = None
     ) -> list[tuple[selectors.SelectorKey, int]]:
         """The sockets that are ready."""
         worked = time.thread_time() - self._rested
-        time.sleep(min(RESTS * worked, LONGEST_REST_S))
+        time.sleep(min(max(RESTS * worked, 0.0), LONGEST_REST_S))
         self._rested = time.thread_time()
         return super().select(timeout)
 
@@ -116,6 +119,8 @@ class WebServer:
             with refusing(f"--web {address}: cannot be listened at"):
                 self._listener.bind((host, port))
                 self._listener.listen(MOST_CONNECTIONS)
+                # Here, so that a lack of descriptors is told to whoever starts it.
+                self._loop = asyncio.SelectorEventLoop(RestingSelector())
         except EdgeError:
             self._listener.close()
             raise
@@ -151,10 +156,7 @@ class WebServer:
         self._thread.join()
 
     def _run(self) -> None:
-        def loop() -> asyncio.AbstractEventLoop:
-            return asyncio.SelectorEventLoop(RestingSelector())
-
-        with asyncio.Runner(loop_factory=loop) as runner:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
             runner.run(self._listen())
 
     async def _listen(self) -> None:

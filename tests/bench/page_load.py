@@ -4,8 +4,8 @@
 the fake at 100 Hz, several times: without any request, with one browser that watches,
 and under each kind of load. It prints the ticks that were left out and the periods of
 the loop. The clients have a processor of their own, as on another machine, where there
-are two or more.
-The exit status is 1 where a load left out more ticks than chance explains.
+are two or more. The exit status is 1 where a load left out more ticks than chance
+explains.
 """
 
 import contextlib
@@ -28,6 +28,8 @@ from tests.bench.program import start
 WAIT_S = 20.0
 """Most time for the program to end."""
 PERIODS = (50, 99, 99.9)
+CONNECTIONS = 40
+"""Connections of a client that holds them open."""
 
 
 def asked(link, request):
@@ -71,16 +73,14 @@ def endless_head(link):
 
 
 def hanging(link):
-    """Hold 40 connections open, with a byte a second each; 25 of these make 1,000."""
+    """Hold connections open, with a byte a second each."""
     place = urlsplit(link)
     clients = []
     while True:
-        while len(clients) < 40:
+        for _ in range(CONNECTIONS - len(clients)):
             with contextlib.suppress(OSError):
                 address = place.hostname, place.port
                 clients.append(socket.create_connection(address, 2.0))
-                continue
-            break
         alive = []
         for client in clients:
             with contextlib.suppress(OSError):

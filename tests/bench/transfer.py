@@ -123,12 +123,11 @@ def draw_touch(thing, fixed, rng, habit):
         slope_rad=math.radians(rng.normal(0.0, 0.7)),
         taxel_n_m=log_uniform(rng, 5e3, 1.5e4),
         noise=(6.0, rng),
-        elbow=HABITS[habit].get("elbow", 0.0),
     )
     changed = {}
     for name, by in HABITS[habit].items():
-        if name != "elbow":
-            changed[name] = np.multiply(getattr(touch, name), by)
+        drawn = getattr(touch, name)
+        changed[name] = by if name == "elbow" else np.multiply(drawn, by)
     return replace(touch, **changed)
 
 

@@ -113,6 +113,16 @@ class _Kind:
     steps_s: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
 
+    @property
+    def tried(self) -> bool:
+        """Whether the step that the trials have is among those tried."""
+        return self.specs[0].step_s in self.steps_s
+
+    @property
+    def force_as_given(self) -> Array:
+        """The force at the step that the trials have."""
+        return self.forces[self.steps_s.index(self.specs[0].step_s)]
+
     def changes(self) -> list[float]:
         """How far each step's force lies from that of the next."""
         return list(map(_distance, self.forces, self.forces[1:]))
@@ -156,9 +166,12 @@ def measure(
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
-    as_given = [_Kind(kind.specs) for kind in kinds]
-    _run(scene, [(kind, kind.specs[0].step_s) for kind in as_given])
-    judged = [_judged(*pair, tolerance) for pair in zip(kinds, as_given, strict=True)]
+    as_given = [kind if kind.tried else _Kind(kind.specs) for kind in kinds]
+    untried = [kind for kind in as_given if not kind.tried]
+    _run(scene, [(kind, kind.specs[0].step_s) for kind in untried])
+    judged = []
+    for kind, with_given in zip(kinds, as_given, strict=True):
+        judged.append(_judged(kind, with_given.force_as_given, tolerance))
     return dict(zip(trials_by_kind, judged, strict=True))
 
 
@@ -199,9 +212,9 @@ def _by_kind(values: Array, kinds: list[_Kind]) -> list[Array]:
     return np.split(values, np.cumsum([len(kind.specs) for kind in kinds])[:-1])
 
 
-def _judged(kind: _Kind, as_given: _Kind, tolerance: float) -> Convergence:
+def _judged(kind: _Kind, force_as_given: Array, tolerance: float) -> Convergence:
     reference = kind.forces.pop()
-    error_as_given = _distance(as_given.forces[0], reference)
+    error_as_given = _distance(force_as_given, reference)
     distances = [_distance(force, reference) for force in kind.forces]
     errors = (*map(max, distances, kind.errors()), distances[-1])
     smallest = min(errors)

@@ -286,7 +286,7 @@ def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, kept):
 
 def test_a_touch_without_decisions_has_none_to_accept(folder_page):
     with pytest.raises(
-        InputError, match="no decision names a label to accept that it lacks"
+        InputError, match="no decision names a label that it does not have"
     ):
         folder_page._act({"do": "accept", "file": "a.npz"})
 

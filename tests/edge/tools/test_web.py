@@ -260,3 +260,15 @@ def test_requests_take_a_tenth_of_a_processor_at_most(server):
     worked += time.clock_gettime(clock)
     # One rest of ten may still be due.
     assert 0.0 < worked < 0.12 * (time.monotonic() - began)
+
+
+def test_a_lack_of_descriptors_is_told_at_the_start():
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with socket.socket() as free:
+        listener = free.fileno()
+    with ExitStack() as stack:
+        # One is left, for the listener.
+        resource.setrlimit(resource.RLIMIT_NOFILE, (listener + 1, limits[1]))
+        stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+        with pytest.raises(InputError, match="cannot be listened at: Too many open"):
+            WebServer("127.0.0.1:0", print)
