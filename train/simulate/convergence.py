@@ -166,13 +166,19 @@ def measure(
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
+    judged = []
+    for kind, force in zip(kinds, _forces_as_given(scene, kinds), strict=True):
+        judged.append(_judged(kind, force, tolerance))
+    return dict(zip(trials_by_kind, judged, strict=True))
+
+
+def _forces_as_given(scene: Scene, kinds: list[_Kind]) -> list[Array]:
+    """The forces at the steps that the trials have, of which those not tried yet are
+    run."""
     as_given = [kind if kind.tried else _Kind(kind.specs) for kind in kinds]
     untried = [kind for kind in as_given if not kind.tried]
     _run(scene, [(kind, kind.specs[0].step_s) for kind in untried])
-    judged = []
-    for kind, with_given in zip(kinds, as_given, strict=True):
-        judged.append(_judged(kind, with_given.force_as_given, tolerance))
-    return dict(zip(trials_by_kind, judged, strict=True))
+    return [kind.force_as_given for kind in as_given]
 
 
 def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
