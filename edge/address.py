@@ -7,7 +7,11 @@ from edge.files import refusing
 
 
 def parse_address(
-    option: str, text: str, example: str, host: str = "", ports: range = range(65536)
+    option: str,
+    text: str,
+    example: str,
+    host: str = "",
+    ports: range = range(65536),
 ) -> tuple[str, int]:
     """Host and port of `HOST:PORT`, or of `PORT` alone where there is a default host.
 
@@ -30,11 +34,16 @@ def sender_to(option: str, address: str) -> socket.socket:
         InputError: the address is not of that form, or its host is unknown.
     """
     host, port = parse_address(
-        option, address, "127.0.0.1:47400", ports=range(1, 65536)
+        option,
+        address,
+        "127.0.0.1:47400",
+        ports=range(1, 65536),
     )
     with refusing(f"{option}{address}: cannot be reached"):
         family, kind, protocol, _, where = socket.getaddrinfo(
-            host, port, type=socket.SOCK_DGRAM
+            host,
+            port,
+            type=socket.SOCK_DGRAM,
         )[0]
         sender = socket.socket(family, kind, protocol)
         sender.setblocking(False)

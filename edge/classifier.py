@@ -339,7 +339,11 @@ class Classifier:
         return number if self._max_contacts > 1 else None
 
     def _decide(
-        self, pending: Pending, began: float, *, short: bool = False
+        self,
+        pending: Pending,
+        began: float,
+        *,
+        short: bool = False,
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
         point = pending.decision_point
@@ -364,7 +368,11 @@ class Classifier:
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
     def _blank(
-        self, pending: Pending, series: FeatureSeries, window_s: float, short: bool
+        self,
+        pending: Pending,
+        series: FeatureSeries,
+        window_s: float,
+        short: bool,
     ) -> Decided:
         """An answer about a contact, with the doubts of its frames, without task and
         label."""
@@ -416,7 +424,9 @@ class Classifier:
             answer: Decided | None = self._answer(candidate, decisions[task], unknown)
             if answer is not None and self._policies:
                 answer = self._policies[task].answer(
-                    answer, pending.decision_point, pending.decided
+                    answer,
+                    pending.decision_point,
+                    pending.decided,
                 )
             if answer is not None:
                 pending.decided[task] = answer

@@ -54,7 +54,9 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         "thresholds and save run the workstation's commands.",
     )
     top.add_argument(
-        "--version", action="version", version=f"edge-classify {__version__}"
+        "--version",
+        action="version",
+        version=f"edge-classify {__version__}",
     )
     for command in add_commands(top, {name: COMMANDS[name] for name in names}):
         flag = partial(command.add_argument, action="store_true")

@@ -48,7 +48,9 @@ def _finite(text: str) -> float:
 
 
 _DECODER = json.JSONDecoder(
-    parse_int=_whole, parse_float=_finite, parse_constant=_finite
+    parse_int=_whole,
+    parse_float=_finite,
+    parse_constant=_finite,
 )
 
 

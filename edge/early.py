@@ -38,7 +38,10 @@ class Policy(Protocol):
     """When and how a task is decided."""
 
     def answer(
-        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
+        self,
+        candidate: Decided,
+        point: int,
+        decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
@@ -56,7 +59,10 @@ class Uncertified:
         self._full = len(info.decision_points_s) - 1
 
     def answer(
-        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
+        self,
+        candidate: Decided,
+        point: int,
+        decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The model's answer at the last decision point."""
         if point < self._full:
@@ -69,7 +75,11 @@ class Early:
     """Decide at the first decision point that is sure enough, or at the rule's last."""
 
     def __init__(
-        self, info: ModelInfo, task: str, rule: StoppingRule, error: float
+        self,
+        info: ModelInfo,
+        task: str,
+        rule: StoppingRule,
+        error: float,
     ) -> None:
         """Follow a rule.
 
@@ -87,7 +97,10 @@ class Early:
         self._names_unknown = info.novelty is not None and info.novelty.task == task
 
     def answer(
-        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
+        self,
+        candidate: Decided,
+        point: int,
+        decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The answer at a decision point; None if the task goes on waiting.
 
@@ -118,7 +131,9 @@ class Early:
         if UNKNOWN in candidate.flags and self._names_unknown and novelty is not None:
             rate = novelty.rate(point, _decision(candidate).novelty)
             candidate = replace(
-                candidate, label=UNKNOWN, confidence=round(1.0 - rate, 6)
+                candidate,
+                label=UNKNOWN,
+                confidence=round(1.0 - rate, 6),
             )
         elif not sure and not self._rule.fixed:
             candidate = replace(candidate, flags=(*candidate.flags, "unsure"))
@@ -130,7 +145,10 @@ class Product(Early):
     """Decide when both factors are, by their labels."""
 
     def answer(
-        self, candidate: Decided, point: int, decided: Mapping[str, Decided]
+        self,
+        candidate: Decided,
+        point: int,
+        decided: Mapping[str, Decided],
     ) -> Decided | None:
         """The answer once both factors have theirs."""
         factors = self._task.factors
@@ -149,7 +167,10 @@ class Product(Early):
         decision = _decision(candidate)._replace(label=label)
         confidence = round(confidence, 6)
         candidate = replace(
-            candidate, label=label, confidence=confidence, decision=decision
+            candidate,
+            label=label,
+            confidence=confidence,
+            decision=decision,
         )
         return self._answered(candidate, point, sure)
 

@@ -73,7 +73,9 @@ def open_regular(path: str | os.PathLike[str], at_most: int) -> Iterator[BinaryI
         # Without O_NONBLOCK, opening a FIFO waits until another process opens it for
         # writing.
         file = open(  # noqa: SIM115 - closed by the with statement below
-            name, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)
+            name,
+            "rb",
+            opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK),
         )
     with file:
         status = os.fstat(file.fileno())

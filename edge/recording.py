@@ -162,7 +162,10 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
 
 
 def _typed(
-    name: str, values: Any, dtype: type, *shapes: tuple[int, ...]
+    name: str,
+    values: Any,
+    dtype: type,
+    *shapes: tuple[int, ...],
 ) -> NDArray[Any]:
     """An array that must have a type and one of some shapes; floats become float64."""
     array: NDArray[Any] = np.asarray(values)
@@ -175,7 +178,9 @@ def _typed(
 
 
 def _frames(
-    values: Any, skin: Mapping[str, Any], scale: float | None
+    values: Any,
+    skin: Mapping[str, Any],
+    scale: float | None,
 ) -> NDArray[np.uint16]:
     """The counts (n, rows, cols) of at least one frame."""
     frames: NDArray[Any] = np.asarray(values)

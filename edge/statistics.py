@@ -4,7 +4,9 @@ import math
 
 
 def wilson(
-    right: float, total: float, z: float = 1.959963984540054
+    right: float,
+    total: float,
+    z: float = 1.959963984540054,
 ) -> tuple[float, float]:
     """Wilson's score interval of a proportion (95 % by default).
 

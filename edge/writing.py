@@ -105,7 +105,10 @@ def _check_target(target: Path) -> None:
 
 @contextmanager
 def write_whole(
-    path: str | os.PathLike[str], *, overwrite: bool = True, lasting: bool = True
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = True,
+    lasting: bool = True,
 ) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path`, which is renamed to `path` at the end of the
     block.

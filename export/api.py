@@ -51,7 +51,10 @@ def save(path: str | os.PathLike[str], fitted: Fitted, name: str | None = None) 
     with write_whole(target) as file:
         file.write(data)
     golden.write(
-        target.with_name("golden.npz"), Model(target), fitted.dataset, fitted.X
+        target.with_name("golden.npz"),
+        Model(target),
+        fitted.dataset,
+        fitted.X,
     )
     return len(data)
 
@@ -127,7 +130,9 @@ def _task(fitted: Fitted, task: str) -> Task:
 
 
 def usual_ranges(
-    dataset: DataSet, window_s: float, samples: int
+    dataset: DataSet,
+    window_s: float,
+    samples: int,
 ) -> dict[str, tuple[float, float]]:
     """{feature: the mean over the window that 1 % of the trials are below, and that 1 %
     are above}."""
@@ -156,7 +161,11 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     dataset, vectors = fitted.taken(choices.values())
     classifier = ContactClassifier.of(choices, vectors)
     of_candidate = replace(
-        fitted, dataset=dataset, classifier=classifier, chosen={}, sequential=None
+        fitted,
+        dataset=dataset,
+        classifier=classifier,
+        chosen={},
+        sequential=None,
     )
     data = to_onnx(classifier, describe(of_candidate))
     with tempfile.TemporaryDirectory() as folder:
@@ -165,6 +174,8 @@ def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
         model = Model(path)
     series = fitted.measured.trials[0].series
     times = timeit.repeat(
-        lambda: model.decide(model.info.vector(series)), number=1, repeat=CALLS
+        lambda: model.decide(model.info.vector(series)),
+        number=1,
+        repeat=CALLS,
     )
     return 1e6 * statistics.median(times), len(data) / 1024

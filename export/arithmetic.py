@@ -104,7 +104,9 @@ def in_int8(model: onnx.ModelProto, folder: Path) -> onnx.ModelProto:
 
 
 def answers(
-    model: onnx.ModelProto, vectors: NDArray[Any], tasks: list[str]
+    model: onnx.ModelProto,
+    vectors: NDArray[Any],
+    tasks: list[str],
 ) -> tuple[Integers, float, float]:
     """The labels (tasks * n) of vectors, and the median microseconds of one decision.
 
@@ -120,7 +122,9 @@ def answers(
         onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
     )
     session = onnxruntime.InferenceSession(
-        model.SerializeToString(), options, providers=["CPUExecutionProvider"]
+        model.SerializeToString(),
+        options,
+        providers=["CPUExecutionProvider"],
     )
 
     def run(inputs: NDArray[Any], output: str) -> NDArray[Any]:

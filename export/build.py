@@ -61,7 +61,10 @@ class Builder:
                 self._container.initializers.append(tensor)
             else:
                 self._container.add_initializer(
-                    stored_name, tensor.data_type, list(array.shape), tensor
+                    stored_name,
+                    tensor.data_type,
+                    list(array.shape),
+                    tensor,
                 )
             self._constants[key] = stored_name
         return self._constants[key]
@@ -109,7 +112,11 @@ class Builder:
         return x if len(columns) == width else self.node("Gather", x, columns, axis=1)
 
     def node(
-        self, operator: str, *inputs: Any, output: str = "", **attributes: Any
+        self,
+        operator: str,
+        *inputs: Any,
+        output: str = "",
+        **attributes: Any,
     ) -> str:
         """Add an operator of one output and return its name; an equal one is not added
         again.
@@ -140,7 +147,12 @@ class Builder:
         ]
         label = self._scope.get_unique_operator_name(operator)
         self._container.add_node(
-            operator, input_names, names, op_version=OPSET, name=label, **attributes
+            operator,
+            input_names,
+            names,
+            op_version=OPSET,
+            name=label,
+            **attributes,
         )
         return names
 
@@ -164,7 +176,10 @@ class Builder:
 
 
 def product(
-    build: Builder, x: str, decision_points: Sequence[Projection], components: int
+    build: Builder,
+    x: str,
+    decision_points: Sequence[Projection],
+    components: int,
 ) -> tuple[str, str]:
     """Nodes that multiply features (n, p) by the weights of a projection for each
     decision point.

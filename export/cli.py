@@ -75,7 +75,10 @@ def _add_files(top: argparse.ArgumentParser) -> None:
         help=".npz recordings or folders",
     )
     option(
-        "--out", type=Path, default=Path("build"), help="folder (default: %(default)s)"
+        "--out",
+        type=Path,
+        default=Path("build"),
+        help="folder (default: %(default)s)",
     )
     option(
         "--name", help="of the model (default: that of the folder of the recordings)"
@@ -167,7 +170,10 @@ def _add_results(top: argparse.ArgumentParser) -> None:
     text = "a former model.onnx, which is scored on the --test recordings too"
     option("--compare", metavar="old.onnx", help=text)
     option(
-        "--jobs", type=count, default=cpu_count(), help="processes (default: all cores)"
+        "--jobs",
+        type=count,
+        default=cpu_count(),
+        help="processes (default: all cores)",
     )
 
 
@@ -268,7 +274,9 @@ def _fit(arguments: argparse.Namespace) -> Fitted:
 
 
 def held_out_text(
-    model: Model, former: Model | None, recordings: Sequence[Path]
+    model: Model,
+    former: Model | None,
+    recordings: Sequence[Path],
 ) -> str:
     """The accuracy on recordings that were not fitted, also of a former model."""
     summary = _scored(model, recordings)

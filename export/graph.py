@@ -142,7 +142,10 @@ def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
 
 
 def _projected(
-    build: Builder, x: str, points: Sequence[ContactClassifier], spaces: Spaces
+    build: Builder,
+    x: str,
+    points: Sequence[ContactClassifier],
+    spaces: Spaces,
 ) -> tuple[str, str]:
     """Nodes that project features x to a task's spaces; see `project`."""
     projections = []
@@ -190,7 +193,11 @@ def _task(
     voters = build.constant([k], f"k of {output}")
     outputs = ["", names[f"{task}_neighbours"]]
     nearest, neighbours = build.nodes(
-        "TopK", [squares, voters], outputs, largest=0, sorted=1
+        "TopK",
+        [squares, voters],
+        outputs,
+        largest=0,
+        sorted=1,
     )
     roots = build.node("Sqrt", build.node("Add", nearest, length))
     scales = build.by_decision_point(units)
@@ -250,7 +257,11 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
 
 
 def _label_distances(
-    build: Builder, task: str, squares: str, labels: Integers, classes: int
+    build: Builder,
+    task: str,
+    squares: str,
+    labels: Integers,
+    classes: int,
 ) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
     rows)."""
@@ -261,7 +272,12 @@ def _label_distances(
     wider = build.node("Pad", squares, [0, 0, 0, 1], np.inf)
     squares_of_label = build.node("Gather", wider, rows, axis=1)
     nearest, _ = build.nodes(
-        "TopK", [squares_of_label, most], ["", ""], axis=2, largest=0, sorted=1
+        "TopK",
+        [squares_of_label, most],
+        ["", ""],
+        axis=2,
+        largest=0,
+        sorted=1,
     )
     roots = build.node("Round", build.node("Sqrt", nearest))
     counted = build.node("Where", taken, roots, 0.0)
@@ -294,7 +310,10 @@ def _outputs(model: Fitted) -> dict[str, Any]:
 
 
 def _parse(
-    scope: Any, model: Fitted, inputs: list[Any], custom_parsers: Any = None
+    scope: Any,
+    model: Fitted,
+    inputs: list[Any],
+    custom_parsers: Any = None,
 ) -> list[Any]:
     operator = scope.declare_local_operator(type(model).__name__, model)
     for variable in inputs:
@@ -319,13 +338,21 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
     """
     kind = type(model)
     update_registered_converter(
-        kind, kind.__name__, _shapes, _convert, parser=_parse, overwrite=True
+        kind,
+        kind.__name__,
+        _shapes,
+        _convert,
+        parser=_parse,
+        overwrite=True,
     )
     inputs: list[tuple[str, Any]] = [("features", DoubleTensorType([None, info.width]))]
     if isinstance(model, SequentialClassifier):
         inputs.append(("decision_point", Int64TensorType([1])))
     proto = convert_sklearn(
-        model, name="edge-classify", initial_types=inputs, target_opset={"": OPSET}
+        model,
+        name="edge-classify",
+        initial_types=inputs,
+        target_opset={"": OPSET},
     )
     if isinstance(model, SequentialClassifier):
         # An initializer of an input's name is its default: whoever gives `features`

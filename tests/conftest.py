@@ -44,7 +44,14 @@ FOREARM = SkinLayout(
 
 
 def touch(
-    *, kind="hard", seed=0, seconds=1.6, lead_s=0.2, arm=True, rate=100.0, labels=None
+    *,
+    kind="hard",
+    seed=0,
+    seconds=1.6,
+    lead_s=0.2,
+    arm=True,
+    rate=100.0,
+    labels=None,
 ):
     """A contact that grows: a hard one in force, a soft one in area. It imitates no
     physics."""

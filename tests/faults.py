@@ -198,7 +198,13 @@ class Watched:
         """The outcome of faults that ended at a time."""
         back = math.nan if self.back_at == math.inf else max(0.0, self.back_at - end)
         return Outcome(
-            name, met, self.wrong, self.missing, self.others, missed_ticks, back
+            name,
+            met,
+            self.wrong,
+            self.missing,
+            self.others,
+            missed_ticks,
+            back,
         )
 
 
@@ -393,7 +399,10 @@ def main(argv=None):
     parser.add_argument("--seed", type=int, default=0)
     positive = within(int, 1, 1e6)
     parser.add_argument(
-        "--every", type=positive, default=1, help="every so many positions"
+        "--every",
+        type=positive,
+        default=1,
+        help="every so many positions",
     )
     parser.add_argument(
         "--overhead",

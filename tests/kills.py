@@ -308,10 +308,15 @@ def main(argv=None):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
     parser = argparse.ArgumentParser(prog="kills", description=__doc__)
     parser.add_argument(
-        "--count", type=POSITIVE, default=60, help="kills of each command"
+        "--count",
+        type=POSITIVE,
+        default=60,
+        help="kills of each command",
     )
     parser.add_argument(
-        "--only", default="", help="commands whose name holds this text"
+        "--only",
+        default="",
+        help="commands whose name holds this text",
     )
     arguments = parser.parse_args(argv)
     names = list(filter(lambda name: arguments.only in name, VICTIMS))

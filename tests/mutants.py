@@ -25,7 +25,10 @@ UNNOTICED = ("survived", "no tests")
 def output(*arguments):
     """The output of a mutmut command; its errors pass through."""
     done = subprocess.run(
-        [*MUTMUT, *arguments], check=True, stdout=subprocess.PIPE, text=True
+        [*MUTMUT, *arguments],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     return done.stdout
 
@@ -45,7 +48,10 @@ def generate():
     # mutmut copies tests anew, but leaves those that were deleted here since.
     shutil.rmtree("mutants/tests", ignore_errors=True)
     done = subprocess.run(
-        [*MUTMUT, "run", "no such mutant"], capture_output=True, text=True, check=False
+        [*MUTMUT, "run", "no such mutant"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if "nothing matches" not in done.stderr:
         raise SystemExit(done.stdout + done.stderr)
@@ -74,13 +80,21 @@ def main(argv=None):
         help="mutants to draw (%(default)s)",
     )
     parser.add_argument(
-        "--seed", type=int, default=2012, help="of the draw (%(default)s)"
+        "--seed",
+        type=int,
+        default=2012,
+        help="of the draw (%(default)s)",
     )
     parser.add_argument(
-        "--minutes", type=float, default=15.0, help="at most (%(default)s)"
+        "--minutes",
+        type=float,
+        default=15.0,
+        help="at most (%(default)s)",
     )
     parser.add_argument(
-        "--only", default="", help="draw from mutants whose name contains this"
+        "--only",
+        default="",
+        help="draw from mutants whose name contains this",
     )
     arguments = parser.parse_args(argv)
     generate()

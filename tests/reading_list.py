@@ -31,7 +31,12 @@ def loaded(*arguments, environment=None):
     """Paths, below the checkout, of the modules of edge that a command loads."""
     command = [sys.executable, "-c", PROGRAM, *arguments]
     done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+        command,
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     paths = []
     for line in done.stdout.splitlines():

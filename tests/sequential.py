@@ -14,7 +14,10 @@ def fitted_model(path, info, choices, X, y, early=None):
     each of its decision points, and the first task of y gives the folds.
     """
     estimator = SequentialClassifier(
-        choices, info.decision_points_s, info.features, early=early
+        choices,
+        info.decision_points_s,
+        info.features,
+        early=early,
     )
     estimator.fit(X, y, stratified_folds(next(iter(y.values()))), [choices] * 10)
     path.write_bytes(to_onnx(estimator, describe(estimator, info, info.samples)))

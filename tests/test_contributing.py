@@ -23,7 +23,9 @@ from train.report.section import Section, Table
 from train.study import run as study
 
 TABLE = re.findall(
-    r"^\| (an? .*|another .*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M
+    r"^\| (an? .*|another .*) \|$",
+    (ROOT / "CONTRIBUTING.md").read_text(),
+    re.M,
 )
 
 

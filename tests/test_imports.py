@@ -42,7 +42,9 @@ def modules(package):
 
 
 @pytest.mark.parametrize(
-    "path", modules("edge"), ids=lambda p: str(p.relative_to(ROOT))
+    "path",
+    modules("edge"),
+    ids=lambda p: str(p.relative_to(ROOT)),
 )
 def test_the_board_imports_only_numpy_onnxruntime_and_smbus2(path):
     roots = {name.split(".")[0] for name in imported(path)}

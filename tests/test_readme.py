@@ -65,7 +65,10 @@ def bench(exported, recordings, tmp_path_factory):
 
 @pytest.mark.parametrize("command", BOARD)
 def test_a_command_of_the_board_does_as_it_is_written(
-    command, bench, monkeypatch, capsys
+    command,
+    bench,
+    monkeypatch,
+    capsys,
 ):
     """In the order of the page; commands that read the skin use fake chips."""
     monkeypatch.chdir(bench)
@@ -80,7 +83,9 @@ def test_a_command_of_the_board_does_as_it_is_written(
 
 @pytest.mark.parametrize(("program", "arguments"), COMMANDS)
 def test_a_command_of_any_page_has_arguments_that_its_program_knows(
-    program, arguments, capsys
+    program,
+    arguments,
+    capsys,
 ):
     makers = {
         "edge-classify": cli.parser,
@@ -102,7 +107,9 @@ def test_a_command_of_any_page_has_arguments_that_its_program_knows(
 
 @pytest.mark.parametrize("command", WORKSTATION)
 def test_a_command_of_the_workstation_does_as_it_is_written(
-    command, bench, monkeypatch
+    command,
+    bench,
+    monkeypatch,
 ):
     if "sdh2" in command and not GRASPS.exists():
         pytest.skip("the recordings are not beside the checkout")

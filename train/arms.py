@@ -9,7 +9,9 @@ from edge.touch.arm import Chain
 
 
 def arm_of(
-    recording: Recording, where: str, unnamed: Chain | None = None
+    recording: Recording,
+    where: str,
+    unnamed: Chain | None = None,
 ) -> Chain | None:
     """The recording's arm: its `meta.arm`, else `unnamed`, else Cody's where it has
     five angles.

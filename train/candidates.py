@@ -277,7 +277,9 @@ def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
 
 
 def _scaled(
-    grids: Sequence[SearchGrid], sets: Sequence[str], fixed: Fixed
+    grids: Sequence[SearchGrid],
+    sets: Sequence[str],
+    fixed: Fixed,
 ) -> tuple[SearchGrid, ...]:
     """The grids with each method of scaling that is tried."""
     methods: Sequence[str] = ("IV",)

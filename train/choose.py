@@ -158,7 +158,10 @@ class Choosing:
             total += fits(self._groups.folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
         with bar(
-            total=total, desc=what, unit=" fits", disable=not self._progress
+            total=total,
+            desc=what,
+            unit=" fits",
+            disable=not self._progress,
         ) as progress:
             answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
             trials = answers(vectors, folds, grids, nested=nested)
@@ -249,7 +252,9 @@ class Choosing:
         return together, trials.folds, without
 
     def early(
-        self, window_s: float, chosen: Mapping[str, Chosen]
+        self,
+        window_s: float,
+        chosen: Mapping[str, Chosen],
     ) -> EarlySettings | None:
         """The settings of the decision points before the full window, by the same rule
         as those of the full window; None without candidates for them."""
@@ -277,7 +282,11 @@ class Choosing:
         return self._tables(vectors, candidates, what, nested=False, repeated=False)
 
     def _settle_early(
-        self, task: str, table: AnswerTable, k: int, margin: float = 0.0
+        self,
+        task: str,
+        table: AnswerTable,
+        k: int,
+        margin: float = 0.0,
     ) -> list[Choice]:
         """A task's settings by a table, and those chosen without each fold of the
         trials.
@@ -296,7 +305,10 @@ class Choosing:
         return Rule(costs(table.choices[task], self._widths), margin=margin)
 
     def _settle(
-        self, task: str, trials: AnswerTable, groups: AnswerTable
+        self,
+        task: str,
+        trials: AnswerTable,
+        groups: AnswerTable,
     ) -> tuple[Chosen, list[Choice]]:
         """A task's settings, by the answers to left-out trials and to left-out groups;
         and [fold] those chosen without the trials of a fold.
@@ -411,7 +423,9 @@ def decided_together(
 
 
 def _planned(
-    settings: Chosen, plans: Mapping[str, Plan], tasks: Sequence[str]
+    settings: Chosen,
+    plans: Mapping[str, Plan],
+    tasks: Sequence[str],
 ) -> Chosen:
     """A task's settings with `by_fold`, of the tasks that are decided together."""
     _, by_fold = plans[settings.left_out]
@@ -432,7 +446,10 @@ def _recounted(result: Promise, hits: Booleans) -> Promise:
 
 
 def _right_together(
-    family: Sequence[str], vectors: Vectors, plan: Plan, jobs: int
+    family: Sequence[str],
+    vectors: Vectors,
+    plan: Plan,
+    jobs: int,
 ) -> dict[str, Booleans]:
     """{task: whether the label named without a trial's fold is right} of tasks that are
     decided together, for the trials with a fold and a label."""

@@ -350,22 +350,24 @@ def load_trials(
     recordings, without_shear = with_shear(recordings, layout)
     posed = with_poses(recordings, measurement)
     names = tuple(feature.name for feature in measurement.types)
+    tracked = {
+        "chain": posed.chain,
+        "horizon_s": measurement.horizon_s,
+        "features": names,
+        "joints": posed.joints,
+    }
     follow = delayed(_followed)
     work = Parallel(n_jobs=jobs, return_as="generator")(
-        follow(
-            recording,
-            path,
-            layout,
-            chain=posed.chain,
-            horizon_s=measurement.horizon_s,
-            features=names,
-            joints=posed.joints,
-        )
+        follow(recording, path, layout, **tracked)
         for recording, path in posed.recordings
     )
     count = len(posed.recordings)
     trials = bar(
-        work, total=count, desc="following", unit=" trials", disable=not progress
+        work,
+        total=count,
+        desc="following",
+        unit=" trials",
+        disable=not progress,
     )
     touched = collect(posed.recordings, trials, layout).completed()
     tasks = shared_tasks(touched.labels, partial=partial)
@@ -448,7 +450,9 @@ def with_poses(data: Recordings, measurement: Measurement) -> Posed:
 
 
 def require_one_arm(
-    recordings: Sequence[Named], arms: Sequence[Chain | None], chain: Chain
+    recordings: Sequence[Named],
+    arms: Sequence[Chain | None],
+    chain: Chain,
 ) -> None:
     """Refuse recordings of an arm that differs from the first one's.
 
@@ -522,7 +526,9 @@ class Touched:
 
 
 def collect(
-    recordings: Sequence[Named], followed: Iterable[Followed], layout: SkinLayout
+    recordings: Sequence[Named],
+    followed: Iterable[Followed],
+    layout: SkinLayout,
 ) -> Touched:
     """The trials of recordings whose contacts were followed.
 
@@ -552,7 +558,10 @@ Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
 
 
 def _followed(
-    recording: Recording, path: Path, layout: SkinLayout, **tracked: Any
+    recording: Recording,
+    path: Path,
+    layout: SkinLayout,
+    **tracked: Any,
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
@@ -576,7 +585,9 @@ def contacts(
 
 
 def with_thresholds(
-    layout: SkinLayout, threshold: int | None, onset: int | None
+    layout: SkinLayout,
+    threshold: int | None,
+    onset: int | None,
 ) -> SkinLayout:
     """The skin with these thresholds; one that is None stays, or scales with the
     other."""

@@ -26,7 +26,10 @@ LARGEST_BYTES = 1_150_000
 
 
 def usual_points(
-    dataset: DataSet, settings: Settings, samples: int, notes: list[str]
+    dataset: DataSet,
+    settings: Settings,
+    samples: int,
+    notes: list[str],
 ) -> tuple[float, ...]:
     """The decision points of a model, where none are asked for.
 

@@ -144,7 +144,10 @@ class _Fit:
     ) -> _Fit:
         """The fit without some trials, by a mask (n,), which answers these."""
         return cls(
-            vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out)
+            vectors,
+            classes,
+            np.flatnonzero(~left_out),
+            np.flatnonzero(left_out),
         )
 
     def counted(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
@@ -166,7 +169,9 @@ class _Fit:
         types = types_of(grid.features, vectors.features, vectors.columns)
         X = vectors.X
         mean, gain, scaled = centred_and_scaled(
-            X[np.ix_(rows, columns)], grid.scaling, *types
+            X[np.ix_(rows, columns)],
+            grid.scaling,
+            *types,
         )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
         first = (np.cumsum(counts) - counts)[counts > 0]
@@ -432,7 +437,9 @@ def _classes(labels: Strings) -> Integers:
 
 
 def _choices(
-    task: str, grids: Sequence[SearchGrid], classes: Mapping[str, Integers]
+    task: str,
+    grids: Sequence[SearchGrid],
+    classes: Mapping[str, Integers],
 ) -> list[Choice]:
     """The candidates of a task."""
     choices: list[Choice] = []

@@ -130,13 +130,22 @@ class FitOptions(Fixed):
         return self.window_s
 
     def candidates_for(
-        self, dataset: DataSet, y: Labels, *, drawn: bool
+        self,
+        dataset: DataSet,
+        y: Labels,
+        *,
+        drawn: bool,
     ) -> list[Candidate]:
         """The candidates for some trials."""
         joints = dataset.joints > 0
         shear = dataset.layout.axes is not None
         return candidates(
-            y, self, joints=joints, shear=shear, drawn=drawn, quick=self.quick
+            y,
+            self,
+            joints=joints,
+            shear=shear,
+            drawn=drawn,
+            quick=self.quick,
         )
 
     def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
@@ -301,7 +310,9 @@ def _copies(recordings: Recordings) -> list[str]:
 
 
 def trials_of(
-    recordings: Recordings, windows: tuple[float, ...], options: FitOptions
+    recordings: Recordings,
+    windows: tuple[float, ...],
+    options: FitOptions,
 ) -> Loaded:
     """The trials of recordings, up to the last of some windows."""
     notes: list[str] = []
@@ -408,7 +419,10 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
 
 
 def _choose_mixed(
-    loaded: Loaded, y: Labels, is_own: Booleans, options: FitOptions
+    loaded: Loaded,
+    y: Labels,
+    is_own: Booleans,
+    options: FitOptions,
 ) -> Settings:
     """The settings where simulated trials stand beside the owner's."""
     dataset = loaded.dataset
@@ -432,7 +446,12 @@ def _choose_mixed(
     y = {task: y[task] for task in mixed.chosen}
     usual = options.candidates_for(dataset, y, drawn=True)
     return Settings(
-        mixed.chosen, mixed.folds, mixed.without, usual, window_s, mixed.notes
+        mixed.chosen,
+        mixed.folds,
+        mixed.without,
+        usual,
+        window_s,
+        mixed.notes,
     )
 
 
@@ -455,7 +474,11 @@ def calibrate(
         early=None if settings.early is None else settings.early.settings,
     )
     return classifier.fit(
-        at_points, y, settings.folds, settings.without, measured.is_own
+        at_points,
+        y,
+        settings.folds,
+        settings.without,
+        measured.is_own,
     )
 
 
@@ -594,7 +617,10 @@ def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
 
 
 def _decision_points(
-    measured: DataSet, settings: Settings, options: FitOptions, notes: list[str]
+    measured: DataSet,
+    settings: Settings,
+    options: FitOptions,
+    notes: list[str],
 ) -> tuple[float, ...]:
     """The decision points asked for, or the usual ones."""
     asked_s = options.decision_points_s

@@ -108,7 +108,10 @@ class Groups:
 
 
 def groups_of(
-    dataset: DataSet, y: Labels, leave_out: str, quick: bool
+    dataset: DataSet,
+    y: Labels,
+    leave_out: str,
+    quick: bool,
 ) -> Groups | None:
     """The kinds of things, or else the groups of a label, where some task has enough of
     them."""

@@ -137,7 +137,9 @@ class Mixing:
         return Vectors(self.features, self.y, self.dataset.names, widths, self.is_own)
 
     def answers(
-        self, grids: Sequence[SearchGrid], folds: NDArray[np.int64]
+        self,
+        grids: Sequence[SearchGrid],
+        folds: NDArray[np.int64],
     ) -> AnswerTable:
         """The answers to the owner's trials, each without its fold (owner's trials,)."""
         everyone = np.full(len(self.is_own), -1)
@@ -194,7 +196,11 @@ class Scores:
         return plans
 
     def weigh(
-        self, task: str, settled: Chosen, mixing: Mixing, plans: Mapping[str, Plan]
+        self,
+        task: str,
+        settled: Chosen,
+        mixing: Mixing,
+        plans: Mapping[str, Plan],
     ) -> Chosen:
         """The settings of a task with their weights; also enters those of each fold."""
         leave_out = mixing.leave_out
@@ -284,7 +290,10 @@ def _sentences(task: str, best: Choice, scores: Scores, mixing: Mixing) -> list[
 
 
 def _grid(
-    task: str, choice: Choice, weights: tuple[int, int], labelled: int
+    task: str,
+    choice: Choice,
+    weights: tuple[int, int],
+    labelled: int,
 ) -> SearchGrid:
     """The one candidate of a task with some weights."""
     return SearchGrid(

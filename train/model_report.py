@@ -165,7 +165,11 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
 
 
 def write(
-    out: Path, fitted: Fitted, model: Model, prices: Prices, jobs: int = 1
+    out: Path,
+    fitted: Fitted,
+    model: Model,
+    prices: Prices,
+    jobs: int = 1,
 ) -> Path:
     """Write report.html with its CSV and PNG files into a folder; the page's path.
 
@@ -212,7 +216,10 @@ def _accuracy(exported: Exported, task: str) -> Section:
         text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
     labels = sorted(set(truth))
     scores: Any = precision_recall_fscore_support(
-        truth, answers, labels=labels, zero_division=0.0
+        truth,
+        answers,
+        labels=labels,
+        zero_division=0.0,
     )
     rows: list[Row] = [
         {
@@ -283,7 +290,10 @@ def _wrong(exported: Exported) -> Section:
 
 
 def _picture(
-    fitted: Fitted, trials: Sequence[str], task: str, answer: Answers
+    fitted: Fitted,
+    trials: Sequence[str],
+    task: str,
+    answer: Answers,
 ) -> Figure:
     """The first wrong answer: the touch's curves over those of the trials that voted
     for it."""
@@ -369,7 +379,10 @@ def _learning(exported: Exported) -> Section:
     title = "Accuracy by the number of training trials"
     figure = lines("learning", title, sizes, results, label="training trials")
     return Section(
-        "The value of more recordings", text, [Table("learning", title, rows)], [figure]
+        "The value of more recordings",
+        text,
+        [Table("learning", title, rows)],
+        [figure],
     )
 
 

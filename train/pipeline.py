@@ -45,7 +45,10 @@ def squared_distances(X: Floats, rows: Floats) -> Floats:
 
 
 def label_distances(
-    squares: Floats, labels: Integers, classes: int, unit: float
+    squares: Floats,
+    labels: Integers,
+    classes: int,
+    unit: float,
 ) -> Floats:
     """(m, classes) distance of each label, from squared distances (m, n) to the trials.
 
@@ -148,7 +151,9 @@ class Choice:
 
 
 def how_often(
-    labelled: Booleans, is_own: Booleans | None, weights: tuple[int, int]
+    labelled: Booleans,
+    is_own: Booleans | None,
+    weights: tuple[int, int],
 ) -> Integers:
     """(n,) how often each trial counts; see `Choice.counts`."""
     if is_own is None:
@@ -158,7 +163,9 @@ def how_often(
 
 
 def fittable(
-    choices: Mapping[str, Choice], y: Labels, is_own: Booleans | None
+    choices: Mapping[str, Choice],
+    y: Labels,
+    is_own: Booleans | None,
 ) -> dict[str, Choice]:
     """The choices of the tasks that y has labels for, with k at most the number of
     their trials.
@@ -223,7 +230,10 @@ class ContactClassifier:
 
     @classmethod
     def of(
-        cls, choices: Mapping[str, Choice], vectors: Vectors, complete: bool = True
+        cls,
+        choices: Mapping[str, Choice],
+        vectors: Vectors,
+        complete: bool = True,
     ) -> ContactClassifier:
         """A classifier fitted on some trials; see `fit`."""
         model = cls(choices, vectors.features, vectors.widths)
@@ -405,7 +415,9 @@ class ContactClassifier:
 
 
 def columns_of(
-    names: Sequence[str], features: Sequence[str], widths: Sequence[int]
+    names: Sequence[str],
+    features: Sequence[str],
+    widths: Sequence[int],
 ) -> Integers:
     """The columns of vectors of `features` that hold the `names` ones, rising; all if
     empty."""
@@ -414,7 +426,9 @@ def columns_of(
 
 
 def types_of(
-    names: Sequence[str], features: Sequence[str], widths: Sequence[int]
+    names: Sequence[str],
+    features: Sequence[str],
+    widths: Sequence[int],
 ) -> tuple[list[str], list[int]]:
     """Names and widths of the `names` among the features, in their order; all if
     empty."""

@@ -394,7 +394,10 @@ class Projection(TransformerMixin, BaseEstimator):
         X = np.asarray(X, dtype=np.float64)
         self.n_features_in_ = X.shape[1]
         self.mean_, self.gain_, d = centred_and_scaled(
-            X, self.scaling, self.features, self.widths
+            X,
+            self.scaling,
+            self.features,
+            self.widths,
         )
         axes, self.gap_ = self._axes(d, y)
         self.rank_ = axes.shape[1]

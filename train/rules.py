@@ -110,7 +110,9 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
 
 
 def certify(
-    course: Course, seconds: Floats, level: float = TEST_SHARE * RISK
+    course: Course,
+    seconds: Floats,
+    level: float = TEST_SHARE * RISK,
 ) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the
     safest first.

@@ -46,7 +46,9 @@ def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def widths_of(
-    columns: int, features: Sequence[str], widths: Sequence[int] | None = None
+    columns: int,
+    features: Sequence[str],
+    widths: Sequence[int] | None = None,
 ) -> tuple[int, ...]:
     """How many of so many columns each feature type has: `widths`, or an equal share.
 
@@ -129,7 +131,9 @@ def _inverse(
 
 
 def _deviations(
-    X: NDArray[np.float64], sizes: NDArray[np.int64], wide: NDArray[np.bool_]
+    X: NDArray[np.float64],
+    sizes: NDArray[np.int64],
+    wide: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """(features,) standard deviation of each feature type over all of its columns.
 

@@ -187,7 +187,9 @@ class Decomposition:
         return _nearest(spaces, k)
 
     def _discriminants(
-        self, task: str, shrinkages: tuple[float, ...]
+        self,
+        task: str,
+        shrinkages: tuple[float, ...],
     ) -> list[tuple[Floats, Floats]]:
         """[shrinkage] coordinates (trials, c) and (m, c) along the discriminants of a
         task's labels."""

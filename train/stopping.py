@@ -354,7 +354,9 @@ class SequentialClassifier:
         return [self._at_points(full, early) for full, early in pairs]
 
     def _at_points(
-        self, full: Mapping[str, Choice], early: Mapping[str, Choice]
+        self,
+        full: Mapping[str, Choice],
+        early: Mapping[str, Choice],
     ) -> AtPoints:
         """[decision point]{task: Choice} of choices for the full window and for early
         points."""
@@ -409,7 +411,11 @@ class SequentialClassifier:
             self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
         novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
         scores = held_out_scores(
-            vectors.X, labels, novelty_folds, vectors.columns, self.jobs
+            vectors.X,
+            labels,
+            novelty_folds,
+            vectors.columns,
+            self.jobs,
         )
         self.novelty_ = limits_of(most, scores[:, folds >= 0])
         self._excess = excess_of(self.novelty_, scores)
@@ -432,7 +438,10 @@ class SequentialClassifier:
         for task, factors in self.products_.items():
             for factor in factors:
                 rules[factor] = following(
-                    rules[factor], rules[task], courses[factor], seconds
+                    rules[factor],
+                    rules[task],
+                    courses[factor],
+                    seconds,
                 )
         full, _ = candidates(len(seconds))
         return {task: (rules[task], courses[task].under(full)[1]) for task in rules}
@@ -475,7 +484,9 @@ class SequentialClassifier:
         return self.decision_points_[-1].products_
 
     def judged(
-        self, X: Floats, y: Mapping[str, Strings]
+        self,
+        X: Floats,
+        y: Mapping[str, Strings],
     ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, Course]]:
         """Hits and confidences (points, m) and course of each task, for trials that are
         new.
@@ -523,7 +534,10 @@ class SequentialClassifier:
             sure = [scores[part][:, decided] for part in deciding]
             wrong = [~right[part][:, decided] for part in deciding]
             courses[task] = Course(
-                sure, wrong, unknown[:, decided], task == self.novelty_.task
+                sure,
+                wrong,
+                unknown[:, decided],
+                task == self.novelty_.task,
             )
         return courses
 

@@ -127,7 +127,9 @@ def _quietest(recording: Recording) -> float:
 
 
 def count_contacts(
-    recordings: Sequence[Recording], threshold: int, onset: int
+    recordings: Sequence[Recording],
+    threshold: int,
+    onset: int,
 ) -> tuple[int, int]:
     """The number of recordings with a contact, and the number of contacts."""
     layout = with_thresholds(recordings[0].layout, threshold, onset)

@@ -44,7 +44,9 @@ def _parsed(entry: Mapping[str, Any]) -> Head | Touch:
     """A line: the head of a run, or a contact with the one task that was decided."""
     if entry["event"] == "map":
         return Head(
-            str(entry["frame"]), str(entry["unit"]), tuple(map(str, entry["tasks"]))
+            str(entry["frame"]),
+            str(entry["unit"]),
+            tuple(map(str, entry["tasks"])),
         )
     x, y, z = map(float, entry["place"])
     onset_s = float(entry["onset_s"])

@@ -112,7 +112,9 @@ class LinuxBus:
                 raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
             flock(smbus.fd, LOCK_EX | LOCK_NB)
             ioctl(
-                smbus.fd, I2C_TIMEOUT, max(1, math.ceil(self.timeout_s * 100.0 - 1e-9))
+                smbus.fd,
+                I2C_TIMEOUT,
+                max(1, math.ceil(self.timeout_s * 100.0 - 1e-9)),
             )
         except BlockingIOError:
             remedy = f"{lock_holder(smbus.fd)} is using the bus; end it first"

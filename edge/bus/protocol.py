@@ -121,7 +121,10 @@ ERRORS: dict[int | None, type[BusError]] = {
 
 
 def bus_error(
-    code: int | None, bus: str, address: int | None = None, remedy: str | None = None
+    code: int | None,
+    bus: str,
+    address: int | None = None,
+    remedy: str | None = None,
 ) -> BusError:
     """Build the named error of an errno; its message names the bus and the chip.
 

@@ -89,7 +89,11 @@ class AD7147(Chip):
     frame_pointer = words((RESULTS,))
 
     def __init__(
-        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * STAGES
+        self,
+        bus: Bus,
+        address: int,
+        *,
+        into: NDArray[np.uint8] | int = 2 * STAGES,
     ) -> None:
         """Identify the chip.
 

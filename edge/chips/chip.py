@@ -110,7 +110,11 @@ class Chip(ABC):
     rests_at_zero: ClassVar[bool] = False
 
     def __init__(
-        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int
+        self,
+        bus: Bus,
+        address: int,
+        *,
+        into: NDArray[np.uint8] | int,
     ) -> None:
         self.bus = bus
         self.address = address

@@ -54,7 +54,11 @@ class MPR121(Chip):
     frame_pointer = bytes([RESULTS])
 
     def __init__(
-        self, bus: Bus, address: int, *, into: NDArray[np.uint8] | int = 2 * ELECTRODES
+        self,
+        bus: Bus,
+        address: int,
+        *,
+        into: NDArray[np.uint8] | int = 2 * ELECTRODES,
     ) -> None:
         """Identify the chip as far as that is possible without a reset.
 

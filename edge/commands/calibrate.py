@@ -133,7 +133,9 @@ class Sums:
 
 
 def unusable(
-    file: SkinFile, baseline: NDArray[np.uint16], share: NDArray[np.float64]
+    file: SkinFile,
+    baseline: NDArray[np.uint16],
+    share: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """(rows, cols), True for working taxels without a usable rest value.
 
@@ -164,7 +166,9 @@ def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
 
 
 def moved_together(
-    file: SkinFile, baseline: NDArray[np.uint16], former: TaxelCalibration | None
+    file: SkinFile,
+    baseline: NDArray[np.uint16],
+    former: TaxelCalibration | None,
 ) -> list[tuple[int, int]]:
     """Taxels (row, col) that rest as if they were touched.
 
@@ -225,7 +229,9 @@ def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int
 
 
 def check_rest(
-    file: SkinFile, calibration: TaxelCalibration, former: TaxelCalibration | None
+    file: SkinFile,
+    calibration: TaxelCalibration,
+    former: TaxelCalibration | None,
 ) -> None:
     """Refuse a calibration that was measured on a touched or very noisy skin.
 
@@ -250,7 +256,10 @@ def check_rest(
 
 
 def replace_unusable(
-    file: SkinFile, measured: Measurement, former: TaxelCalibration | None, force: bool
+    file: SkinFile,
+    measured: Measurement,
+    former: TaxelCalibration | None,
+    force: bool,
 ) -> int:
     """Give taxels without a usable rest value their former one; returns their number.
 

@@ -32,7 +32,11 @@ LOOK_S = 2.0
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "model", nargs="?", type=Path, metavar="model.onnx", help="the new model"
+        "model",
+        nargs="?",
+        type=Path,
+        metavar="model.onnx",
+        help="the new model",
     )
     parser.add_argument(
         "--to",
@@ -48,7 +52,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--skin", help="skin.toml, which the model must suit")
     parser.add_argument("--service", help="systemd service to restart, and to watch")
     parser.add_argument(
-        "--back", action="store_true", help="bring the former model back"
+        "--back",
+        action="store_true",
+        help="bring the former model back",
     )
 
 

@@ -40,7 +40,9 @@ seconds = within(float, 1e-3, 1e9)
 def add_skin(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the skin, real or fake; `source.open_skin` opens it."""
     parser.add_argument(
-        "--skin", metavar="skin.toml", help="the file that describes the skin"
+        "--skin",
+        metavar="skin.toml",
+        help="the file that describes the skin",
     )
     parser.add_argument(
         "--fake",
@@ -55,7 +57,9 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
         help="play the recording at its original speed",
     )
     parser.add_argument(
-        "--loop", action="store_true", help="play the recording over and over"
+        "--loop",
+        action="store_true",
+        help="play the recording over and over",
     )
     parser.add_argument(
         "--seconds",

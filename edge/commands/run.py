@@ -197,7 +197,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _listeners(
-    arguments: argparse.Namespace, model: Model, opened: Opened
+    arguments: argparse.Namespace,
+    model: Model,
+    opened: Opened,
 ) -> Iterator[list[Callable[[Frame, Sequence[Event]], None]]]:
     """Functions that take in every frame with its events, where they are called for:
     one keeps touches, another tells systemd that the program is alive."""

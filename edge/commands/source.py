@@ -246,7 +246,9 @@ def reading(
 
 
 def _page(
-    address: str, opened: Opened, options: Mapping[str, Any]
+    address: str,
+    opened: Opened,
+    options: Mapping[str, Any],
 ) -> AbstractContextManager[Page]:
     from edge.tools.page import open_page  # few runs have a page
 
@@ -255,7 +257,10 @@ def _page(
 
 @contextmanager
 def _joints(
-    option: str | None, opened: Opened, arm: Chain | None, dof: int | None
+    option: str | None,
+    opened: Opened,
+    arm: Chain | None,
+    dof: int | None,
 ) -> Iterator[JointSource | None]:
     """The joint angles that another program sends, or those of a played recording."""
     if option is None:

@@ -18,7 +18,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
-        "--golden", required=True, help="golden.npz, written together with the model"
+        "--golden",
+        required=True,
+        help="golden.npz, written together with the model",
     )
     add_engine(parser)
 

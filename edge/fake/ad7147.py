@@ -49,7 +49,12 @@ class FakeAD7147(FakeChip):
 
     @classmethod
     def of(
-        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+        cls,
+        spec: ChipSpec,
+        sense: Sense,
+        *,
+        timed: bool,
+        power_up: random.Random,
     ) -> Self:
         """The model of a skin's chip."""
         refresh_s = REFRESH_S if timed else 0.0

@@ -20,7 +20,12 @@ class FakeBlock(FakeChip):
     """A model of a microcontroller that serves frames."""
 
     def __init__(
-        self, sense: Sense, *, taxels: int, bits: int = 16, axes: int = 1
+        self,
+        sense: Sense,
+        *,
+        taxels: int,
+        bits: int = 16,
+        axes: int = 1,
     ) -> None:
         """Model one.
 
@@ -37,7 +42,12 @@ class FakeBlock(FakeChip):
 
     @classmethod
     def of(
-        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+        cls,
+        spec: ChipSpec,
+        sense: Sense,
+        *,
+        timed: bool,
+        power_up: random.Random,
     ) -> Self:
         """The model of a skin's chip, with the axes that its driver reads."""
         if spec.kind is ThreeAxisBlock:

@@ -29,7 +29,12 @@ class FakeChip(ABC):
 
     @classmethod
     def of(
-        cls, spec: ChipSpec, sense: Sense, *, timed: bool, power_up: random.Random
+        cls,
+        spec: ChipSpec,
+        sense: Sense,
+        *,
+        timed: bool,
+        power_up: random.Random,
     ) -> Self:
         """The model of a skin's chip.
 

@@ -259,7 +259,11 @@ def playback(file: SkinFile, recording: Recording, *, loop: bool = False) -> Pla
 
 
 def play(
-    file: SkinFile, recording: Recording, *, loop: bool = False, **options: Any
+    file: SkinFile,
+    recording: Recording,
+    *,
+    loop: bool = False,
+    **options: Any,
 ) -> tuple[Skin, Playback]:
     """A fake skin that feels a recording, with further options of `fake_skin`.
 

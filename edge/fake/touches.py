@@ -42,7 +42,10 @@ number of counts."""
 
 
 def touches(
-    file: SkinFile, *, trials: int, seed: int = 0
+    file: SkinFile,
+    *,
+    trials: int,
+    seed: int = 0,
 ) -> Iterator[tuple[str, Recording]]:
     """Name and recording of each touch, for every contact of the demo.
 
@@ -128,7 +131,10 @@ def pitch(layout: SkinLayout) -> tuple[float, float]:
 
 
 def _mapped(
-    source: Recording, onto: SkinLayout, rate_hz: float, rng: np.random.Generator
+    source: Recording,
+    onto: SkinLayout,
+    rate_hz: float,
+    rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
     """Times (n,) and forces (n, rows, cols) of one trial."""
     row, col = (rng.uniform(0.25, 0.75) * (n - 1) for n in onto.shape)
@@ -161,7 +167,11 @@ def _middle(forces: Floats) -> tuple[float, float]:
 
 
 def _spread(
-    source: SkinLayout, onto: SkinLayout, axis: int, middle: float, centre: float
+    source: SkinLayout,
+    onto: SkinLayout,
+    axis: int,
+    middle: float,
+    centre: float,
 ) -> Floats:
     """(sources, taxels) shares of each source row (axis 0) or column on each row or
     column.

@@ -34,10 +34,41 @@ VENDOR = 0x0403
 PRODUCT = 0xC631
 """The USB identity for which the kernel loads its driver."""
 DEVICE_DESCRIPTOR = struct.pack(
-    "<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 8, VENDOR, PRODUCT, 0x0100, 0, 0, 0, 1
+    "<BBHBBBBHHHBBBB",
+    18,
+    1,
+    0x0110,
+    0xFF,
+    0,
+    0,
+    8,
+    VENDOR,
+    PRODUCT,
+    0x0100,
+    0,
+    0,
+    0,
+    1,
 )
 CONFIGURATION_DESCRIPTOR = struct.pack(
-    "<BBHBBBBB BBBBBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50, 9, 4, 0, 0, 0, 0xFF, 0, 0, 0
+    "<BBHBBBBB BBBBBBBBB",
+    9,
+    2,
+    18,
+    1,
+    1,
+    0,
+    0x80,
+    50,
+    9,
+    4,
+    0,
+    0,
+    0,
+    0xFF,
+    0,
+    0,
+    0,
 )
 """A single configuration with a single interface; every request goes to endpoint 0."""
 
@@ -150,7 +181,12 @@ class UsbAdapter:
         return self._transfer(request, value, index, length, data)
 
     def _transfer(
-        self, request: int, value: int, address: int, length: int, data: bytes
+        self,
+        request: int,
+        value: int,
+        address: int,
+        length: int,
+        data: bytes,
     ) -> bytes:
         """Carry a message to the bus, once its last part is there."""
         message = read(address, length) if value & I2C_M_RD else write(address, data)

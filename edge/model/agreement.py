@@ -15,7 +15,9 @@ softness."""
 
 
 def agreed(
-    task: str, factors: Factors, distances: Mapping[str, NDArray[Any]]
+    task: str,
+    factors: Factors,
+    distances: Mapping[str, NDArray[Any]],
 ) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     """The nearest answer in which a product and its factors agree.
 
@@ -53,7 +55,9 @@ def product_label(factors: Factors, indices: Mapping[str, int]) -> int:
 
 
 def factors_fit(
-    factors: Factors, labels: Mapping[str, tuple[str, ...]], task: str
+    factors: Factors,
+    labels: Mapping[str, tuple[str, ...]],
+    task: str,
 ) -> bool:
     """Whether each pair of the factors' labels is one label of the task.
 

@@ -177,7 +177,11 @@ class Stopping:
         return self.rules[0].error
 
     def confidence(
-        self, decision_point: int, distances: Sequence[float], label: int, excess: float
+        self,
+        decision_point: int,
+        distances: Sequence[float],
+        label: int,
+        excess: float,
     ) -> float:
         """Probability, 0 to 1, that a label is right.
 
@@ -192,7 +196,11 @@ class Stopping:
         return _logistic(log_odds - self.doubts[decision_point] * excess)
 
     def sure(
-        self, rule: StoppingRule, distances: Sequence[float], label: int, excess: float
+        self,
+        rule: StoppingRule,
+        distances: Sequence[float],
+        label: int,
+        excess: float,
     ) -> bool:
         """Whether a label is sure enough for a rule; see `confidence`."""
         log_odds = self.slope * margin(distances, label) + self.intercept

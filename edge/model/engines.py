@@ -21,7 +21,9 @@ ENGINES = ("onnxruntime", "numpy")
 
 
 def open_engine(
-    path: str, contents: Contents, engine: str | None
+    path: str,
+    contents: Contents,
+    engine: str | None,
 ) -> OnnxRuntime | Graph:
     """The engine of a model.
 
@@ -84,7 +86,9 @@ class OnnxRuntime:
         options.enable_cpu_mem_arena = False
         try:
             self._session = runtime.InferenceSession(
-                contents.data, options, providers=["CPUExecutionProvider"]
+                contents.data,
+                options,
+                providers=["CPUExecutionProvider"],
             )
         # ONNX Runtime's own exceptions share no base but this.
         except Exception as error:
@@ -94,7 +98,9 @@ class OnnxRuntime:
             ) from None
 
     def run(
-        self, names: Sequence[str], inputs: Mapping[str, NDArray[Any]]
+        self,
+        names: Sequence[str],
+        inputs: Mapping[str, NDArray[Any]],
     ) -> list[NDArray[Any]]:
         """The named outputs of the graph.
 

@@ -116,12 +116,18 @@ class ModelInfo:
         return sum(self.widths)
 
     def vector(
-        self, series: FeatureSeries, window_s: float | None = None
+        self,
+        series: FeatureSeries,
+        window_s: float | None = None,
     ) -> NDArray[np.float64]:
         """The model's `feature_vector` of a contact, by default at the full window."""
         window_s = window_s or self.window_s
         return feature_vector(
-            series, window_s, self.samples, self.features, self.kernels
+            series,
+            window_s,
+            self.samples,
+            self.features,
+            self.kernels,
         )
 
     def unusual(self, vector: NDArray[np.float64]) -> str | None:
@@ -271,7 +277,9 @@ def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]
 
 
 def _kernels(
-    meta: ConfigTable, names: Sequence[str], layout: SkinLayout
+    meta: ConfigTable,
+    names: Sequence[str],
+    layout: SkinLayout,
 ) -> dict[str, KernelTable]:
     """{feature: its table} of convolution features."""
     tables = {}

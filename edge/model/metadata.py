@@ -23,5 +23,9 @@ def to_json(info: ModelInfo) -> str:
         if not entries[key]:
             del entries[key]
     return json.dumps(
-        entries, default=vars, sort_keys=True, allow_nan=False, ensure_ascii=False
+        entries,
+        default=vars,
+        sort_keys=True,
+        allow_nan=False,
+        ensure_ascii=False,
     )

@@ -174,7 +174,9 @@ class Model:
         return self.info.decision_points_s or (self.info.window_s,)
 
     def run(
-        self, vectors: NDArray[np.float64], decision_point: int | None = None
+        self,
+        vectors: NDArray[np.float64],
+        decision_point: int | None = None,
     ) -> dict[str, NDArray[Any]]:
         """The graph's outputs for vectors (n, width).
 
@@ -205,7 +207,9 @@ class Model:
         return outputs
 
     def decide(
-        self, vector: ArrayLike, decision_point: int | None = None
+        self,
+        vector: ArrayLike,
+        decision_point: int | None = None,
     ) -> dict[str, Decision]:
         """Decide all tasks for one feature vector.
 
@@ -270,7 +274,11 @@ class Model:
         return Decision(
             label=self.info.tasks[task].labels[label],
             confidence=self._confidence(
-                task, decision_point, distances, label, novelty
+                task,
+                decision_point,
+                distances,
+                label,
+                novelty,
             ),
             votes=shares[label],
             scores=scores,

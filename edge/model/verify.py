@@ -107,7 +107,9 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
             f"{name}: is of another model than {model.path}; copy or export both together"
         )
     with parsing(
-        name, "a golden file of this model", "; export it again with the model"
+        name,
+        "a golden file of this model",
+        "; export it again with the model",
     ):
         SkinLayout.from_dict(meta["skin"], where=name)
         bounds = {str(key): float(bound) for key, bound in meta["bounds"].items()}
@@ -200,7 +202,10 @@ def _path(
 
 
 def _graph(
-    model: Model, name: str, arrays: dict[str, NDArray[Any]], bounds: dict[str, float]
+    model: Model,
+    name: str,
+    arrays: dict[str, NDArray[Any]],
+    bounds: dict[str, float],
 ) -> Iterator[Line]:
     """The graph's outputs for the stored vectors."""
     for key in ("vectors", "decision_point_vectors"):
@@ -251,7 +256,9 @@ def answers(
 
 
 def _named(
-    model: Model, outputs: Mapping[str, NDArray[Any]], prefix: str
+    model: Model,
+    outputs: Mapping[str, NDArray[Any]],
+    prefix: str,
 ) -> dict[str, NDArray[Any]]:
     """Outputs as a golden file names them; the prefix tells its two kinds of vectors
     apart."""
@@ -267,7 +274,9 @@ def _named(
 
 
 def _outputs(
-    model: Model, vectors: NDArray[np.float64], decision_point: int | None = None
+    model: Model,
+    vectors: NDArray[np.float64],
+    decision_point: int | None = None,
 ) -> dict[str, NDArray[Any]]:
     """The graph's outputs for vectors (n, width), asked one by one as on the board."""
     vectors = np.ascontiguousarray(vectors, np.float64)
@@ -301,13 +310,21 @@ def renew(
 
 
 def compared(
-    name: str, values: NDArray[Any], expected: NDArray[Any], bound: float
+    name: str,
+    values: NDArray[Any],
+    expected: NDArray[Any],
+    bound: float,
 ) -> Check:
     """Compare a quantity, whose first axis is the rows; see the module for the
     bound."""
     if values.shape != expected.shape:
         return Check(
-            name, len(expected), np.inf, 0, f"shape {values.shape}", f"{expected.shape}"
+            name,
+            len(expected),
+            np.inf,
+            0,
+            f"shape {values.shape}",
+            f"{expected.shape}",
         )
     if values.size == 0:
         return Check(name, 0, 0.0, None)
@@ -316,7 +333,9 @@ def compared(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         # An infinite value is near no other, though its allowance is infinite.
         gap = np.where(
-            np.isfinite(allowance), np.abs(values - expected) / allowance, np.inf
+            np.isfinite(allowance),
+            np.abs(values - expected) / allowance,
+            np.inf,
         )
     share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(
         len(values), -1

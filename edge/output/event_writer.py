@@ -70,7 +70,9 @@ class LineWriter:
         """Lines that wait, and None at the end."""
         self._closed = False
         self._thread = threading.Thread(
-            target=self._work, name=f"lines to {name}", daemon=True
+            target=self._work,
+            name=f"lines to {name}",
+            daemon=True,
         )
         self._thread.start()
 

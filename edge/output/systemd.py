@@ -17,7 +17,10 @@ class Notifier:
     """
 
     def __init__(
-        self, environment: Mapping[str, str] = os.environ, *, now: Callable[[], float]
+        self,
+        environment: Mapping[str, str] = os.environ,
+        *,
+        now: Callable[[], float],
     ):
         """Take the manager's address from the environment.
 

@@ -26,7 +26,9 @@ NOT_A_MAP = "not a map; give a file that `run --map` wrote"
 
 
 def map_writer(
-    path: str | os.PathLike[str], info: ModelInfo, patient: Patience = impatient
+    path: str | os.PathLike[str],
+    info: ModelInfo,
+    patient: Patience = impatient,
 ) -> LineWriter:
     """A writer that appends a run to a map: of the events it gets, the decisions with a
     place.
@@ -48,7 +50,9 @@ def map_writer(
             torn = former.read() not in (b"", b"\n")
     with refusing(f"{name}: cannot be written"):
         file = os.open(
-            name, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666
+            name,
+            os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC,
+            0o666,
         )
 
     def write(line: bytes) -> None:

@@ -44,7 +44,9 @@ def calibration_text(calibration: TaxelCalibration) -> str:
 
 
 def with_calibration(
-    text: str, calibration: TaxelCalibration, where: str = "skin"
+    text: str,
+    calibration: TaxelCalibration,
+    where: str = "skin",
 ) -> str:
     """The file's text with its `[calibration]` replaced and all else kept, comments
     included.

@@ -74,7 +74,12 @@ def taxel_map(file: SkinFile) -> TaxelMap:
     for row, col in file.signal.dead:
         served[row * file.layout.cols + col] = False
     return TaxelMap(
-        stage, chip_of, sign[chip_of], lowest.astype(np.uint16), span, served
+        stage,
+        chip_of,
+        sign[chip_of],
+        lowest.astype(np.uint16),
+        span,
+        served,
     )
 
 
@@ -157,7 +162,10 @@ class Decoder:
         return groups
 
     def decode(
-        self, slots: Sequence[Slot], began: float, oldest: float
+        self,
+        slots: Sequence[Slot],
+        began: float,
+        oldest: float,
     ) -> NDArray[np.bool_]:
         """Parse the bytes of all chips into `values` and `times`.
 
@@ -256,7 +264,11 @@ class Baseline:
 
     @classmethod
     def of(
-        cls, file: SkinFile, rest: ArrayLike, noise: ArrayLike, sign: ArrayLike = 1
+        cls,
+        file: SkinFile,
+        rest: ArrayLike,
+        noise: ArrayLike,
+        sign: ArrayLike = 1,
     ) -> Self:
         """The baseline of a skin's values, from their rest values and noise."""
         signal = file.signal

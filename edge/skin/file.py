@@ -176,7 +176,9 @@ def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signa
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
         dead_band_counts=table.whole(
-            "dead_band_counts", defaults.dead_band_counts, counts
+            "dead_band_counts",
+            defaults.dead_band_counts,
+            counts,
         ),
         drift_counts_per_s=table.number("drift_counts_per_s", rate, 0.0, 65535.0),
         drift_limit_counts=table.whole("drift_limit_counts", limit, counts),
@@ -201,7 +203,9 @@ def _reading(table: ConfigTable) -> Reading:
 
 
 def _calibration(
-    table: ConfigTable, layout: SkinLayout, chips: list[ChipSpec]
+    table: ConfigTable,
+    layout: SkinLayout,
+    chips: list[ChipSpec],
 ) -> TaxelCalibration:
     rest = _array(table, "baseline", layout, "whole numbers")
     if (rest != np.floor(rest)).any():
@@ -229,7 +233,10 @@ def _calibration(
 
 
 def _array(
-    table: ConfigTable, key: str, layout: SkinLayout, numbers: str
+    table: ConfigTable,
+    key: str,
+    layout: SkinLayout,
+    numbers: str,
 ) -> NDArray[np.float64]:
     """A value for each taxel, from 0 to 65535."""
     try:
@@ -244,7 +251,10 @@ def _array(
 
 
 def _no_array(
-    table: ConfigTable, key: str, layout: SkinLayout, numbers: str
+    table: ConfigTable,
+    key: str,
+    layout: SkinLayout,
+    numbers: str,
 ) -> InputError:
     return InputError(
         f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "

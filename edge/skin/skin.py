@@ -108,7 +108,10 @@ class Skin:
 
     @classmethod
     def open(
-        cls, file: SkinFile | str | os.PathLike[str], *, calibrated: bool = True
+        cls,
+        file: SkinFile | str | os.PathLike[str],
+        *,
+        calibrated: bool = True,
     ) -> Self:
         """Open the buses of a skin file and set their chips up.
 

@@ -33,7 +33,9 @@ class BusSpec:
 
 
 def read_buses(
-    tables: Sequence[ConfigTable], layout: SkinLayout, sign: int | None
+    tables: Sequence[ConfigTable],
+    layout: SkinLayout,
+    sign: int | None,
 ) -> tuple[BusSpec, ...]:
     """The buses of a skin.
 
@@ -159,7 +161,9 @@ def _address(table: ConfigTable, kind: type[Chip], serial: bool) -> int:
 
 
 def _check_taxels(
-    table: ConfigTable, kind: type[Chip], taxels: tuple[int, ...]
+    table: ConfigTable,
+    kind: type[Chip],
+    taxels: tuple[int, ...],
 ) -> None:
     if kind.stages is not None and len(taxels) != kind.stages:
         raise InputError(
@@ -207,7 +211,10 @@ def _rectangle(table: ConfigTable, layout: SkinLayout) -> list[list[int]]:
 
 
 def taxel_at(
-    table: ConfigTable, key: str, value: object, layout: SkinLayout
+    table: ConfigTable,
+    key: str,
+    value: object,
+    layout: SkinLayout,
 ) -> tuple[int, int]:
     """Row and column of a taxel that a key names.
 
@@ -260,7 +267,11 @@ def _check_addresses(bus: BusSpec, place: str) -> None:
 
 
 def _claim_taxels(
-    chip: ChipSpec, place: str, owners: dict[int, str], layout: SkinLayout, where: str
+    chip: ChipSpec,
+    place: str,
+    owners: dict[int, str],
+    layout: SkinLayout,
+    where: str,
 ) -> None:
     for taxel in chip.served:
         if taxel in owners:

@@ -53,7 +53,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
-        "--out", required=True, metavar="board.json", help="the file to write"
+        "--out",
+        required=True,
+        metavar="board.json",
+        help="the file to write",
     )
 
 
@@ -191,7 +194,10 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
 
 
 def pushed(
-    make: Callable[[], Any], frames: list[Frame], keep: slice, rounds: int
+    make: Callable[[], Any],
+    frames: list[Frame],
+    keep: slice,
+    rounds: int,
 ) -> list[float]:
     """Microseconds of each frame in `keep`, pushed among the others into new objects of
     `make`."""

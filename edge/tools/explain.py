@@ -30,7 +30,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
     parser.add_argument(
-        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+        "recordings",
+        nargs="+",
+        metavar="REC",
+        help=".npz files or folders",
     )
 
 
@@ -47,7 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def explanations(
-    model: Model, recording: Recording, name: str
+    model: Model,
+    recording: Recording,
+    name: str,
 ) -> Iterator[dict[str, Any]]:
     """For each task, why the model answers a recording's first contact as it does.
 

@@ -26,7 +26,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
     parser.add_argument(
-        "other", nargs="?", metavar="other.onnx", help="compare with this model"
+        "other",
+        nargs="?",
+        metavar="other.onnx",
+        help="compare with this model",
     )
 
 

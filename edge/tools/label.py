@@ -41,7 +41,10 @@ DELETED = ".edge-classify-deleted"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "data", nargs="+", metavar="REC", help=".npz recordings or folders of them"
+        "data",
+        nargs="+",
+        metavar="REC",
+        help=".npz recordings or folders of them",
     )
     for option, metavar, kind, text in (
         (
@@ -71,7 +74,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         ),
     ):
         parser.add_argument(
-            option, action="append", default=[], type=kind, metavar=metavar, help=text
+            option,
+            action="append",
+            default=[],
+            type=kind,
+            metavar=metavar,
+            help=text,
         )
     for option, text in {
         "--accept": "label kept touches as they were decided, in tasks without a label",
@@ -148,7 +156,9 @@ def _relabel(
 
 
 def _delete(
-    arguments: argparse.Namespace, output: Output, paths: Sequence[Path]
+    arguments: argparse.Namespace,
+    output: Output,
+    paths: Sequence[Path],
 ) -> int:
     """Show what is deleted, ask, and delete it."""
     for path in paths:
@@ -334,7 +344,9 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
 
 
 def _check_names(
-    name: str, labels: Mapping[str, str], names: Mapping[str, str]
+    name: str,
+    labels: Mapping[str, str],
+    names: Mapping[str, str],
 ) -> None:
     """Refuse a task's new name that another label of the recording has or takes."""
     former: dict[str, str] = {}

@@ -88,7 +88,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "trial",
     )
     parser.add_argument(
-        "--trials", type=within(int, 1, 1e9), help="stop after this many trials"
+        "--trials",
+        type=within(int, 1, 1e9),
+        help="stop after this many trials",
     )
     parser.add_argument(
         "--length",
@@ -304,7 +306,9 @@ def _dof(arguments: argparse.Namespace, arm: Chain | None) -> int | None:
 
 
 def _labels(
-    arguments: argparse.Namespace, folder: Path | None, by_key: bool
+    arguments: argparse.Namespace,
+    folder: Path | None,
+    by_key: bool,
 ) -> dict[str, str]:
     """{task: label} of the first trial.
 
@@ -346,7 +350,9 @@ def _choices(
 
 
 def _joint_names(
-    arguments: argparse.Namespace, opened: Opened, arm: Chain | None
+    arguments: argparse.Namespace,
+    opened: Opened,
+    arm: Chain | None,
 ) -> Sequence[str] | None:
     """The names of the joints; None if they are unknown.
 
@@ -494,7 +500,10 @@ class Recorder:
             self.page.saved(path, trial)
 
     def _saved_event(
-        self, path: Path, trial: Recording, unposed: int
+        self,
+        path: Path,
+        trial: Recording,
+        unposed: int,
     ) -> dict[str, Any]:
         """The event of a saved trial, some frames of which have no joint angles."""
         event = {

@@ -47,7 +47,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_engine(parser)
     add_error(parser)
     parser.add_argument(
-        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+        "recordings",
+        nargs="+",
+        metavar="REC",
+        help=".npz files or folders",
     )
 
 
@@ -68,7 +71,10 @@ def contact_of(model: Model, recording: Recording, name: str) -> FeatureSeries:
 
 
 def decide(
-    model: Model, recording: Recording, name: str, error: float | None = None
+    model: Model,
+    recording: Recording,
+    name: str,
+    error: float | None = None,
 ) -> list[dict[str, Any]]:
     """All events of one recording as JSON objects, with early decisions if `error` is
     given.

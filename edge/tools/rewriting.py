@@ -19,7 +19,9 @@ from edge.model.onnx_file import (
 
 
 def rewritten(
-    data: bytes, constants: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]
+    data: bytes,
+    constants: Mapping[str, NDArray[Any]],
+    metadata: Mapping[str, str],
 ) -> bytes:
     """A model's bytes with other values of some constants, and other metadata."""
     model: list[bytes | memoryview] = []

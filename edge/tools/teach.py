@@ -28,7 +28,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--model", required=True, help="model.onnx")
     parser.add_argument(
-        "recordings", nargs="+", metavar="REC", help=".npz files or folders"
+        "recordings",
+        nargs="+",
+        metavar="REC",
+        help=".npz files or folders",
     )
     parser.add_argument(
         "--out",

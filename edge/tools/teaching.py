@@ -177,7 +177,10 @@ def taught(
     if new_labels:
         info = with_labels(info, unknown_labels(info, labels))
     for name, trial, trial_labels in zip(
-        names, vectors.swapaxes(0, 1), labels, strict=True
+        names,
+        vectors.swapaxes(0, 1),
+        labels,
+        strict=True,
     ):
         _check_reach(model, name, trial)
         _check_labels(info, name, trial_labels)
@@ -257,7 +260,9 @@ def _check_labels(info: ModelInfo, name: str, labels: Labels) -> None:
 
 
 def label_indices(
-    classes: Sequence[str], task: str, labels: Sequence[Labels]
+    classes: Sequence[str],
+    task: str,
+    labels: Sequence[Labels],
 ) -> Integers:
     """(m,) index of each trial's label for a task; -1 where it has none."""
     index = {label: i for i, label in enumerate(classes)}

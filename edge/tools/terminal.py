@@ -40,7 +40,9 @@ LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be 
 
 
 def skin_colours(
-    frame: Frame, layout: SkinLayout, full: int
+    frame: Frame,
+    layout: SkinLayout,
+    full: int,
 ) -> tuple[Colours, list[Region]]:
     """256-colour numbers (rows, cols), and the regions.
 
@@ -48,7 +50,10 @@ def skin_colours(
     """
     threshold = layout.threshold_counts
     regions = find_regions(
-        frame.counts, threshold, valid=frame.valid, wraps=layout.wraps
+        frame.counts,
+        threshold,
+        valid=frame.valid,
+        wraps=layout.wraps,
     )
     counts = frame.counts.astype(np.float64)
     floor = max(threshold, 1)

@@ -35,10 +35,14 @@ def add_arm(parser: argparse.ArgumentParser, use: str) -> None:
         help=f"the arm that carries the skin, {use}",
     )
     parser.add_argument(
-        "--base", metavar="LINK", help="in a URDF, the first link of the arm"
+        "--base",
+        metavar="LINK",
+        help="in a URDF, the first link of the arm",
     )
     parser.add_argument(
-        "--tip", metavar="LINK", help="in a URDF, the link that carries the skin"
+        "--tip",
+        metavar="LINK",
+        help="in a URDF, the link that carries the skin",
     )
 
 

@@ -89,7 +89,9 @@ def run(arguments: argparse.Namespace) -> int:
             if live.page is None and frame.t >= due:
                 due = frame.t + interval_s
                 print(
-                    terminal.screen(draw(frame, layout, decisions)), end="", flush=True
+                    terminal.screen(draw(frame, layout, decisions)),
+                    end="",
+                    flush=True,
                 )
     return 0
 

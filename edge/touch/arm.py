@@ -52,7 +52,10 @@ class Chain:
     """
 
     def __init__(
-        self, joints: Sequence[Joint], base: str = "base", tip: str = "tip"
+        self,
+        joints: Sequence[Joint],
+        base: str = "base",
+        tip: str = "tip",
     ) -> None:
         """Make a chain of joints; a joint of the kind "fixed" takes no angle.
 
@@ -148,7 +151,10 @@ class Chain:
         return x, y, z
 
     def _carried(
-        self, angles: Any, position: Any, sin: Callable[[Any], Any]
+        self,
+        angles: Any,
+        position: Any,
+        sin: Callable[[Any], Any],
     ) -> tuple[Any, ...]:
         """(x, y, z) in the base's frame of coordinates (4,) in the tip's frame.
 
@@ -253,7 +259,11 @@ def _rows(step: NDArray[np.float64]) -> tuple[float, ...]:
 
 
 def _moved(
-    step: tuple[float, ...], x: Any, y: Any, z: Any, w: Any
+    step: tuple[float, ...],
+    x: Any,
+    y: Any,
+    z: Any,
+    w: Any,
 ) -> tuple[Any, Any, Any]:
     """Homogeneous coordinates after a fixed step."""
     a, b, c, tx, d, e, f, ty, g, h, i, tz = step

@@ -8,7 +8,9 @@ from edge.touch.arm import Chain
 
 
 def read_arm(
-    path: str | os.PathLike[str], base: str | None = None, tip: str | None = None
+    path: str | os.PathLike[str],
+    base: str | None = None,
+    tip: str | None = None,
 ) -> Chain:
     """The chain of a TOML file, or of a URDF file between two of its links.
 

@@ -99,7 +99,9 @@ def _roots(count: int, first: Integers, second: Integers) -> Integers:
 
 
 def _peaks(
-    components: Components, active: NDArray[np.bool_], counts: NDArray[Any]
+    components: Components,
+    active: NDArray[np.bool_],
+    counts: NDArray[Any],
 ) -> NDArray[np.int64]:
     """(components,) the largest count of each."""
     peaks = np.full(len(components.areas), counts.min(), dtype=np.int64)
@@ -108,7 +110,9 @@ def _peaks(
 
 
 def all_of(
-    active: NDArray[np.bool_], counts: NDArray[Any], wraps: bool
+    active: NDArray[np.bool_],
+    counts: NDArray[Any],
+    wraps: bool,
 ) -> list[tuple[int, int]]:
     """Taxels, as the bits of `edge.touch.active.Grid`, and peak of each component.
 

@@ -132,7 +132,10 @@ class Measurer:
     """
 
     def __init__(
-        self, layout: SkinLayout, names: Sequence[str], joints: int = 0
+        self,
+        layout: SkinLayout,
+        names: Sequence[str],
+        joints: int = 0,
     ) -> None:
         types = feature_types(names)
         quantities = {feature.quantity for feature in types}
@@ -172,7 +175,11 @@ class Contact:
     """
 
     def __init__(
-        self, onset_s: float, region: Region, measurer: Measurer, chain: Chain | None
+        self,
+        onset_s: float,
+        region: Region,
+        measurer: Measurer,
+        chain: Chain | None,
     ) -> None:
         self.onset_s = onset_s
         self.age_s = 0.0
@@ -195,7 +202,11 @@ class Contact:
         """The counts of the last frame."""
 
     def add(
-        self, frame: Frame, active: ActiveTaxels, region: Region | None, age_s: float
+        self,
+        frame: Frame,
+        active: ActiveTaxels,
+        region: Region | None,
+        age_s: float,
     ) -> None:
         """Take in a frame.
 
@@ -256,7 +267,10 @@ class Contact:
                 del self._starts[name]
 
     def _motions(
-        self, frame: Frame, region: Region | None, zones: list[int]
+        self,
+        frame: Frame,
+        region: Region | None,
+        zones: list[int],
     ) -> dict[str, float]:
         """The distances that the centroids have travelled, without contact the last."""
         measurer = self._measurer
@@ -274,7 +288,9 @@ class Contact:
             _, _, force, rows, cols, *_ = zones
             centroid = rows / force, cols / force % self.layout.cols
             motions["force_motion"] = self._distance(
-                "force_motion", centroid, frame.joints
+                "force_motion",
+                centroid,
+                frame.joints,
             )
         return motions
 
@@ -308,7 +324,9 @@ class Contact:
         return math.dist(position, self._starts.setdefault(name, position))
 
     def _located(
-        self, centroid: tuple[float, float], joints: NDArray[np.float64] | None
+        self,
+        centroid: tuple[float, float],
+        joints: NDArray[np.float64] | None,
     ) -> Vector | None:
         """Where a point of the skin lies; None if an arm's angles are not known."""
         point = self.layout.position(*centroid)

@@ -38,7 +38,10 @@ def is_several(series: FeatureSeries) -> bool:
 
 
 def frame_doubts(
-    series: FeatureSeries, window_s: float, several_share: float, limits: Limits
+    series: FeatureSeries,
+    window_s: float,
+    several_share: float,
+    limits: Limits,
 ) -> dict[str, bool]:
     """{flag: whether it holds} for the frames of a contact's window.
 

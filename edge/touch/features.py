@@ -25,7 +25,10 @@ WINDOW_S = 1.2
 
 
 def widths(
-    names: Sequence[str], samples: int, layout: SkinLayout, joints: int = 0
+    names: Sequence[str],
+    samples: int,
+    layout: SkinLayout,
+    joints: int = 0,
 ) -> tuple[int, ...]:
     """How many values of a vector each feature takes, in their order.
 
@@ -131,7 +134,10 @@ class _Course:
     """The measurements of a contact, sampled at times of its window."""
 
     def __init__(
-        self, series: FeatureSeries, window_s: float, tables: Mapping[str, KernelTable]
+        self,
+        series: FeatureSeries,
+        window_s: float,
+        tables: Mapping[str, KernelTable],
     ) -> None:
         self._series = series
         self._window_s = window_s
@@ -169,7 +175,9 @@ class _Course:
         return kernels.shares(channels, self._tables[name])
 
     def _sampled(
-        self, group: tuple[Feature, ...], times: NDArray[np.float64]
+        self,
+        group: tuple[Feature, ...],
+        times: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """(rows, times) features of one value a frame, or of one wide feature."""
         first = group[0]
@@ -222,7 +230,9 @@ class _Course:
 
 
 def _resample(
-    times: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[Any]
+    times: NDArray[np.float64],
+    t: NDArray[np.float64],
+    values: NDArray[Any],
 ) -> NDArray[np.float64]:
     """Values (..., n) at the increasing times `t`, interpolated to `times`.
 

@@ -203,7 +203,10 @@ class Joints:
 
 @contextmanager
 def open_joints(
-    option: str, dof: int | None, names: Sequence[str] | None, now: Callable[[], float]
+    option: str,
+    dof: int | None,
+    names: Sequence[str] | None,
+    now: Callable[[], float],
 ) -> Iterator[Joints]:
     """The joint angles that `--joints` names, closed at the end of the block.
 
@@ -264,7 +267,10 @@ class Datagrams:
             InputError: the address is not of that form or cannot be bound.
         """
         host, port = parse_address(
-            "--joints udp:", address, "udp:127.0.0.1:47401", "127.0.0.1"
+            "--joints udp:",
+            address,
+            "udp:127.0.0.1:47401",
+            "127.0.0.1",
         )
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.listener = socket.socket(family, socket.SOCK_DGRAM)

@@ -73,7 +73,10 @@ class KernelTable:
 
     @classmethod
     def from_table(
-        cls, table: ConfigTable, name: str, layout: SkinLayout
+        cls,
+        table: ConfigTable,
+        name: str,
+        layout: SkinLayout,
     ) -> KernelTable:
         """Read the table of a feature from a model's metadata, which holds its `vars`.
 
@@ -173,7 +176,9 @@ def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float6
 
 
 def kernel_channels(
-    series: FeatureSeries, window_s: float, name: str
+    series: FeatureSeries,
+    window_s: float,
+    name: str,
 ) -> NDArray[np.int64]:
     """(channels, `edge.touch.SAMPLES`) numbers to which a feature's kernels are
     applied.

@@ -28,7 +28,10 @@ def above(level: float, margin: float = MARGIN) -> tuple[int, int]:
 
 
 def doubt(
-    t: NDArray[np.float64], frames: NDArray[np.uint16], skin: dict[str, Any], onset: int
+    t: NDArray[np.float64],
+    frames: NDArray[np.uint16],
+    skin: dict[str, Any],
+    onset: int,
 ) -> str | None:
     """Why a recording's thresholds (`skin`, and the `onset` of them) may not suit it,
     or None."""

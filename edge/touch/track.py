@@ -282,7 +282,10 @@ class StillTaxels:
             self._look(frame, active, any_active)
 
     def _take_back(
-        self, frame: Frame, active: NDArray[np.bool_], aside: NDArray[np.bool_]
+        self,
+        frame: Frame,
+        active: NDArray[np.bool_],
+        aside: NDArray[np.bool_],
     ) -> None:
         change = np.abs(frame.counts - self._levels)
         most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
@@ -350,7 +353,11 @@ class WatchfulTracker(ContactTracker):
         return self._beside(frame, active, self._active(frame, valid), age_s)
 
     def _beside(
-        self, frame: Frame, active: ActiveTaxels, beside: ActiveTaxels, age_s: float
+        self,
+        frame: Frame,
+        active: ActiveTaxels,
+        beside: ActiveTaxels,
+        age_s: float,
     ) -> list[Contact]:
         """Follow the active taxels `beside` those that are set aside."""
         if self._early and age_s <= EARLY_S and _grown(active, beside):
@@ -373,7 +380,10 @@ class WatchfulTracker(ContactTracker):
         ]
 
     def _touched(
-        self, frame: Frame, active: ActiveTaxels, age_s: float
+        self,
+        frame: Frame,
+        active: ActiveTaxels,
+        age_s: float,
     ) -> list[Contact]:
         """Follow what was set aside and is touched, from the first frame if it soon
         changed."""

@@ -35,7 +35,9 @@ def _floor(feature: Feature, layout: SkinLayout) -> float:
 
 
 def transformed(
-    values: NDArray[Any], group: Sequence[Feature], layout: SkinLayout
+    values: NDArray[Any],
+    group: Sequence[Feature],
+    layout: SkinLayout,
 ) -> NDArray[Any]:
     """Samples (rows, times) after the transforms of their features, which are of one
     kind."""
@@ -66,7 +68,9 @@ def _transformed(
 
 
 def summarised(
-    values: NDArray[np.float64], summary: str, step_s: float
+    values: NDArray[np.float64],
+    summary: str,
+    step_s: float,
 ) -> NDArray[Any]:
     """A summary of samples (rows, times) that are `step_s` apart."""
     if summary == "rate":

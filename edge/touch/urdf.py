@@ -12,7 +12,9 @@ LOG = logging.getLogger(__name__)
 
 
 def joints_between(
-    path: str | os.PathLike[str], base: str, tip: str
+    path: str | os.PathLike[str],
+    base: str,
+    tip: str,
 ) -> list[dict[str, Any]]:
     """The joints from link `base` to link `tip`, as tables for
     `edge.touch.arm.Chain.from_dict`.

@@ -138,7 +138,10 @@ def quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray
     # 2^-25 of the skin's larger side.
     determinant = np.maximum(rows * cols - slant * slant, 0.0)
     smaller = np.divide(
-        determinant, larger, out=np.zeros_like(larger), where=larger > 0
+        determinant,
+        larger,
+        out=np.zeros_like(larger),
+        where=larger > 0,
     )
     return {
         "max_force": peak / scale,

@@ -29,7 +29,9 @@ def bench_decision(rows, components, against):
     y = np.array([f"object {i:02d}" for i in rng.integers(0, 18, rows)])
     ours = Ours(X, y, Choice("IV", components, K))
     usual = make_pipeline(
-        StandardScaler(), PCA(components, svd_solver="full"), KNeighborsClassifier(K)
+        StandardScaler(),
+        PCA(components, svd_solver="full"),
+        KNeighborsClassifier(K),
     ).fit(X, y)
     converted = to_onnx(usual, X[:1].astype(np.float32), options={"zipmap": False})
     vector = X[0] + 0.1

@@ -36,7 +36,9 @@ def bench_features(against, note, names):
     felt = series.felt(WINDOW_S)
     tables = {
         name: kernel_table(
-            [kernel_channels(felt, WINDOW_S, name)], biases, name == "taxel_kernels"
+            [kernel_channels(felt, WINDOW_S, name)],
+            biases,
+            name == "taxel_kernels",
         )
         for name, biases in NUMBERS.items()
         if name in features

@@ -24,7 +24,12 @@ PITCH_M = 0.0108
 """The middle of the skin's 16 rows, and the distance between two."""
 BOX = Thing("box", floor=0.3, skin=0.4, height_m=0.3, below_m=0.15)
 FOAM = Thing(
-    "foam", floor=0.3, skin=0.4, height_m=14 * PITCH_M, breadth_m=0.15, modulus_pa=8e3
+    "foam",
+    floor=0.3,
+    skin=0.4,
+    height_m=14 * PITCH_M,
+    breadth_m=0.15,
+    modulus_pa=8e3,
 )
 """The box is taller than the skin and the foam ends between two rows. On an end,
 MuJoCo's pad is a ball and our taxel a square, which says nothing about physics."""

@@ -141,13 +141,24 @@ class Rub:
         force = self.pull * along
         for body, push in ((self.arm, -force), (self.thing, force)):
             mujoco.mj_applyFT(
-                self.model, data, push, np.zeros(3), point, body, data.qfrc_applied
+                self.model,
+                data,
+                push,
+                np.zeros(3),
+                point,
+                body,
+                data.qfrc_applied,
             )
 
     def _speed(self, data, body, point):
         """(3,) m/s of a point of a body."""
         spatial = np.zeros(6)
         mujoco.mj_objectVelocity(
-            self.model, data, mujoco.mjtObj.mjOBJ_BODY, body, spatial, 0
+            self.model,
+            data,
+            mujoco.mjtObj.mjOBJ_BODY,
+            body,
+            spatial,
+            0,
         )
         return np.asarray(spatial[3:] + np.cross(spatial[:3], point - data.xpos[body]))

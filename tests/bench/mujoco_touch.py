@@ -378,7 +378,9 @@ def readings(touch, loads, pulls):
         counts += generator.normal(0.0, size, counts.shape)
         shear += generator.spawn(1)[0].normal(0.0, size, shear.shape)
     shear = np.where(
-        np.abs(shear) < LEAST_COUNTS, 0.0, shear.clip(-MOST_COUNTS, MOST_COUNTS)
+        np.abs(shear) < LEAST_COUNTS,
+        0.0,
+        shear.clip(-MOST_COUNTS, MOST_COUNTS),
     )
     counts = np.where(counts < LEAST_COUNTS, 0.0, np.minimum(counts, MOST_COUNTS))
     return counts.astype(np.uint16), np.rint(shear).astype(np.int16)

@@ -125,7 +125,11 @@ def judged(drawn, labels):
     for window in POINTS_S:
         decided = POINTS_S if window == WINDOW_S else ()
         fitted = fit(
-            drawn, window_s=window, decision_points_s=decided, quick=True, jobs=1
+            drawn,
+            window_s=window,
+            decision_points_s=decided,
+            quick=True,
+            jobs=1,
         )
         vectors = drawn.vectors([window], others, fitted.dataset.names)
         answered = answers([fitted.classifier], vectors)

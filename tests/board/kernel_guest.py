@@ -173,7 +173,13 @@ RECORD = "--label object=box --trials 1 --length 60"
     ],
 )
 def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
-    tmp_path, edge, skin, command, options, expected, times
+    tmp_path,
+    edge,
+    skin,
+    command,
+    options,
+    expected,
+    times,
 ):
     rig = Rig(skin, tmp_path)
     frames = rig.touch
@@ -211,7 +217,12 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
     ids=["absent chip", "shortened transfer", "stalled transfer", "hung transfer"],
 )
 def test_a_transfer_fails_with_its_error_and_the_next_is_carried(
-    pad, bus, fault, address, error, lasts_s
+    pad,
+    bus,
+    fault,
+    address,
+    error,
+    lasts_s,
 ):
     pad.adapter.short = fault == "short"
     if isinstance(fault, int):

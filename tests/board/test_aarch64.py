@@ -92,7 +92,9 @@ def python(wheel, counts):
 
 
 def test_labels_neighbours_and_integers_are_those_of_x86_and_floats_within_the_bound(
-    python, exported, tmp_path
+    python,
+    exported,
+    tmp_path,
 ):
     """In one process, as its start takes long: shipped model, the tests' model, the
     hard cases."""

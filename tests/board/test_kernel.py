@@ -125,7 +125,9 @@ def skins(tmp_path_factory):
     export = f"export --data {touches}/touches --out {touches} --features paper --projection pca"
     for command in (fake, f"{export} --decision-points none"):
         subprocess.run(
-            [sys.executable, "-m", *command.split()], cwd=CHECKOUT, check=True
+            [sys.executable, "-m", *command.split()],
+            cwd=CHECKOUT,
+            check=True,
         )
     shutil.copy(touches / "model.onnx", folder / "pad.onnx")
     shutil.copy(MODEL, folder / "cody.onnx")

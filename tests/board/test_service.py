@@ -107,7 +107,9 @@ def started(machine):
 
 def test_the_unit_is_valid(machine):
     printed = machine.run(
-        "bash", "-c", f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?"
+        "bash",
+        "-c",
+        f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?",
     )
     assert printed.splitlines()[-1] == "0", printed
 

@@ -113,7 +113,10 @@ def without_a_pose(touch):
     ],
 )
 def test_a_new_touch_is_flagged_only_where_something_is_missing(
-    model, make_touch, change, flags
+    model,
+    make_touch,
+    change,
+    flags,
 ):
     events = [e for _, e in watch(model, change(make_touch(kind="soft", seed=99)))]
     assert [e.flags for e in events if isinstance(e, Decided)] == [flags] * 2
@@ -121,7 +124,10 @@ def test_a_new_touch_is_flagged_only_where_something_is_missing(
 
 @pytest.mark.parametrize(("scale", "labelled"), [(0.01, True), (1e-300, False)])
 def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
-    model, make_touch, scale, labelled
+    model,
+    make_touch,
+    scale,
+    labelled,
 ):
     recording = make_touch(kind="soft", seed=99)
     skin = {**recording.meta["skin"], "counts_per_newton": scale}
@@ -134,7 +140,9 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
 
 
 def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
-    exported, make_touch, monkeypatch
+    exported,
+    make_touch,
+    monkeypatch,
 ):
     broken = Model(exported / "model.onnx")
 

@@ -97,7 +97,9 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
 
 @pytest.mark.parametrize(("error", "status"), [(InputError, 2), (BusMissing, 3)])
 def test_bad_input_is_one_sentence_and_exit_2_and_a_device_exit_3(
-    capsys, error, status
+    capsys,
+    error,
+    status,
 ):
     assert cli.dispatch(top(raising(error("a: not there"))), []) == status
     assert capsys.readouterr().err == "edge-classify: a: not there\n"

@@ -20,7 +20,9 @@ def said(check):
     with pytest.raises(InputError) as caught:
         check(
             ConfigTable(
-                {"a": "x", "n": 7, "h": HUGE, "f": BEYOND_FLOATS}, "my.toml", "read."
+                {"a": "x", "n": 7, "h": HUGE, "f": BEYOND_FLOATS},
+                "my.toml",
+                "read.",
             )
         )
     return str(caught.value)

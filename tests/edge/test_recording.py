@@ -26,7 +26,11 @@ def test_what_is_saved_is_loaded(make_touch, tmp_path):
     valid = np.ones(recording.frames.shape, dtype=bool)
     valid[3, 4, 5] = False
     full = Recording(
-        recording.t, recording.frames, recording.joints, valid, recording.meta
+        recording.t,
+        recording.frames,
+        recording.joints,
+        valid,
+        recording.meta,
     )
     save(tmp_path / "a.npz", full)
     back = load(tmp_path / "a.npz")
@@ -167,7 +171,9 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(
-    case, make_touch, tmp_path
+    case,
+    make_touch,
+    tmp_path,
 ):
     damage, sentence = WRONG[case]
     path = tmp_path / "wrong.npz"
@@ -215,7 +221,11 @@ def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path
     ],
 )
 def test_times_that_do_not_seem_to_be_in_seconds_are_named(
-    make_touch, tmp_path, caplog, factor, said
+    make_touch,
+    tmp_path,
+    caplog,
+    factor,
+    said,
 ):
     recording = make_touch()
     save(tmp_path / "a.npz", replace(recording, t=recording.t * factor))

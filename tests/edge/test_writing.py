@@ -101,7 +101,9 @@ def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeyp
     replace = os.replace
     monkeypatch.setattr(os, "fsync", lambda fd: order.append("fsync") or fsync(fd))
     monkeypatch.setattr(
-        os, "replace", lambda *names: order.append("name") or replace(*names)
+        os,
+        "replace",
+        lambda *names: order.append("name") or replace(*names),
     )
     with write_whole(tmp_path / "a") as file:
         file.write(b"x")

@@ -26,7 +26,9 @@ def test_a_fitted_model_is_saved_with_its_golden_outputs(fitted, tmp_path):
 
 
 def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(
-    fitted, recordings, tmp_path
+    fitted,
+    recordings,
+    tmp_path,
 ):
     path = tmp_path / "model.onnx"
     export.save(path, fitted, "pads")
@@ -43,7 +45,9 @@ def test_a_model_has_a_name_a_version_and_the_names_of_its_trials(
 
 
 def test_trials_of_one_recording_are_numbered_and_too_many_names_are_left_out(
-    fitted, tmp_path, monkeypatch
+    fitted,
+    tmp_path,
+    monkeypatch,
 ):
     trials = fitted.dataset.trials
     twice = replace(fitted.dataset, trials=(*trials[:2], trials[1]))

@@ -188,7 +188,9 @@ def test_the_board_stops_where_the_rule_does(early, make_touch, error):
 
 
 def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
-    early, make_touch, error
+    early,
+    make_touch,
+    error,
 ):
     events = decided(early, make_touch(kind="soft", seed=50, seconds=0.25), error)
     assert list(events) == list(early.info.tasks)
@@ -196,7 +198,10 @@ def test_a_stream_that_ends_before_any_rule_is_sure_is_decided_at_its_end(
 
 
 def test_a_task_that_is_never_sure_waits_for_the_last_decision_point_of_its_rule(
-    early, make_touch, monkeypatch, error
+    early,
+    make_touch,
+    monkeypatch,
+    error,
 ):
     rule = replace(stopping_rules(early, error)["category"], confidence=2.0, last=1)
     waits = replace(early.info.stopping["category"], rules=(rule,))
@@ -223,7 +228,10 @@ def test_a_task_without_a_certified_rule_says_so(uncertified, make_touch, error)
 
 @pytest.mark.parametrize("seed", range(50, 56))
 def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
-    uncertified, make_touch, error, seed
+    uncertified,
+    make_touch,
+    error,
+    seed,
 ):
     touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
     asked = decided(uncertified, touch, error)["object"]
@@ -413,7 +421,9 @@ ALL_COUNTED = {"t": {0: "d", 1: "a", 2: "d"}, "u": {0: "y", 1: "z", 2: "x"}}
 
 
 @pytest.fixture(
-    scope="module", params=[False, True], ids=["known labels", "new labels"]
+    scope="module",
+    params=[False, True],
+    ids=["known labels", "new labels"],
 )
 def lesson(early, tmp_path_factory, request):
     """A model of two tasks, taught further trials, and the estimators with their rows.
@@ -440,7 +450,11 @@ def lesson(early, tmp_path_factory, request):
     oracle = path.with_name("oracle.onnx")
     oracle.write_bytes(to_onnx(sequential, described))
     return SimpleNamespace(
-        new=new, model=model, more=more, queries=queries, oracle=Model(oracle)
+        new=new,
+        model=model,
+        more=more,
+        queries=queries,
+        oracle=Model(oracle),
     )
 
 
@@ -464,7 +478,9 @@ def test_a_taught_model_says_how_many_trials_and_which_labels_it_has(lesson):
 
 
 def test_the_golden_file_of_a_taught_model_holds_the_further_trials(
-    lesson, folder, tmp_path
+    lesson,
+    folder,
+    tmp_path,
 ):
     renewed = tmp_path / "golden.npz"
     renew(folder / "out" / "golden.npz", renewed, lesson.model, lesson.more)

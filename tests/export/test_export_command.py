@@ -128,7 +128,12 @@ def test_fixed_values_and_some_tasks(recordings, tmp_path):
     ],
 )
 def test_options_that_make_no_sense_are_one_sentence(
-    options, word, recordings, tmp_path, capsys, monkeypatch
+    options,
+    word,
+    recordings,
+    tmp_path,
+    capsys,
+    monkeypatch,
 ):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
@@ -150,7 +155,11 @@ def test_options_that_make_no_sense_are_one_sentence(
     ],
 )
 def test_decision_points_before_a_window_hold_it_fixed(
-    options, window_s, points, tmp_path, monkeypatch
+    options,
+    window_s,
+    points,
+    tmp_path,
+    monkeypatch,
 ):
     asked = Mock(side_effect=InputError("enough"))
     monkeypatch.setattr("export.cli.fit", asked)
@@ -214,7 +223,11 @@ def test_the_accuracy_of_each_folder_is_printed(recordings, tmp_path, capsys):
 
 
 def test_recordings_that_are_held_out_are_scored_by_both_models(
-    exported, recordings, held_out, tmp_path, capsys
+    exported,
+    recordings,
+    held_out,
+    tmp_path,
+    capsys,
 ):
     words = "--quick --features paper --decision-points none".split()
     words += ["--test", held_out, "--compare", exported / "model.onnx"]
@@ -226,7 +239,11 @@ def test_recordings_that_are_held_out_are_scored_by_both_models(
 
 
 def test_a_former_model_in_the_same_place_is_compared_as_it_was(
-    exported, recordings, held_out, tmp_path, capsys
+    exported,
+    recordings,
+    held_out,
+    tmp_path,
+    capsys,
 ):
     path = shutil.copy(exported / "model.onnx", tmp_path)
     words = "--features max_force --projection pca --decision-points none".split()
@@ -247,7 +264,11 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
     ],
 )
 def test_held_out_recordings_and_a_former_model_are_read_before_any_work(
-    words, sentence, tmp_path, capsys, monkeypatch
+    words,
+    sentence,
+    tmp_path,
+    capsys,
+    monkeypatch,
 ):
     monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
     assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2

@@ -50,7 +50,9 @@ def test_its_golden_file_holds(six, edge):
 
 
 def test_kernels_ride_in_the_model_and_give_the_board_the_same_bits(
-    recordings, tmp_path, edge
+    recordings,
+    tmp_path,
+    edge,
 ):
     words = ("--quick", "--features", "kernels", "zone_kernels", "--tasks", "object")
     export(tmp_path, "--data", recordings, *words)

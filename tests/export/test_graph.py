@@ -141,7 +141,10 @@ def coordinates_of(graph):
     seed=st.integers(0, 10**6),
 )
 def test_every_number_of_the_graph_is_that_of_whole_numbers(
-    kind, projection, scaling, seed
+    kind,
+    projection,
+    scaling,
+    seed,
 ):
     """Coordinates, squared distances, neighbours and labels, by two engines and by
     training."""

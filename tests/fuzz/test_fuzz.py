@@ -129,7 +129,9 @@ BROKE = {
 
 @pytest.mark.parametrize(("name", "sentence"), BROKE.items(), ids=BROKE)
 def test_a_file_that_once_broke_a_reader_is_refused_with_a_sentence(
-    name, sentence, path_for
+    name,
+    sentence,
+    path_for,
 ):
     reader = BY_NAME[name.split("-")[0]]
     path = path_for(reader)

@@ -46,7 +46,11 @@ def ask(golden, python, path=""):
     command = [*python, "-P", "-c", GUEST, *map(str, sets(golden))]
     environment = {**os.environ, "PYTHONPATH": path}
     done = subprocess.run(
-        command, env=environment, stdout=subprocess.PIPE, text=True, check=True
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
     )
     machine = {}
     shares = {}
@@ -68,7 +72,9 @@ def main(argv=None):
     parser = argparse.ArgumentParser(prog="elsewhere", description=__doc__)
     parser.add_argument("--golden", type=Path, default=Path("build/hard-cases/golden"))
     parser.add_argument(
-        "python", nargs="+", help="the command that runs the other Python"
+        "python",
+        nargs="+",
+        help="the command that runs the other Python",
     )
     arguments = parser.parse_args(argv)
     if not sets(arguments.golden):

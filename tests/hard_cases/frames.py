@@ -17,7 +17,13 @@ from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 
 FULL_SCALE = "3554 and 24331"
 FOREARM = SkinLayout(
-    16, 24, True, (0.0108, 0.01205), 0.046, threshold_counts=50, onset_counts=50
+    16,
+    24,
+    True,
+    (0.0108, 0.01205),
+    0.046,
+    threshold_counts=50,
+    onset_counts=50,
 )
 
 
@@ -66,7 +72,9 @@ def flicker_error(seed):
     for i in range(40):
         first, second = (101, 100) if i == 0 or rng.random() < 0.5 else (100, 101)
         counts = taxels((3, 5), (3, 6), value=first) + taxels(
-            (12, 17), (12, 18), value=second
+            (12, 17),
+            (12, 18),
+            value=second,
         )
         frames.append(Frame(0.01 * i, counts))
     return float(np.abs(contact_of(frames).series().motion).max())
@@ -89,7 +97,9 @@ def times_error(seed, shortest):
     peaks = list(latest.values())
     worst = 0.0
     for sample, time in zip(
-        vector.tolist(), (np.arange(40) * (1.2 / 39)).tolist(), strict=True
+        vector.tolist(),
+        (np.arange(40) * (1.2 / 39)).tolist(),
+        strict=True,
     ):
         if time >= t[-1]:
             worst = max(worst, abs(sample - peaks[-1]) / 65536)

@@ -71,7 +71,10 @@ def short(recording):
     frames = recording.frames[20:].copy()
     frames[60:] = 0
     return replace(
-        recording, frames=frames, t=recording.t[20:], joints=recording.joints[20:]
+        recording,
+        frames=frames,
+        t=recording.t[20:],
+        joints=recording.joints[20:],
     )
 
 

@@ -68,7 +68,9 @@ def clock_error(start):
     worst = Fraction(0)
     for samples, course in zip(vector.tolist(), courses, strict=True):
         for sample, time in zip(
-            samples, np.linspace(0.0, 1.2, 40).tolist(), strict=True
+            samples,
+            np.linspace(0.0, 1.2, 40).tolist(),
+            strict=True,
         ):
             place = Fraction(time) * 128
             whole = place.numerator // place.denominator

@@ -147,7 +147,9 @@ def session(data, level=None, threads=1):
     if level is not None:
         options.graph_optimization_level = level
     return onnxruntime.InferenceSession(
-        data, options, providers=["CPUExecutionProvider"]
+        data,
+        options,
+        providers=["CPUExecutionProvider"],
     )
 
 

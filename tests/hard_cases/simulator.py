@@ -13,7 +13,12 @@ def push_error(h, mu, steps=120):
     grid = np.meshgrid(10.0 ** np.arange(-3, 16, 2), 10.0 ** np.arange(-9, 10, 1.8))
     stiffness, mass = (values.ravel() for values in grid)
     rig = slider(
-        np.full(mass.size, h), mass, mu, 0.8 * mu, speed=SPEED, law=Law(stiffness[None])
+        np.full(mass.size, h),
+        mass,
+        mu,
+        0.8 * mu,
+        speed=SPEED,
+        law=Law(stiffness[None]),
     )
     trace = rig.run(steps)
     pushes = (

@@ -68,7 +68,9 @@ def settled():
     unseen = AnswerTable(folds // 2, choices, {"t": np.stack([~right] * 2)})
     objects = Groups("object", folds.astype(str), frozenset({"t"}), unseen.folds)
     dataset = SimpleNamespace(
-        names=("max_force",), widths=lambda samples: (1,), untouched_labels=lambda t: ()
+        names=("max_force",),
+        widths=lambda samples: (1,),
+        untouched_labels=lambda t: (),
     )
 
     def settle(grouped):
@@ -178,7 +180,11 @@ def touches(make_touch, folder, seconds, late_s):
     for seed in range(20):
         labels = {"kind": "ab"[seed % 2]}
         touch = make_touch(
-            seed=seed, seconds=seconds, arm=False, rate=25.0, labels=labels
+            seed=seed,
+            seconds=seconds,
+            arm=False,
+            rate=25.0,
+            labels=labels,
         )
         frames = np.minimum(touch.frames, 700)
         frames[touch.t > 0.2 + late_s] //= 1 + seed % 2

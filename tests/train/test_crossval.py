@@ -143,7 +143,9 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
 @pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (0.02, 0.005), (2e-4, 0.5)])
 @pytest.mark.parametrize("shape", [(60, 120), (120, 60)])
 def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(
-    shape, share, gap
+    shape,
+    share,
+    gap,
 ):
     """Where the last axis' share of the largest variance times its relative gap is
     1e-4."""

@@ -81,7 +81,10 @@ def test_recordings_without_shear_are_left_out_and_named(sheared, recordings, tm
 
 
 def test_a_model_of_shear_is_verified_and_refuses_a_skin_without_it(
-    sheared, recordings, tmp_path, capsys
+    sheared,
+    recordings,
+    tmp_path,
+    capsys,
 ):
     features = ("--features", "contact", "shear", "--projection", "pca")
     export(tmp_path, "--data", sheared, "--quick", *features)
@@ -231,7 +234,10 @@ def test_a_contacts_label_that_is_a_whole_number_becomes_text(two, tmp_path):
     ],
 )
 def test_labels_of_contacts_that_do_not_fit_are_one_sentence(
-    contacts, word, two, tmp_path
+    contacts,
+    word,
+    two,
+    tmp_path,
 ):
     save(tmp_path / "two.npz", described(two, contacts=contacts))
     with pytest.raises(InputError, match=f"two.npz: meta.contacts .*{word}"):
@@ -269,7 +275,10 @@ ONE_JOINT = {"joint": [{"axis": [0, 0, 1]}]}
     ],
 )
 def test_recordings_that_do_not_belong_together_are_refused(
-    change, word, folder, make_touch
+    change,
+    word,
+    folder,
+    make_touch,
 ):
     save(folder / "odd.npz", change(make_touch()))
     with pytest.raises(InputError, match=word):
@@ -309,7 +318,9 @@ def test_recordings_that_name_no_arm_take_the_one_given(make_touch, tmp_path):
 
 
 def test_angles_are_measured_by_the_names_of_their_joints(
-    recordings, make_touch, tmp_path
+    recordings,
+    make_touch,
+    tmp_path,
 ):
     """A recording whose columns are reversed, with a wheel between them, has the same
     features."""

@@ -22,7 +22,10 @@ from train.settings import Settings
     ],
 )
 def test_a_model_has_the_decision_points_that_keep_it_small(
-    trials, objects, components, points
+    trials,
+    objects,
+    components,
+    points,
 ):
     labels = np.array([f"object {i % objects}" for i in range(trials)])
     data = SimpleNamespace(

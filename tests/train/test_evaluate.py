@@ -203,7 +203,10 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
 
     def table(right, **repeated):
         return AnswerTable(
-            folds, {"t": settings}, {"t": np.stack([right] * 2)}, **repeated
+            folds,
+            {"t": settings},
+            {"t": np.stack([right] * 2)},
+            **repeated,
         )
 
     both = table(first, repeated=(table(second),))

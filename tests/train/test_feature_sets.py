@@ -48,7 +48,10 @@ def touch(peaks, step=0.25, joints=None):
 
 def vector_of(frames, *features, samples=5, window=1.0, **options):
     return feature_vector(
-        series_of(frames, features, **options), window, samples, features
+        series_of(frames, features, **options),
+        window,
+        samples,
+        features,
     )
 
 
@@ -119,7 +122,11 @@ def test_widths_are_those_of_courses_cells_joints_and_single_numbers():
 
 def test_a_name_says_its_own_number_of_times():
     vector = vector_of(
-        touch(PEAKS), "max_force@3", "max_force", "taxel_force_mean@2", samples=5
+        touch(PEAKS),
+        "max_force@3",
+        "max_force",
+        "taxel_force_mean@2",
+        samples=5,
     )
     assert vector[:3].tolist() == [1.0, 2.0, 4.0]
     assert vector[3:8].tolist() == [p / 100 for p in PEAKS]
@@ -156,7 +163,9 @@ def test_summaries_are_one_number_of_the_transformed_samples():
         "sqrt_max_force_roughness",
     )
     assert vector == pytest.approx(
-        [mean, deviation, math.fsum(steps) / 4], rel=4e-16, abs=1e-15
+        [mean, deviation, math.fsum(steps) / 4],
+        rel=4e-16,
+        abs=1e-15,
     )
 
 
@@ -181,12 +190,19 @@ def test_pressure_is_force_over_area_and_stiffness_force_over_motion():
     frames[1].counts[1, 3] = 200
     frames[2].counts[:] = 0
     pressure = vector_of(
-        frames, "skin_pressure", "left_pressure", window=0.5, samples=3
+        frames,
+        "skin_pressure",
+        "left_pressure",
+        window=0.5,
+        samples=3,
     )
     assert pressure == pytest.approx([0.75, 3.5 / 3, 0.0, 0.75, 0.75, 0.0])
     features = ["stiffness", "skin_force", "force_motion"]
     stiffness, force, motion = vector_of(
-        frames, *features, window=0.5, samples=3
+        frames,
+        *features,
+        window=0.5,
+        samples=3,
     ).reshape(3, 3)
     assert stiffness[:2] == pytest.approx((force[:2] + 0.1) / (motion[:2] + 0.002))
     assert stiffness[0] == pytest.approx(1.6 / 0.002)
@@ -218,7 +234,10 @@ def test_joints_are_taken_as_they_change_from_onset_on_and_as_they_are():
 def test_angles_that_lack_are_interpolated_and_flagged():
     angles = [np.array([1.0]), None, np.array([2.0]), None, np.array([3.0])]
     contact = followed(
-        SKIN, touch(PEAKS, joints=angles), features=["joint_angle"], joints=1
+        SKIN,
+        touch(PEAKS, joints=angles),
+        features=["joint_angle"],
+        joints=1,
     )
     assert contact.missing_pose
     vector = feature_vector(contact.series(), 1.0, 5, ["joint_angle"])

@@ -113,7 +113,9 @@ def test_early_errors_of_recorded_objects_are_told_for_both_ways_to_choose(objec
 
 
 def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
-    recordings, make_touch, tmp_path
+    recordings,
+    make_touch,
+    tmp_path,
 ):
     for name, label in (("missed", "rigid-fixed"), ("empty", "none")):
         labels = {"category": label, "object": "hard 0"}
@@ -121,7 +123,11 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     paths = [str(recordings), str(tmp_path)]
     both = train.fit(paths, features=["paper"], projection="pca", scaling="IV", jobs=1)
     alone = train.fit(
-        paths[0], features=["paper"], projection="pca", scaling="IV", jobs=1
+        paths[0],
+        features=["paper"],
+        projection="pca",
+        scaling="IV",
+        jobs=1,
     )
     after, before = (f.chosen["category"].accuracy for f in (both, alone))
     assert after.right == before.right + 1

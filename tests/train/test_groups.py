@@ -55,7 +55,10 @@ def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
     [(("box", "bin", "post"), "kind"), (("box", "bin"), "object")],
 )
 def test_entire_kinds_are_left_out_where_every_class_has_three(
-    kinds, left_out, make_touch, tmp_path
+    kinds,
+    left_out,
+    make_touch,
+    tmp_path,
 ):
     for thing, touch in drawn_touches(make_touch, kinds).items():
         save(tmp_path / f"{thing}.npz", touch)

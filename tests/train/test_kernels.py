@@ -37,5 +37,7 @@ def test_biases_are_quantiles_of_the_results_of_training(biases):
 
 def test_the_same_touches_give_the_same_table():
     assert kernel_table(TOUCHES, 504, alike=True) == kernel_table(
-        TOUCHES, 504, alike=True
+        TOUCHES,
+        504,
+        alike=True,
     )

@@ -53,7 +53,9 @@ def test_a_task_is_what_most_have_or_ten():
 
 
 def test_trials_that_lack_a_label_stay_for_their_other_tasks(
-    make_touch, recordings, tmp_path
+    make_touch,
+    recordings,
+    tmp_path,
 ):
     bare = make_touch(seed=9)
     bare.meta["labels"] = {"category": "rigid-fixed"}

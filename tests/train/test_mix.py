@@ -78,7 +78,12 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
 ):
     simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True, swap=True)
     own = saved(
-        tmp_path / "own", make_touch, 22, simulated=False, first=50, room="kitchen"
+        tmp_path / "own",
+        make_touch,
+        22,
+        simulated=False,
+        first=50,
+        room="kitchen",
     )
     fitted = train.fit([own, simulated], **GIVEN)
     assert fitted.chosen["category"].choice.weights == (0, 1)
@@ -107,7 +112,9 @@ def test_a_weight_of_three_is_a_trial_that_stands_three_times():
     own = np.arange(12) >= 8
     choice = Choice("IV", 2, 1, "lda", weights=(1, 3))
     fitted = ContactClassifier({"t": choice}, ("max_force", "contact_area")).fit(
-        X, {"t": labels}, own
+        X,
+        {"t": labels},
+        own,
     )
     times = np.repeat(np.arange(12), np.where(own, 3, 1))
     oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(

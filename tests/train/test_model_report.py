@@ -32,7 +32,11 @@ def written(recordings, tmp_path_factory):
             trial = replace(trial, frames=0 * trial.frames)
         save(folder / path.name, trial)
     fitted = train.fit(
-        str(folder), features=["paper"], projection="pca", quick=True, jobs=1
+        str(folder),
+        features=["paper"],
+        projection="pca",
+        quick=True,
+        jobs=1,
     )
     export.save(out / "model.onnx", fitted)
     page = report.write(out, fitted, Model(out / "model.onnx"), measure(fitted))

@@ -61,7 +61,10 @@ def test_components_stop_at_the_rank():
     spread=st.sampled_from([1e-6, 1.0, 1e6]),
 )
 def test_coordinates_are_those_of_whole_numbers_in_any_order(
-    seed, scaling, offset, spread
+    seed,
+    scaling,
+    offset,
+    spread,
 ):
     X = features(30, seed) * spread + offset
     p = Projection(scaling, 4).fit(X)
@@ -164,7 +167,9 @@ ROWS = [
         pytest.param([*ROWS[:4], *ROWS[:4]], "abcdabcd", id="equal trials"),
         pytest.param([[a, 2 * a, -a] for a, *_ in ROWS], "abababab", id="rank 1"),
         pytest.param(
-            [[a + 10**6, b, c - 10**6] for a, b, c in ROWS], "aabbccaa", id="offsets"
+            [[a + 10**6, b, c - 10**6] for a, b, c in ROWS],
+            "aabbccaa",
+            id="offsets",
         ),
     ],
 )

@@ -33,7 +33,10 @@ def test_a_trial_that_counts_twice_is_found_once():
     twice = np.repeat(FIRST, 2)
     grid = SearchGrid(components=(2,), neighbours=(9,))
     near = Decomposition(
-        ROWS[twice], ROWS[:1], {"t": LABELS["t"][twice]}, np.arange(0, 12, 2)
+        ROWS[twice],
+        ROWS[:1],
+        {"t": LABELS["t"][twice]},
+        np.arange(0, 12, 2),
     ).neighbours(grid, "t")
     assert near.tolist() == [[[0, 2, 3, 4, 5, 1]]]
 

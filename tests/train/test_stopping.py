@@ -36,7 +36,9 @@ class TestCurve:
     )
     @pytest.mark.parametrize("right", [False, True])
     def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
-        self, margins, right
+        self,
+        margins,
+        right,
     ):
         outcomes = np.full(len(margins), right)
         curve = Curve.of(margins, np.zeros(len(margins)), outcomes)
@@ -101,7 +103,10 @@ def calibrated(choices, X, y):
     """A model whose settings serve every fold too."""
     folds = stratified_folds(next(iter(y.values())))
     return SequentialClassifier(choices, SECONDS, ("max_force",)).fit(
-        X, y, folds, [choices] * 10
+        X,
+        y,
+        folds,
+        [choices] * 10,
     )
 
 

@@ -42,11 +42,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         module = import_module(f"train.importers.{name}")
         headline, _, more = (module.__doc__ or name).partition("\n\n")
         command = formats.add_parser(
-            name, help=headline, description=f"{headline}\n\n{more}"
+            name,
+            help=headline,
+            description=f"{headline}\n\n{more}",
         )
         command.add_argument("file", type=Path, help="the file or folder")
         command.add_argument(
-            "--out", required=True, type=Path, help="folder for the recordings"
+            "--out",
+            required=True,
+            type=Path,
+            help="folder for the recordings",
         )
         add_arm(command, "to select and order a log's joint angles by name")
         command.add_argument(

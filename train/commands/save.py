@@ -38,7 +38,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("recording", nargs="+", help=".npz recordings or folders")
     add("--as", dest="form", required=True, choices=FORMATS, help="the format")
     add(
-        "--out", type=Path, metavar="FILE", help="the file (default: recordings.FORMAT)"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="the file (default: recordings.FORMAT)",
     )
 
 

@@ -17,7 +17,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     option = parser.add_argument
     option(
-        "recording", nargs="+", help="an .npz recording, several to compare, or a map"
+        "recording",
+        nargs="+",
+        help="an .npz recording, several to compare, or a map",
     )
     option(
         "--model",
@@ -38,7 +40,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="sketch arm, contact and its path from the side too",
     )
     option(
-        "--dark", action="store_true", help="draw several recordings for a dark page"
+        "--dark",
+        action="store_true",
+        help="draw several recordings for a dark page",
     )
     option(
         "--threshold",
@@ -77,7 +81,11 @@ def run(arguments: argparse.Namespace) -> int:
         from train.draw import explanation
 
         explanation.draw(
-            load(first), out, model, arguments.data or Path(first).parent, first
+            load(first),
+            out,
+            model,
+            arguments.data or Path(first).parent,
+            first,
         )
     else:
         from train.draw.recording import draw

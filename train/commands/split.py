@@ -30,7 +30,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("data", nargs="+", help=".npz recordings or folders of them")
     parser.add_argument(
-        "--out", required=True, type=Path, help="folder for the recordings"
+        "--out",
+        required=True,
+        type=Path,
+        help="folder for the recordings",
     )
 
 

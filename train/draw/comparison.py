@@ -73,7 +73,9 @@ def draw(
 
 
 def _draw(
-    recordings: Sequence[tuple[str, Recording]], out: Path, model: Model | None
+    recordings: Sequence[tuple[str, Recording]],
+    out: Path,
+    model: Model | None,
 ) -> None:
     horizon = WINDOW_S if model is None else model.info.window_s
     touches = [_Touch.of(*recording, horizon) for recording in recordings]
@@ -82,7 +84,11 @@ def _draw(
         _require_units(touch, layout)
     figure = Figure(figsize=(2.6 * len(touches) + 0.6, 8.6), layout="constrained")
     axes = figure.subplots(
-        4, len(touches), sharey="row", squeeze=False, height_ratios=[1.25, 1, 1, 1]
+        4,
+        len(touches),
+        sharey="row",
+        squeeze=False,
+        height_ratios=[1.25, 1, 1, 1],
     )
     strongest = max(float(touch.force.max()) for touch in touches)
     scale = PowerNorm(GAMMA, vmin=0.0, vmax=strongest)
@@ -105,7 +111,9 @@ def _draw(
 
 
 def contact_of(
-    name: str, recording: Recording, number: int = 1
+    name: str,
+    recording: Recording,
+    number: int = 1,
 ) -> tuple[float, FeatureSeries]:
     """Onset and series of a recording's first contact, or of a later one.
 
@@ -191,7 +199,10 @@ def _decided(touch: _Touch, model: Model) -> Decided | None:
 
 
 def _draw_curves(
-    axes: Sequence[Any], series: FeatureSeries, decided: Decided | None, horizon: float
+    axes: Sequence[Any],
+    series: FeatureSeries,
+    decided: Decided | None,
+    horizon: float,
 ) -> None:
     """A touch's curves below each other, and until when they count."""
     end = horizon if decided is None else decided.window_s

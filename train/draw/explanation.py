@@ -51,7 +51,11 @@ class Case:
 
 
 def draw_case(
-    canvas: Any, case: Case, layout: SkinLayout, window_s: float, phone: bool
+    canvas: Any,
+    case: Case,
+    layout: SkinLayout,
+    window_s: float,
+    phone: bool,
 ) -> None:
     """Draw the three features of a case beside those of its nearest trials, and the
     pulls."""
@@ -63,7 +67,11 @@ def draw_case(
         axis.set(xlim=(0.0, 1.06 * window_s), ylim=(0.0, None))
     _draw_pulls(below, case)
     canvas.legend(
-        legend.values(), legend, loc="outside lower left", fontsize=8, frameon=False
+        legend.values(),
+        legend,
+        loc="outside lower left",
+        fontsize=8,
+        frameon=False,
     )
 
 
@@ -102,7 +110,11 @@ def _draw_pulls(axis: Any, case: Case) -> None:
 
 
 def draw(
-    recording: Recording, out: Path, model: Model, folder: Path, where: str
+    recording: Recording,
+    out: Path,
+    model: Model,
+    folder: Path,
+    where: str,
 ) -> None:
     """Draw a recording over the trials of a folder that a model finds nearest, into a
     PNG.

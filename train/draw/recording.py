@@ -77,7 +77,11 @@ def draw(
     if scene and chain is not None:
         with parsing(f"{where}: meta.simulation", "that of a scene"):
             draw_side(
-                figure.add_subplot(grid[2, 1:-1]), recording, chain, layout, onset
+                figure.add_subplot(grid[2, 1:-1]),
+                recording,
+                chain,
+                layout,
+                onset,
             )
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
@@ -128,8 +132,20 @@ def _shear(axis: Any, frame: Frame, region: Region, counts: float) -> None:
     axis.quiver(cols, rows, around, along, color="white", **style)
 
 
+def _name_axes(axis: Any, layout: SkinLayout) -> None:
+    if layout.wraps:
+        axis.set(xlabel="column (around)", ylabel="row, from elbow")
+    else:
+        axis.set(xlabel="column", ylabel="row")
+    axis.label_outer()
+
+
 def _frames(
-    figure: Any, grid: Any, recording: Recording, layout: SkinLayout, onset: float
+    figure: Any,
+    grid: Any,
+    recording: Recording,
+    layout: SkinLayout,
+    onset: float,
 ) -> None:
     """Draw a frame before the onset, and others spread over the window."""
     frames = list(recording)
@@ -151,23 +167,25 @@ def _frames(
         )
         image = axis.imshow(force, vmin=0.0, vmax=top, cmap="viridis", aspect="equal")
         region = largest_region(
-            counts, layout.threshold_counts, valid=valid, wraps=layout.wraps
+            counts,
+            layout.threshold_counts,
+            valid=valid,
+            wraps=layout.wraps,
         )
         title = f"{t[k] - onset:+.2f} s"
         if region is not None:
             if frames[k].shear is not None:
                 _shear(axis, frames[k], region, longest / ARROW)
             axis.contour(
-                region.mask.astype(float), levels=[0.5], colors="red", linewidths=1.2
+                region.mask.astype(float),
+                levels=[0.5],
+                colors="red",
+                linewidths=1.2,
             )
             row, col = region.centroid
             axis.plot(col % layout.cols, row, "r+", markersize=9)
             title += f", {region.area} taxels"
         axis.set_title(title, fontsize=10)
-        if layout.wraps:
-            axis.set(xlabel="column (around)", ylabel="row, from elbow")
-        else:
-            axis.set(xlabel="column", ylabel="row")
-        axis.label_outer()
+        _name_axes(axis, layout)
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.01)
     bar.set_label(f"{UNITS[layout.force_unit]} per taxel")

@@ -62,7 +62,11 @@ def link_positions(chain: Chain, q: Any) -> Floats:
 
 
 def draw_side(
-    axis: Any, recording: Recording, chain: Chain, layout: SkinLayout, onset: float
+    axis: Any,
+    recording: Recording,
+    chain: Chain,
+    layout: SkinLayout,
+    onset: float,
 ) -> None:
     """Draw the arm at onset and at the end of the window, in the x-z plane of its base.
 
@@ -98,7 +102,11 @@ def draw_side(
 
 
 def _arm(
-    axis: Any, chain: Chain, q: Floats, layout: SkinLayout, moment: Moment
+    axis: Any,
+    chain: Chain,
+    q: Floats,
+    layout: SkinLayout,
+    moment: Moment,
 ) -> None:
     """Draw the arm at joint angles q, with the skin of a cylinder around it."""
     style = {"color": moment.colour, "label": moment.name, "markersize": 4}
@@ -130,12 +138,18 @@ def skin_outline(pose: Floats, layout: SkinLayout) -> Floats:
 
 
 def _last_contact(
-    recording: Recording, joints: Floats, chain: Chain, layout: SkinLayout, k: int
+    recording: Recording,
+    joints: Floats,
+    chain: Chain,
+    layout: SkinLayout,
+    k: int,
 ) -> tuple[float, Place] | None:
     """Seconds from the last contact to frame k, and the place of that contact."""
     for i in range(k, -1, -1):
         region = largest_region(
-            recording.frames[i], layout.threshold_counts, wraps=layout.wraps
+            recording.frames[i],
+            layout.threshold_counts,
+            wraps=layout.wraps,
         )
         if region is not None:
             pose = chain.pose(joints[i])

@@ -93,7 +93,9 @@ def draw(
         axis.locator_params(nbins=6)
         axis.grid(alpha=0.3)
     figure.legend(
-        *axes[0].get_legend_handles_labels(), title=chosen, loc="outside right upper"
+        *axes[0].get_legend_handles_labels(),
+        title=chosen,
+        loc="outside right upper",
     )
     frame = "the skin" if contacts.head.frame == "skin" else contacts.head.frame
     figure.suptitle(f"{counted(len(touches), 'contact')} in the frame of {frame}")
@@ -110,7 +112,10 @@ def _draw_outline(axis: Any, info: ModelInfo, plane: list[int]) -> None:
 
 
 def _draw_touches(
-    axis: Any, touches: Sequence[Touch], task: str, plane: list[int]
+    axis: Any,
+    touches: Sequence[Touch],
+    task: str,
+    plane: list[int],
 ) -> None:
     """Draw the contacts in a plane of two axes, in the colour and marker of their
     label for a task; the less sure, the fainter."""

@@ -159,7 +159,9 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
 
 
 def _time_column(
-    table: Table, joints: Sequence[str], options: argparse.Namespace
+    table: Table,
+    joints: Sequence[str],
+    options: argparse.Namespace,
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
@@ -199,7 +201,9 @@ def is_date(table: Table, name: str) -> bool:
 
 
 def _taxels(
-    table: Table, rest: list[str], options: argparse.Namespace
+    table: Table,
+    rest: list[str],
+    options: argparse.Namespace,
 ) -> tuple[list[str], tuple[int, ...]]:
     """The taxels, and their shape where their names tell it."""
     if options.taxels:
@@ -256,7 +260,9 @@ def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
 
 
 def _unit(
-    table: Table, time: str | None, options: argparse.Namespace
+    table: Table,
+    time: str | None,
+    options: argparse.Namespace,
 ) -> tuple[str, str]:
     """The unit of times, and how it is known."""
     if time is None:
@@ -294,7 +300,9 @@ def _likely_unit(table: Table, time: str) -> tuple[str, str]:
 
 
 def times_of(
-    table: Table, meaning: Meaning, options: argparse.Namespace
+    table: Table,
+    meaning: Meaning,
+    options: argparse.Namespace,
 ) -> NDArray[np.float64]:
     """(n,) seconds from the first row; NaN where a time is missing."""
     if meaning.time is None:

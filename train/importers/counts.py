@@ -129,7 +129,9 @@ class Trial:
         return np.asarray(~np.isfinite(self.values).all(axis=2))
 
     def in_order(
-        self, frame: str = "frame", numbers: Sequence[int] | None = None
+        self,
+        frame: str = "frame",
+        numbers: Sequence[int] | None = None,
     ) -> Self:
         """The frames in the order of their times, as `clock.order`; warns of what that
         changes.
@@ -147,7 +149,9 @@ class Trial:
 
 
 def skin_shape(
-    trial: Trial, stated_shape: Sequence[int], options: argparse.Namespace
+    trial: Trial,
+    stated_shape: Sequence[int],
+    options: argparse.Namespace,
 ) -> tuple[int, int]:
     """The rows and columns of a trial's skin: those of --shape, or those that are told.
 
@@ -180,7 +184,10 @@ class Rest:
     scale: float = 1.0
 
     def recording(
-        self, trial: Trial, shape: tuple[int, int], meta: Mapping[str, Any]
+        self,
+        trial: Trial,
+        shape: tuple[int, int],
+        meta: Mapping[str, Any],
     ) -> Recording:
         """The recording of a trial in whole counts, from the time 0.
 
@@ -223,7 +230,10 @@ class Rest:
         )
 
     def _counts(
-        self, trial: Trial, valid: NDArray[np.bool_], rows: slice
+        self,
+        trial: Trial,
+        valid: NDArray[np.bool_],
+        rows: slice,
     ) -> NDArray[np.int32]:
         """Whole counts (rows, taxels, axes) of some frames; 0 where not valid."""
         at_rest = 0.0 if self.values is None else self.values

@@ -143,7 +143,9 @@ class Measured:
 
 
 def trials(
-    path: Path, arm: Chain | None, options: argparse.Namespace
+    path: Path,
+    arm: Chain | None,
+    options: argparse.Namespace,
 ) -> Iterator[tuple[str, Recording]]:
     """One recording for each file of a folder, or for each trial of a long table.
 
@@ -204,7 +206,10 @@ def _nothing(path: Path, options: argparse.Namespace) -> InputError:
 
 
 def _announced(
-    first: Measured, skin: ConfigTable, axes: Axes | None, options: argparse.Namespace
+    first: Measured,
+    skin: ConfigTable,
+    axes: Axes | None,
+    options: argparse.Namespace,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints what was taken, once for all files."""
     taxels = len(first.meaning.taxels)
@@ -219,7 +224,9 @@ def _announced(
 
 
 def _labelled(
-    sources: Sequence[Source], path: Path, options: argparse.Namespace
+    sources: Sequence[Source],
+    path: Path,
+    options: argparse.Namespace,
 ) -> Iterator[Source]:
     """The trials with the labels of a labels.csv instead of those of the files' names.
 
@@ -313,7 +320,9 @@ def _counting(places: Sequence[Path]) -> set[str]:
 
 
 def _label(
-    place: Path, counting: Set[str], options: argparse.Namespace
+    place: Path,
+    counting: Set[str],
+    options: argparse.Namespace,
 ) -> tuple[dict[str, str], str]:
     """The labels that the names of a file and its folders tell, and how."""
     folders = [part for part in place.parts[:-1] if part not in counting]
@@ -350,7 +359,9 @@ def _name(file: Path, folder: Path) -> str:
 
 
 def _of_arrays(
-    file: Path, stored: arrays.Arrays, options: argparse.Namespace
+    file: Path,
+    stored: arrays.Arrays,
+    options: argparse.Namespace,
 ) -> Iterator[Source]:
     """The trials in a file of arrays."""
     with about(str(file)):
@@ -364,7 +375,9 @@ def _of_arrays(
 
 
 def _of_frames(
-    inside: Path, folder: Path, options: argparse.Namespace
+    inside: Path,
+    folder: Path,
+    options: argparse.Namespace,
 ) -> Iterator[Source]:
     """The trial of a folder with a file for each frame, if it has files."""
     files = sorted(p for p in inside.glob("[!.]*") if suffix_of(p) in SUFFIXES)
@@ -479,7 +492,9 @@ def _pivoted(table: Table, options: argparse.Namespace) -> Table:
 
 
 def _time_of_long(
-    table: Table, further: Sequence[str], options: argparse.Namespace
+    table: Table,
+    further: Sequence[str],
+    options: argparse.Namespace,
 ) -> str:
     times = named_times(table) or further
     if options.time:
@@ -521,7 +536,9 @@ def _natural(name: Any) -> list[Any]:
 
 
 def _measured(
-    sources: Iterable[Source], axes: Axes | None, options: argparse.Namespace
+    sources: Iterable[Source],
+    axes: Axes | None,
+    options: argparse.Namespace,
 ) -> list[Measured]:
     """The numbers of the trials whose columns are those of most of them.
 
@@ -594,7 +611,9 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
 
 
 def _understood(
-    source: Source, axes: Axes | None, options: argparse.Namespace
+    source: Source,
+    axes: Axes | None,
+    options: argparse.Namespace,
 ) -> Measured:
     """The numbers of a trial."""
     table = source.table if axes is None else parted(source.table, axes.normal)

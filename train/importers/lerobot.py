@@ -64,7 +64,9 @@ class Episode:
 
 
 def trials(
-    path: Path, arm: Chain | None, options: argparse.Namespace
+    path: Path,
+    arm: Chain | None,
+    options: argparse.Namespace,
 ) -> Iterator[tuple[str, Recording]]:
     """One recording for each episode.
 

@@ -19,7 +19,9 @@ __all__ = ["add_options", "trials"]
 
 
 def trials(
-    path: Path, arm: Chain | None, options: argparse.Namespace
+    path: Path,
+    arm: Chain | None,
+    options: argparse.Namespace,
 ) -> Iterator[tuple[str, Recording]]:
     """The one trial of the bag."""
     with needs("rosbags", "this"):

@@ -165,7 +165,10 @@ def _pads(root: ElementTree.Element) -> Pads:
 
 
 def _mask(
-    matrix: ElementTree.Element, name: str, rows: int, cols: int
+    matrix: ElementTree.Element,
+    name: str,
+    rows: int,
+    cols: int,
 ) -> NDArray[np.bool_]:
     """(rows, cols), True for the texels that exist: all of them if the file has no such
     mask."""
@@ -191,7 +194,10 @@ def _unpacked(text: str, cells: int) -> NDArray[np.uint16]:
 
 
 def _joints(
-    root: ElementTree.Element, t: NDArray[np.float64], start_ms: float, file: Path
+    root: ElementTree.Element,
+    t: NDArray[np.float64],
+    start_ms: float,
+    file: Path,
 ) -> NDArray[np.float64] | None:
     """(n, 7) radians at the frames' times, NaN where they are not known; None if the
     file has none."""
@@ -214,7 +220,10 @@ def _joints(
 
 
 def _number(
-    parent: ElementTree.Element, name: str, low: float = 0.0, high: float = 1e15
+    parent: ElementTree.Element,
+    name: str,
+    low: float = 0.0,
+    high: float = 1e15,
 ) -> float:
     text = parent.findtext(name) or "nan"
     if not low <= float(text) <= high:

@@ -166,7 +166,11 @@ class Log:
             self._left_out[topic].append(reason)
 
     def _frame(
-        self, topic: str, times: tuple[float, float], kind: str, message: Any
+        self,
+        topic: str,
+        times: tuple[float, float],
+        kind: str,
+        message: Any,
     ) -> None:
         """Take in a message's values, or leave it out where it has none."""
         try:

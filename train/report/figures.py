@@ -84,7 +84,11 @@ def legend(canvas: Any, axes: Any, columns: int) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
         canvas.legend(
-            handles, labels, loc="outside upper center", ncols=columns, frameon=False
+            handles,
+            labels,
+            loc="outside upper center",
+            ncols=columns,
+            frameon=False,
         )
 
 
@@ -99,7 +103,11 @@ def spread(
 
 
 def curve(
-    axes: Any, order: int, label: str, x: Sequence[float], results: Sequence[Result]
+    axes: Any,
+    order: int,
+    label: str,
+    x: Sequence[float],
+    results: Sequence[Result],
 ) -> None:
     """Draw accuracies in percent with their 95 % intervals, in the `order`-th of
     `STROKES`."""

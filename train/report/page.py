@@ -134,7 +134,10 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
 
 
 def write(
-    out: Path, title: str, lead: Sequence[str], sections: Sequence[Section]
+    out: Path,
+    title: str,
+    lead: Sequence[str],
+    sections: Sequence[Section],
 ) -> Path:
     """Write report.html, PNGs and CSVs into a folder, each whole or not at all.
 

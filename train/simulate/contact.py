@@ -65,7 +65,11 @@ def bed_law(gaps: Array, stiffness: Array) -> tuple[Array, Array]:
 
 
 def closed_form(
-    gaps: Array, slopes: Array, intercepts: Array, y: Array, c: Array
+    gaps: Array,
+    slopes: Array,
+    intercepts: Array,
+    y: Array,
+    c: Array,
 ) -> Array:
     """The forces F = phi(y - c F) of beds (S, n): exact, without iteration, and never
     negative.

@@ -207,7 +207,9 @@ def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -
         plan = plan.with_hooks(pace=[])
     forces = run_physics(scene, specs, plan=plan, images=False).force
     for (kind, step_s), force in zip(
-        work, _by_kind(forces, [k for k, _ in work]), strict=True
+        work,
+        _by_kind(forces, [k for k, _ in work]),
+        strict=True,
     ):
         kind.steps_s.append(step_s)
         kind.forces.append(force)

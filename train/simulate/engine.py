@@ -109,7 +109,10 @@ def batch_size(scene: Scene) -> int:
 
 
 def begin(
-    scene: Scene, specs: tuple[TrialSpec, ...], *, plan: Plan | None = None
+    scene: Scene,
+    specs: tuple[TrialSpec, ...],
+    *,
+    plan: Plan | None = None,
 ) -> Batch:
     """Trials before their first step, with the hooks of a plan (None makes it).
 
@@ -117,7 +120,10 @@ def begin(
         InputError: an object touches the arm before it moves.
     """
     batch = Batch(
-        scene, specs, values_of(scene, specs), plan or make_plan(scene, specs)
+        scene,
+        specs,
+        values_of(scene, specs),
+        plan or make_plan(scene, specs),
     )
     t = batch.everyone
     t.run(*SETUP, *TUNE, *FRAME)
@@ -322,7 +328,9 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
 
 
 def readings(
-    physics: PhysicsRun, which: Places | None = None, scene: Scene | None = None
+    physics: PhysicsRun,
+    which: Places | None = None,
+    scene: Scene | None = None,
 ) -> Iterator[Readings]:
     """The sensor readings of a run's trials, trial by trial.
 

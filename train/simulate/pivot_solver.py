@@ -99,7 +99,12 @@ class Pivots:
         off = self.lever - mean
         spread = total(off * off * held)
         return Loads(
-            total(force), total(force * self.lever), stiffness, mean, spread, force
+            total(force),
+            total(force * self.lever),
+            stiffness,
+            mean,
+            spread,
+            force,
         )
 
     def step(self, y: Array, loads: Loads) -> Array:
@@ -158,7 +163,9 @@ class Pivots:
         c00, c01, _ = self.c
         inverse, invertible = self.arm(y)
         single = (self.free[0] - y[0] - c01 * loads.moment) / np.where(
-            c00 > 0.0, c00, 1.0
+            c00 > 0.0,
+            c00,
+            1.0,
         )
         stiff = (c00 * loads.stiffness > 1.0) & (loads.force > 0.0)
         force = np.where(stiff, np.where(invertible, inverse[0], single), loads.force)
@@ -167,7 +174,9 @@ class Pivots:
 
 
 def search(
-    pivots: Pivots, guess: Array, guarded_rounds: int = GUARDED_ROUNDS
+    pivots: Pivots,
+    guess: Array,
+    guarded_rounds: int = GUARDED_ROUNDS,
 ) -> tuple[Array, Array, Mask]:
     """The loads (F, M) with y = free - C (F, M), searched for from a guess (2, n) of
     them; the force on each row (rows, n), and (n,) whether the search failed.

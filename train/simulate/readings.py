@@ -49,7 +49,10 @@ class Readings:
     def stream(self, effect: str) -> np.random.Generator:
         """An effect's random numbers in this trial."""
         return streams.stream(
-            self.scene.seed, effect, self.trial.key, self.trial.number
+            self.scene.seed,
+            effect,
+            self.trial.key,
+            self.trial.number,
         )
 
     def frames(self) -> NDArray[np.uint16]:

@@ -46,7 +46,9 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 
 
 def recordings(
-    physics: PhysicsRun, which: Places | None = None, scene: Scene | None = None
+    physics: PhysicsRun,
+    which: Places | None = None,
+    scene: Scene | None = None,
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a run, or of some; arguments as of
     `readings`."""
@@ -179,7 +181,10 @@ def write(
 
 
 def _simulated(
-    scene: Scene, work: list[tuple[TrialSpec, ...]], jobs: int, address: str | None
+    scene: Scene,
+    work: list[tuple[TrialSpec, ...]],
+    jobs: int,
+    address: str | None,
 ) -> Iterator[tuple[str, Recording]]:
     """The trials of each batch as soon as it is simulated, here or on a cluster."""
     if jobs == 1 and address is None:

@@ -45,7 +45,10 @@ del CODY_SKIN["name"]
 
 
 def load(
-    path: str | os.PathLike[str], *, seed: int | None = None, count: int | None = None
+    path: str | os.PathLike[str],
+    *,
+    seed: int | None = None,
+    count: int | None = None,
 ) -> Scene:
     """The scene of a file; `seed` and `count` (trials) replace the file's.
 
@@ -215,7 +218,10 @@ def _stops_s(chain: Chain, start: Sequence[float], rate: Sequence[float]) -> flo
 
 
 def _motion(
-    table: SceneTable, chain: Chain, skin: Cylinder, lead: Value
+    table: SceneTable,
+    chain: Chain,
+    skin: Cylinder,
+    lead: Value,
 ) -> dict[str, Any]:
     """Start and rate of each joint in radians, seconds of travel, and the place of the
     contact."""
@@ -234,7 +240,9 @@ def _motion(
     )
     if not any(rate):
         raise table.fail(
-            "rate_deg_s", "not all 0, so that the arm reaches an object", rate
+            "rate_deg_s",
+            "not all 0, so that the arm reaches an object",
+            rate,
         )
     _check_start(table, chain, start)
     travel_s = table.number("travel_s", 1e6, 0.0, 1e6, open_low=True)
@@ -270,14 +278,22 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
         settings["column_angles_deg"] = [a if a < 180.0 else a - 360.0 for a in angles]
         if not table.has("pitch_m"):
             radius = table.number(
-                "radius_m", CODY_SKIN["radius_m"], 0.0, 10.0, open_low=True
+                "radius_m",
+                CODY_SKIN["radius_m"],
+                0.0,
+                10.0,
+                open_low=True,
             )
             settings["pitch_m"] = [
                 CODY_SKIN["pitch_m"][0],
                 2.0 * math.pi * radius / cols,
             ]
     table.number(
-        "counts_per_newton", CODY_SKIN["counts_per_newton"], 0.0, 1e6, open_low=True
+        "counts_per_newton",
+        CODY_SKIN["counts_per_newton"],
+        0.0,
+        1e6,
+        open_low=True,
     )
     taxel = table.value("taxel_n_m", schema.TAXEL)
     if table.has("axes"):
@@ -290,7 +306,11 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
 
 
 def _objects(
-    top: SceneTable, seed: int, push_n: float, skin: Cylinder, spread: dict[str, float]
+    top: SceneTable,
+    seed: int,
+    push_n: float,
+    skin: Cylinder,
+    spread: dict[str, float],
 ) -> tuple[SceneObject, ...]:
     tables = list(_named(top, "object"))
     for family in _named(top, "family"):
@@ -337,7 +357,9 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
 
 
 def _object_values(
-    table: SceneTable, family: str, differs: set[str]
+    table: SceneTable,
+    family: str,
+    differs: set[str],
 ) -> dict[str, Value]:
     """An object's values, which begin at 0 where they differ by a spread alone."""
     values: dict[str, Value] = {}
@@ -386,7 +408,10 @@ def _effects(table: SceneTable) -> dict[str, Any]:
 
 
 def draw_family(
-    table: SceneTable, seed: int, push_n: float, skin: Cylinder
+    table: SceneTable,
+    seed: int,
+    push_n: float,
+    skin: Cylinder,
 ) -> Iterator[dict[str, Any]]:
     """The objects of one [[family]], as [[object]] tables.
 
@@ -447,7 +472,9 @@ def _counted(values: Mapping[str, float]) -> dict[str, Any]:
 
 
 def _draw_object(
-    generator: np.random.Generator, ranges: Mapping[str, Value], part: Value
+    generator: np.random.Generator,
+    ranges: Mapping[str, Value],
+    part: Value,
 ) -> dict[str, float]:
     """The values of an object, with its kinetic friction as a part of the static."""
     values = {key: _draw(generator, value) for key, value in ranges.items()}

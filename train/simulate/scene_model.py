@@ -53,7 +53,12 @@ class SceneTable(ConfigTable):
             raise self.fail(key, "one number or a range [low, high]")
         low, high = (
             self.number(
-                key, 0, field.low, field.high, open_low=field.open_low, value=end
+                key,
+                0,
+                field.low,
+                field.high,
+                open_low=field.open_low,
+                value=end,
             )
             for end in ends
         )
@@ -64,7 +69,10 @@ class SceneTable(ConfigTable):
         return Value(low, high)
 
     def names(
-        self, key: str, allowed: tuple[str, ...], default: object = ()
+        self,
+        key: str,
+        allowed: tuple[str, ...],
+        default: object = (),
     ) -> tuple[str, ...]:
         """A list of different names, each of which is allowed."""
         names = self.texts(key, default)

@@ -49,12 +49,19 @@ CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
     "count": Field(
-        1, 1_000_000, 5, "trials of each object in each condition", integer=True
+        1,
+        1_000_000,
+        5,
+        "trials of each object in each condition",
+        integer=True,
     ),
     "after_s": Field(0.1, 60.0, 2.2, "time after it"),
     "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
     "tolerance": Field(
-        1e-5, 0.5, 0.01, "error allowed to the step, as a part of the peak force"
+        1e-5,
+        0.5,
+        0.01,
+        "error allowed to the step, as a part of the peak force",
     ),
 }
 LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
@@ -62,16 +69,28 @@ TAXEL = above_0(1e15, 10_000.0, "stiffness of a taxel in N/m")
 """At 1e16 N/m the depth of a touch is below the rounding error of a metre."""
 LABELS = {
     "window_s": Field(
-        0.01, 60.0, 1.2, "time after the first touch in which labels are judged"
+        0.01,
+        60.0,
+        1.2,
+        "time after the first touch in which labels are judged",
     ),
     "push_n": Field(
-        0.1, 1e6, 6.0, "push that moves every movable object of a [[family]]"
+        0.1,
+        1e6,
+        6.0,
+        "push that moves every movable object of a [[family]]",
     ),
     "slides_m": Field(
-        0.0, 1.0, 0.02, "a movable object moves at least this far by then"
+        0.0,
+        1.0,
+        0.02,
+        "a movable object moves at least this far by then",
     ),
     "yields": Field(
-        0.0, 1.0, 0.01, "a soft object yields by then, as a part of its thickness"
+        0.0,
+        1.0,
+        0.01,
+        "a soft object yields by then, as a part of its thickness",
     ),
 }
 SPREAD = {
@@ -82,7 +101,10 @@ SPREAD = {
     "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
     "stiffness": Field(0.0, 1.0, 0.0, "of the object, as a part of its value"),
     "friction": Field(
-        0.0, 1.0, 0.0, "of both coefficients together, as a part of their value"
+        0.0,
+        1.0,
+        0.0,
+        "of both coefficients together, as a part of their value",
     ),
     "mass": Field(0.0, 1.0, 0.0, "as a part of its value"),
     "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
@@ -103,7 +125,10 @@ OBJECT = {
     "foot_m": above_0(10.0, None, "diameter of the object's foot"),
     "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
     "slope_deg": Field(
-        -20.0, 20.0, None, "of the surface under the object, uphill along the push"
+        -20.0,
+        20.0,
+        None,
+        "of the surface under the object, uphill along the push",
     ),
     "stribeck_m_s": above_0(10.0, None, "speed at which friction has fallen"),
     "modulus_pa": above_0(1e18, 12e3, "of the elastic foundation"),
@@ -116,7 +141,10 @@ OBJECT = {
     "stem_slip_m": above_0(10.0, 0.12, "bend at which a stem slips off"),
     "stem_damping": Field(0.0, 1.0, 0.15, "damping ratio of a stem"),
     "stem_deviation": Field(
-        0.0, 2.0, 0.3, "of the logarithm of the stems' stiffnesses"
+        0.0,
+        2.0,
+        0.3,
+        "of the logarithm of the stems' stiffnesses",
     ),
     "stem_kg": above_0(10.0, 0.02, "moving mass of a stem"),
     "bubble_n_m": above_0(1e12, 2000.0, "stiffness of a bubble at rest"),
@@ -220,7 +248,11 @@ EFFECTS: dict[str, Effect] = {
         {
             "part": Field(0.0, 1.0, 0.01, "of all taxels"),
             "known": Field(
-                0, 1, 1, "1: marked invalid; 0: they read zero", integer=True
+                0,
+                1,
+                1,
+                "1: marked invalid; 0: they read zero",
+                integer=True,
             ),
         },
     ),

@@ -19,7 +19,10 @@ def key(name: str) -> tuple[int, int]:
 
 
 def stream(
-    seed: int, name: str, condition: str, trial: int | None = None
+    seed: int,
+    name: str,
+    condition: str,
+    trial: int | None = None,
 ) -> np.random.Generator:
     """The stream of `name` in one trial of `condition`; without `trial`, of the
     condition.
@@ -34,7 +37,11 @@ def stream(
 
 
 def draws(
-    seed: int, name: str, condition: str, trials: NDArray[np.int64], kind: str
+    seed: int,
+    name: str,
+    condition: str,
+    trials: NDArray[np.int64],
+    kind: str,
 ) -> NDArray[np.float64]:
     """(n,) draws: the trial-th number of the condition's stream.
 
@@ -56,7 +63,9 @@ def quantiles(deviation: float = 1.0) -> NDArray[np.float32]:
 
 
 def add_normal(
-    generator: np.random.Generator, deviation: float, to: NDArray[np.float32]
+    generator: np.random.Generator,
+    deviation: float,
+    to: NDArray[np.float32],
 ) -> None:
     """Add to each number a normal draw, one of 65,536 `quantiles` that 16 random bits
     choose.

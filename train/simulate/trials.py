@@ -284,13 +284,24 @@ class Batch:
         self.sizes |= {"xyz": 3, "pair": 2, "spring": 0, "line": 1}
         self.joints = Joints(stiffness, damping, rate, damping / stiffness * rate)
         self.clock = self.begin(
-            Clock, usual=usual, steps=usual, left=0, frame=0, h=h, longest_s=np.inf
+            Clock,
+            usual=usual,
+            steps=usual,
+            left=0,
+            frame=0,
+            h=h,
+            longest_s=np.inf,
         )
         self.arm = self.begin(Arm)
         self.contact = self.begin(Contact)
         self.contact.arrays["free_depth"] = self.contact.y[0]
         self.bed = self.begin(
-            Bed, columns=0, springs=0, law_gaps=np.inf, gain=1.0, lost=False
+            Bed,
+            columns=0,
+            springs=0,
+            law_gaps=np.inf,
+            gain=1.0,
+            lost=False,
         )
         self.bed.arrays["first_row_force"] = self.bed.row_force[0]
         self.touch = self.begin(Touch)
@@ -420,7 +431,10 @@ class Trials:
         return np.asarray(self.arm.start + way)
 
     def add_springs(
-        self, gaps: Array, stiffness: Array, intact: Array | None = None
+        self,
+        gaps: Array,
+        stiffness: Array,
+        intact: Array | None = None,
     ) -> None:
         """Add springs (S, m) to each row; with `intact` (S, rows, m), they may break."""
         bed = self.bed.arrays

@@ -131,7 +131,9 @@ def true_runs(
 
 
 def _next_draws(
-    scene: Scene, last: TrialSpec, wrong: Contradiction
+    scene: Scene,
+    last: TrialSpec,
+    wrong: Contradiction,
 ) -> Iterator[TrialSpec]:
     """The next draws of a trial whose last draw contradicted its label."""
     first = last.attempt + 1

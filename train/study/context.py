@@ -31,7 +31,9 @@ class Context:
         return {task: labels for task, labels in y.items() if len(set(labels)) > 1}
 
     def vectors(
-        self, window_s: float = WINDOW_S, names: Sequence[str] = FEATURES
+        self,
+        window_s: float = WINDOW_S,
+        names: Sequence[str] = FEATURES,
     ) -> Floats:
         """The trials' feature vectors."""
         return self.dataset.features(window_s, SAMPLES, names)

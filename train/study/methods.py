@@ -152,7 +152,9 @@ def section(context: Context) -> Section:
 
 
 def sentence(
-    task: str, known: Mapping[str, Answers], unseen: Mapping[str, Answers]
+    task: str,
+    known: Mapping[str, Answers],
+    unseen: Mapping[str, Answers],
 ) -> str:
     """The accuracy of the paper's method and of the best one, with objects known and
     never met."""

@@ -165,6 +165,8 @@ def _of_another_seed(context: Context, scene: Scene, i: int) -> paper.Numbers:
         simulate(replace(scene, seed=scene.seed + i), folder, jobs=context.workers.jobs)
         dataset = load_trials([folder], Measurement(horizon_s=LONGEST_S))
     quiet = replace(
-        context, dataset=dataset, workers=replace(context.workers, progress=False)
+        context,
+        dataset=dataset,
+        workers=replace(context.workers, progress=False),
     )
     return _numbers([analysis(quiet) for analysis in COMPARED])

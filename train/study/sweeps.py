@@ -96,7 +96,11 @@ def window(context: Context) -> Section:
         )
     title = "Effect of the time window (Fig. 10)"
     png = figures.lines(
-        "window", title, WINDOWS_S, by_task(results), label="seconds from first contact"
+        "window",
+        title,
+        WINDOWS_S,
+        by_task(results),
+        label="seconds from first contact",
     )
     table = Table("window", "Accuracy at each window", rows("window s", results))
     return Section(title, text, [table], [png])
@@ -116,7 +120,12 @@ def scaling(context: Context) -> Section:
     )
     cases = {method: (context.vectors(), context.labels, method) for method in SCALINGS}
     return _compared(
-        context, "scaling", "Effect of feature scaling (Table II)", "II", cases, text
+        context,
+        "scaling",
+        "Effect of feature scaling (Table II)",
+        "II",
+        cases,
+        text,
     )
 
 
@@ -130,7 +139,12 @@ def features(context: Context) -> Section:
         for names in SUBSETS
     }
     return _compared(
-        context, "features", "Effect of the features (Table III)", "III", cases, text
+        context,
+        "features",
+        "Effect of the features (Table III)",
+        "III",
+        cases,
+        text,
     )
 
 

@@ -213,7 +213,9 @@ def picture_of(measured: Measured) -> Figure:
     def draw(canvas: Any, phone: bool) -> None:
         across = 1 if phone else wide
         upper, lower = canvas.subfigures(
-            2, 1, height_ratios=[heights[phone] - 1.8, 1.8]
+            2,
+            1,
+            height_ratios=[heights[phone] - 1.8, 1.8],
         )
         grid = upper.subplots(-(-m // across), across, squeeze=False, sharey=True)
         for axes, (task, comparison) in zip(grid.flat, compared.items(), strict=False):
@@ -236,14 +238,21 @@ def picture_of(measured: Measured) -> Figure:
 
 
 def _panel(
-    axes: Any, task: str, compared: StoppingComparison, measured: Measured
+    axes: Any,
+    task: str,
+    compared: StoppingComparison,
+    measured: Measured,
 ) -> None:
     """Draw a task's accuracy after fixed windows and with early decisions."""
     results = measured.results(task)
     after_s = measured.after_s
     chance = 100 * majority(measured.y[task]).accuracy
     axes.axhline(
-        chance, color="0.45", lw=1, ls=(0, (1, 2)), label="most frequent label"
+        chance,
+        color="0.45",
+        lw=1,
+        ls=(0, (1, 2)),
+        label="most frequent label",
     )
     times = [window + after_s for window in results]
     curve(axes, 0, "after a fixed time", times, list(results.values()))

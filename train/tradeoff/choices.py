@@ -80,7 +80,9 @@ def followed(
 
 
 def chosen(
-    dataset: DataSet, window_s: float = WINDOW_S, **options: Any
+    dataset: DataSet,
+    window_s: float = WINDOW_S,
+    **options: Any,
 ) -> dict[str, Chosen]:
     """Each task's choice, as `python -m export --window` makes it with options; by
     default a quick one."""

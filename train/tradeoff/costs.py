@@ -81,7 +81,9 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
 
 
 def _fewer_frames(
-    raw: Recordings, layout: SkinLayout, rate_hz: float
+    raw: Recordings,
+    layout: SkinLayout,
+    rate_hz: float,
 ) -> Iterator[Change]:
     """Every n-th frame, and the wire that then suffices."""
     for n in EVERY:
@@ -164,7 +166,11 @@ def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float,
 
 
 def measure(
-    raw: Recordings, dataset: DataSet, windows: Points, rate_hz: float, workers: Workers
+    raw: Recordings,
+    dataset: DataSet,
+    windows: Points,
+    rate_hz: float,
+    workers: Workers,
 ) -> list[Row]:
     """A row for each change, beside the choice at `WINDOW_S` on the recordings as they
     are.
@@ -192,7 +198,10 @@ def measure(
 
 
 def row_of(
-    case: Change, base: Mapping[str, Hits], after: Mapping[str, Hits], seconds: float
+    case: Change,
+    base: Mapping[str, Hits],
+    after: Mapping[str, Hits],
+    seconds: float,
 ) -> Row:
     """The row of a change: the points that it gains, and what it saves or costs."""
     row: Row = {"change": case.name}

@@ -178,7 +178,9 @@ def _held_out(dataset: DataSet, test: Booleans, options: Mapping[str, Any]) -> _
 
 
 def _compared(
-    task: str, folds: Sequence[_HeldOut], decision_points_s: Sequence[float]
+    task: str,
+    folds: Sequence[_HeldOut],
+    decision_points_s: Sequence[float],
 ) -> StoppingComparison:
     """A task's early decisions over all folds."""
     shape = len(decision_points_s), len(folds[0].test)
@@ -230,5 +232,9 @@ def _certified(
     decided, waited, *shares = map(np.concatenate, zip(*rows, strict=True))
     means = [float(share.mean()) for share in shares]
     return Certified(
-        error, len(rows), decided.astype(bool), waited.astype(bool), *means
+        error,
+        len(rows),
+        decided.astype(bool),
+        waited.astype(bool),
+        *means,
     )

@@ -59,7 +59,12 @@ class ParetoFront:
 
     @classmethod
     def of(
-        cls, points: Points, task: str, after_s: float = 0.0, *, quick: bool = False
+        cls,
+        points: Points,
+        task: str,
+        after_s: float = 0.0,
+        *,
+        quick: bool = False,
     ) -> ParetoFront:
         """The windows that no other beats in both time and accuracy.
 

@@ -110,7 +110,10 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     points = dict(zip(ready.windows, results, strict=True))
     rate = _rate_hz(raw.recordings)
     comparisons = early.compare_stopping(
-        dataset, WINDOWS_S, quick=quick, jobs=options.jobs
+        dataset,
+        WINDOWS_S,
+        quick=quick,
+        jobs=options.jobs,
     )
     sheared = None
     if dataset.layout.axes:
@@ -137,10 +140,15 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     )
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     report = _write(measured, out, counted(len(dataset.trials), "contact") + simulated)
-    best = ParetoFront.of(points, main, measured.after_s, quick=quick)
-    with write_whole(out / "front.json") as file:
-        file.write(json.dumps(best.to_dict(dataset.digest), indent=1).encode() + b"\n")
+    front = ParetoFront.of(points, main, measured.after_s, quick=quick)
+    _write_front(front, out / "front.json", dataset.digest)
     return report
+
+
+def _write_front(front: ParetoFront, path: Path, digest: str) -> None:
+    text = json.dumps(front.to_dict(digest), indent=1)
+    with write_whole(path) as file:
+        file.write(text.encode() + b"\n")
 
 
 def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> Commands:
@@ -173,7 +181,11 @@ def _sheared(
     quick = options.quick
     jobs = options.jobs
     unmet = early.compare_stopping(
-        dataset, WINDOWS_S, leave_out=LEAVE_OUT, quick=quick, jobs=jobs
+        dataset,
+        WINDOWS_S,
+        leave_out=LEAVE_OUT,
+        quick=quick,
+        jobs=jobs,
     )
     by_kind = {shear.KNOWN: comparisons, shear.UNMET: unmet}
     sheared = shear.Answers(points, by_kind)

@@ -74,7 +74,11 @@ def without(dataset: DataSet) -> DataSet:
 
 
 def answers(
-    dataset: DataSet, windows: Sequence[float], workers: Workers, *, quick: bool = True
+    dataset: DataSet,
+    windows: Sequence[float],
+    workers: Workers,
+    *,
+    quick: bool = True,
 ) -> Answers:
     """The choice at each window, and early decisions."""
     cases = [(dataset, window) for window in windows]
@@ -82,7 +86,11 @@ def answers(
     points = [window for window in windows if window <= WINDOWS_S[-1]]
     early = {
         kind: compare_stopping(
-            dataset, points, leave_out=leave_out, quick=quick, jobs=workers.jobs
+            dataset,
+            points,
+            leave_out=leave_out,
+            quick=quick,
+            jobs=workers.jobs,
         )
         for kind, leave_out in ((KNOWN, TRIAL), (UNMET, LEAVE_OUT))
     }
@@ -90,7 +98,11 @@ def answers(
 
 
 def compared(
-    dataset: DataSet, sheared: Answers, workers: Workers, *, quick: bool = True
+    dataset: DataSet,
+    sheared: Answers,
+    workers: Workers,
+    *,
+    quick: bool = True,
 ) -> Compared:
     """The answers with shear beside those without."""
     windows = list(sheared.points)
@@ -174,7 +186,10 @@ def section(compared: Compared) -> Section:
         [
             Table("shear_times", "The time to an accuracy", times(compared), narrow=5),
             Table(
-                "shear", "Accuracy with shear and without", gains(compared), narrow=5
+                "shear",
+                "Accuracy with shear and without",
+                gains(compared),
+                narrow=5,
             ),
         ],
         [picture_of(compared)],

@@ -115,7 +115,9 @@ def microcontroller(layout: SkinLayout) -> Wire:
 
 
 def wire_time_s(
-    recordings: Sequence[Recording], layout: SkinLayout, rate_hz: float
+    recordings: Sequence[Recording],
+    layout: SkinLayout,
+    rate_hz: float,
 ) -> float | None:
     """Seconds from the end of a window until its last frame is read, where the
     recordings tell the skin's wires.

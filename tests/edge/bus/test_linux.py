@@ -123,7 +123,9 @@ def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(ad
     ("name", "said"), [("i801", "no such bus"), ("bcm", "several adapters")]
 )
 def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(
-    name, said, adapters
+    name,
+    said,
+    adapters,
 ):
     with pytest.raises(protocol.BusMissing, match=f"^{name}: {said}"):
         linux.find_device(name, adapters)

@@ -81,7 +81,9 @@ class Board:
         self.port = os.ttyname(slave)
         self.slave = slave
         self.serving = threading.Thread(
-            target=self._serve, args=(self.master,), daemon=True
+            target=self._serve,
+            args=(self.master,),
+            daemon=True,
         )
         self.serving.start()
 
@@ -155,7 +157,11 @@ def test_each_request_is_answered_by_its_own_frame(board, bus):
     ],
 )
 def test_silence_is_a_timeout_and_half_an_answer_a_fault(
-    board, bus, cut, error, sentence
+    board,
+    bus,
+    cut,
+    error,
+    sentence,
 ):
     """A fault is read again at once, a timeout after a pause."""
     chip = Block(bus, 0, taxels=TAXELS)
@@ -212,7 +218,9 @@ def test_a_register_of_another_length_is_a_fault(bus):
 
 
 def test_a_missing_port_and_a_missing_pyserial_are_one_sentence_each(
-    board, tmp_path, monkeypatch
+    board,
+    tmp_path,
+    monkeypatch,
 ):
     with pytest.raises(BusMissing, match=r"no-port: no such serial port; is the micro"):
         SerialBus(str(tmp_path / "no-port"))

@@ -35,7 +35,13 @@ def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
 def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin, quiet):
     before = skin.read_text()
     status, (event,), _ = edge(
-        "calibrate", "--skin", skin, "--fake", quiet, "--frames", 50
+        "calibrate",
+        "--skin",
+        skin,
+        "--fake",
+        quiet,
+        "--frames",
+        50,
     )
     assert status == 0
     assert event["frames"] == 50
@@ -53,7 +59,11 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin,
     [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
 )
 def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
-    edge, skin, quiet, options, deviation
+    edge,
+    skin,
+    quiet,
+    options,
+    deviation,
 ):
     fake = ("--skin", skin, "--fake", quiet, *options)
     (first,), (again,) = (
@@ -76,14 +86,27 @@ def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
     saving.save(touched, make_touch(arm=False))
     before = skin.read_text()
     status, _, err = edge(
-        "calibrate", "--skin", skin, "--fake", touched, "--frames", 100
+        "calibrate",
+        "--skin",
+        skin,
+        "--fake",
+        touched,
+        "--frames",
+        100,
     )
     assert status == 2
     assert "taxels that vary while they should be at rest: " in err
     assert skin.read_text() == before
     assert (
         edge(
-            "calibrate", "--skin", skin, "--fake", touched, "--frames", 100, "--force"
+            "calibrate",
+            "--skin",
+            skin,
+            "--fake",
+            touched,
+            "--frames",
+            100,
+            "--force",
         )[0]
         == 0
     )
@@ -123,7 +146,13 @@ def spoil(monkeypatch):
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values(
-    edge, skin, quiet, spoil, value, share, said
+    edge,
+    skin,
+    quiet,
+    spoil,
+    value,
+    share,
+    said,
 ):
     spoil(value, share)
     arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
@@ -136,7 +165,13 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
-    edge, skin, quiet, spoil, value, share, said
+    edge,
+    skin,
+    quiet,
+    spoil,
+    value,
+    share,
+    said,
 ):
     arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
     assert edge(*arguments)[0] == 0
@@ -215,7 +250,11 @@ def test_a_skin_that_something_leans_on_steadily_is_refused(edge, calibrated, tm
 
 @pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])
 def test_a_single_taxel_or_a_small_drift_is_calibrated(
-    edge, calibrated, tmp_path, counts, taxels
+    edge,
+    calibrated,
+    tmp_path,
+    counts,
+    taxels,
 ):
     drifted = shifted(calibrated, tmp_path, counts, taxels)
     words = ("calibrate", "--skin", calibrated, "--fake", drifted, "--frames", 50)
@@ -259,7 +298,9 @@ def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
 
 
 def test_a_calibration_that_would_make_taxels_deaf_is_refused(
-    edge, calibrated, tmp_path
+    edge,
+    calibrated,
+    tmp_path,
 ):
     rest = tmp_path / "rest.npz"
     words = ("calibrate", "--skin", calibrated, "--fake", rest, "--frames", 50)

@@ -74,7 +74,10 @@ def test_check_counts_what_the_wire_carries(edge, skin):
 
 @pytest.mark.parametrize(("noise", "hidden"), [(0.0, ["32 chips"]), (4.0, [])])
 def test_check_names_the_chips_whose_freezing_nothing_would_show(
-    edge, skin, noise, hidden
+    edge,
+    skin,
+    noise,
+    hidden,
 ):
     resting = numpy.full((16, 24), 9000, dtype=numpy.uint16)
     save_calibration(skin, TaxelCalibration(resting, numpy.full((16, 24), noise)))
@@ -139,7 +142,9 @@ def board(tmp_path, monkeypatch):
     """A machine with the given devices, of which one belongs to another group."""
     (tmp_path / "dev").mkdir()
     monkeypatch.setattr(
-        board_module.os, "access", lambda device, mode: device.name != "i2c-7"
+        board_module.os,
+        "access",
+        lambda device, mode: device.name != "i2c-7",
     )
     monkeypatch.setattr(board_module.os, "getloadavg", lambda: (0.1, 0.1, 0.1))
 

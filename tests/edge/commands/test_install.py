@@ -33,7 +33,9 @@ def running(tmp_path):
 
 
 def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
-    edge, new, running
+    edge,
+    new,
+    running,
 ):
     status, (event,), _ = edge("install", new, "--to", running)
     assert status == 0
@@ -67,7 +69,11 @@ def test_a_model_that_is_installed_twice_is_not_its_own_way_back(edge, new, runn
 
 @pytest.mark.parametrize("damage", ["model", "golden", "missing"])
 def test_a_model_that_does_not_verify_leaves_the_former_one(
-    edge, new, running, damage, exported
+    edge,
+    new,
+    running,
+    damage,
+    exported,
 ):
     golden = new.with_name("golden.npz")
     if damage == "model":
@@ -83,7 +89,10 @@ def test_a_model_that_does_not_verify_leaves_the_former_one(
 
 
 def test_a_service_that_does_not_run_with_the_new_model_gets_the_former_one(
-    edge, new, running, monkeypatch
+    edge,
+    new,
+    running,
+    monkeypatch,
 ):
     restarted = []
     monkeypatch.setattr(install, "restart", restarted.append)

@@ -22,7 +22,10 @@ def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
 
 
 def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
-    edge, tmp_path, monkeypatch, capsys
+    edge,
+    tmp_path,
+    monkeypatch,
+    capsys,
 ):
     """Its sequence number stands still."""
     monkeypatch.setattr("edge.fake.block.RATE_HZ", 0.0)
@@ -111,10 +114,19 @@ def bare(make_touch, tmp_path):
     ],
 )
 def test_run_flags_a_decision_whose_joints_never_came(
-    edge, exported, bare, options, flag
+    edge,
+    exported,
+    bare,
+    options,
+    flag,
 ):
     status, events, _ = edge(
-        "run", "--model", exported / "model.onnx", "--fake", bare, *options
+        "run",
+        "--model",
+        exported / "model.onnx",
+        "--fake",
+        bare,
+        *options,
     )
     assert status == 0
     assert [e["flags"][0] for e in events if e["event"] == "decision"] == [flag] * 2
@@ -164,7 +176,13 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     ],
 )
 def test_a_bad_option_is_one_sentence(
-    edge, exported, recordings, bare, tmp_path, arguments, said
+    edge,
+    exported,
+    recordings,
+    bare,
+    tmp_path,
+    arguments,
+    said,
 ):
     files = {
         "REC": recordings / "hard_0.npz",
@@ -184,7 +202,12 @@ def test_a_bad_option_is_one_sentence(
 
 @pytest.mark.parametrize("command", ["record", "run", "view"])
 def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
-    edge, exported, recordings, tmp_path, monkeypatch, command
+    edge,
+    exported,
+    recordings,
+    tmp_path,
+    monkeypatch,
+    command,
 ):
     """A silent serial port may take seconds, and there is nothing to lose yet."""
     handled = []

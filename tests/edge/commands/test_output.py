@@ -17,7 +17,9 @@ RUN = ["run", "--model", str(demo.MODEL), "--fake", TOUCH]
 @pytest.fixture
 def terminal(monkeypatch):
     monkeypatch.setattr(
-        Output, "of", classmethod(lambda cls, arguments: cls(arguments.json))
+        Output,
+        "of",
+        classmethod(lambda cls, arguments: cls(arguments.json)),
     )
 
 

@@ -56,7 +56,9 @@ def test_a_mux_connects_at_stop_and_two_chips_at_one_address_pull_the_same_wire(
     mux.channels[0][0x20], mux.channels[1][0x20] = Echo(0b1100), Echo(0b1010)
     plain = mux.write
     monkeypatch.setattr(
-        mux, "write", lambda *a: (plain(*a), connected.append(mux.connected))
+        mux,
+        "write",
+        lambda *a: (plain(*a), connected.append(mux.connected)),
     )
     send(fake, 0x70, [3])
     assert connected == [[]]

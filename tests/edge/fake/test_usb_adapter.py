@@ -144,7 +144,12 @@ def test_the_first_free_port_for_a_slow_device_is_taken():
     ],
 )
 def test_a_machine_that_cannot_do_it_is_named_in_a_sentence(
-    platform, drivers, user, sentence, tmp_path, monkeypatch
+    platform,
+    drivers,
+    user,
+    sentence,
+    tmp_path,
+    monkeypatch,
 ):
     hub = tmp_path if drivers else tmp_path / "absent"
     monkeypatch.setattr(usb_adapter, "DRIVERS", (hub,))

@@ -37,7 +37,9 @@ class TestMargin:
         ],
     )
     def test_what_is_infinitely_far_is_no_evidence_for_a_label(
-        self, distances, expected
+        self,
+        distances,
+        expected,
     ):
         assert margin(distances, 0) == expected
 

@@ -86,7 +86,13 @@ def test_decision_points_have_the_same_bits_in_both(exported):
     seed=st.integers(0, 10**6),
 )
 def test_random_models_have_the_same_bits_in_both(
-    tmp_path_factory, kind, projection, scaling, k, labels, seed
+    tmp_path_factory,
+    kind,
+    projection,
+    scaling,
+    k,
+    labels,
+    seed,
 ):
     X, queries = hard_set(kind, np.random.default_rng(seed))
     k = min(len(X), k)

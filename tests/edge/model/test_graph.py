@@ -64,7 +64,10 @@ def test_an_operator_gives_the_values_of_its_definition(operator):
 def test_of_equal_values_the_first_is_nearest():
     x = np.array([[2.0, 1.0, 2.0, 1.0, 0.0]])
     contents = one_node(
-        "TopK", [x, np.array([4])], {"largest": 0, "sorted": 1}, ("values", "places")
+        "TopK",
+        [x, np.array([4])],
+        {"largest": 0, "sorted": 1},
+        ("values", "places"),
     )
     values, places = Graph(contents).run(["values", "places"], {})
     assert values.tolist() == [[0.0, 1.0, 1.0, 2.0]]

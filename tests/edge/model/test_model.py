@@ -303,7 +303,9 @@ RELEASED = Path(__file__).parents[2] / "golden" / "released"
 
 
 @pytest.mark.parametrize(
-    "path", sorted(RELEASED.glob("*.onnx")), ids=lambda path: path.stem
+    "path",
+    sorted(RELEASED.glob("*.onnx")),
+    ids=lambda path: path.stem,
 )
 def test_a_model_of_each_released_format_is_read_or_refused_with_the_remedy(path):
     """`format-N.onnx` stays here when format N is no longer written."""
@@ -378,7 +380,10 @@ def test_a_graph_that_answers_a_row_with_a_scalar_is_refused(altered):
     ],
 )
 def test_a_tie_is_of_two_labels_or_more_with_the_most_votes(
-    model, monkeypatch, shares, tie
+    model,
+    monkeypatch,
+    shares,
+    tie,
 ):
     vector = np.zeros(model.info.width)
     outputs = model.run(vector[None])

@@ -23,7 +23,9 @@ def model(nodes, initial=(), **more):
     ]
     graph = helper.make_graph(nodes, "g", sides[:1], sides[1:], list(initial))
     proto = helper.make_model(
-        graph, opset_imports=[helper.make_opsetid("", 18)], **more
+        graph,
+        opset_imports=[helper.make_opsetid("", 18)],
+        **more,
     )
     helper.set_model_props(proto, {"kind": "a test", "umlaut": "ä"})
     return proto

@@ -43,7 +43,9 @@ def test_ready_and_stopping_are_one_datagram_each(manager, notifier):
 
 
 def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
-    manager, clock, notifier
+    manager,
+    clock,
+    notifier,
 ):
     service = notifier(WATCHDOG_USEC="10000000", WATCHDOG_PID=str(os.getpid()))
     for tick in range(2001):  # 20 s at 100 Hz
@@ -89,7 +91,9 @@ def test_without_a_manager_no_socket_is_opened(notifier, address, monkeypatch):
 
 
 def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
-    tmp_path, clock, notifier
+    tmp_path,
+    clock,
+    notifier,
 ):
     address = str(tmp_path / "later")
     service = notifier(NOTIFY_SOCKET=address, WATCHDOG_USEC="2000000")

@@ -105,7 +105,9 @@ def both():
     frames = np.zeros((n, *a.frames.shape[1:]), dtype=np.uint16)
     frames[: len(a.t)] = np.where(a.frames > 60, a.frames, 0)[:n]
     frames[late : late + len(b.t)] += np.roll(
-        np.where(b.frames > 60, b.frames, 0), 12, 2
+        np.where(b.frames > 60, b.frames, 0),
+        12,
+        2,
     )[: n - late]
     t = np.arange(n) / 25.0
     joints = np.concatenate([a.joints, np.repeat(a.joints[-1:], n, axis=0)])[:n]

@@ -26,7 +26,13 @@ chips = [
 
 
 def one_chip(
-    rows, cols, kind="block", skin="", signal="", bus="device = 1", at="address = 40, "
+    rows,
+    cols,
+    kind="block",
+    skin="",
+    signal="",
+    bus="device = 1",
+    at="address = 40, ",
 ):
     """A skin file of one chip that has all taxels, with further lines for its
     tables."""

@@ -55,7 +55,11 @@ def test_after_a_brown_out_every_taxel_is_back_in_half_a_second_also_when_it_rep
     for resets in (REPEATED[:1], REPEATED[:3]):
         lasts = {"seconds": (resets[-1] + 60) / SKINS[name].reading.rate_hz}
         outcome = run(
-            name, SKINS[name], resets=resets, overhead_s=overhead_us * 1e-6, **lasts
+            name,
+            SKINS[name],
+            resets=resets,
+            overhead_s=overhead_us * 1e-6,
+            **lasts,
         )
         assert outcome.wrong == 0
         assert outcome.back_s <= BACK_S
@@ -158,7 +162,10 @@ def test_an_adapter_that_refuses_the_drivers_transactions_is_an_error_at_the_sta
     buses = faulty_buses(CODY, lambda t: QUIET, clock, faults=refused)
     with pytest.raises(BusRefused, match="refuses a transaction of this shape"):
         BusReader(
-            buses[0], CODY.buses[0], [np.zeros(24, np.uint8)] * 12, CODY.reading
+            buses[0],
+            CODY.buses[0],
+            [np.zeros(24, np.uint8)] * 12,
+            CODY.reading,
         ).start()
 
 

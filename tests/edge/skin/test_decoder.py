@@ -64,14 +64,19 @@ def test_chips_of_different_kinds_make_one_skin():
     ("raw", "valid"), [(1, True), (52_946, True), (52_947, False), (0xFFFF, False)]
 )
 def test_a_value_that_no_touch_reaches_is_not_valid_and_its_chip_is_checked(
-    sign, raw, valid
+    sign,
+    raw,
+    valid,
 ):
     """Rest 20946, saturation 30000 counts and 2000 of drift: the wire's ones are
     beyond."""
     signal = replace(CODY.signal, saturation_counts=30_000)
     bus = replace(CODY.buses[0], chips=(replace(CODY.chips[0], sign=sign),))
     file = replace(
-        CODY, buses=(bus,), signal=signal, reading=Reading(recheck_frames=100)
+        CODY,
+        buses=(bus,),
+        signal=signal,
+        reading=Reading(recheck_frames=100),
     )
     with still(file) as skin:
         [reader] = skin.readers

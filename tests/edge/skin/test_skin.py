@@ -75,7 +75,9 @@ def test_buses_are_read_side_by_side_each_in_a_thread(monkeypatch):
         for reader in skin.readers:
             chip = reader.slots[4].chip
             monkeypatch.setattr(
-                chip, "read", lambda r=chip.read: (together.wait(), r())
+                chip,
+                "read",
+                lambda r=chip.read: (together.wait(), r()),
             )
         assert skin.read().valid.all()
 

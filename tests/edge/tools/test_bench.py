@@ -35,7 +35,9 @@ def test_every_stage_has_a_median_and_a_99th_percentile(board):
 
 
 def test_a_busy_machine_is_named_and_the_fastest_round_counts(
-    model, monkeypatch, caplog
+    model,
+    monkeypatch,
+    caplog,
 ):
     """The process gets a quarter of the time; each of its rounds is slower than the one
     before."""
@@ -43,7 +45,9 @@ def test_a_busy_machine_is_named_and_the_fastest_round_counts(
     monkeypatch.setattr(bench.time, "process_time", iter((0.0, 0.25)).__next__)
     monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
     monkeypatch.setattr(
-        bench, "time_stages", lambda *_: {"answer": {"median_us": next(rounds)}}
+        bench,
+        "time_stages",
+        lambda *_: {"answer": {"median_us": next(rounds)}},
     )
     monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
     board = bench.measure(model)
@@ -77,7 +81,10 @@ def test_the_touch_is_a_contact_that_grows_over_the_whole_window(model):
     info = model.info
     frames = touch(model, info.window_s)
     tracker = ContactTracker(
-        info.layout, info.debounce, chain=info.chain, horizon_s=info.window_s
+        info.layout,
+        info.debounce,
+        chain=info.chain,
+        horizon_s=info.window_s,
     )
     onset, series = first_contact(frames, tracker)
     assert onset == 0.0

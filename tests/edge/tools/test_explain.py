@@ -12,7 +12,9 @@ from edge.tools.explain import text
 
 def test_a_program_gets_the_trials_by_name_and_the_parts(edge, exported, recordings):
     status, lines, _ = edge(
-        "explain", exported / "model.onnx", recordings / "hard_0.npz"
+        "explain",
+        exported / "model.onnx",
+        recordings / "hard_0.npz",
     )
     assert status == 0
     assert [line["task"] for line in lines] == ["category", "object"]
@@ -65,5 +67,7 @@ def test_a_change_is_a_sentence(mean, unit, sentence):
 
 def test_a_recording_without_contact_is_one_sentence(exported, quiet, refused):
     assert "quiet.npz: holds no contact; leave it out" in refused(
-        "explain", exported / "model.onnx", quiet
+        "explain",
+        exported / "model.onnx",
+        quiet,
     )

@@ -13,11 +13,20 @@ from tests.edge.skin.small import one_chip
 
 def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        Output, "of", classmethod(lambda cls, arguments: cls(arguments.json))
+        Output,
+        "of",
+        classmethod(lambda cls, arguments: cls(arguments.json)),
     )
     skin = skinfile.shipped("matrix")
     status, out, _ = edge(
-        "fake", "--skin", skin, "--out", tmp_path, "--trials", 1, text=True
+        "fake",
+        "--skin",
+        skin,
+        "--out",
+        tmp_path,
+        "--trials",
+        1,
+        text=True,
     )
     assert status == 0
     still = tmp_path / "still.npz"

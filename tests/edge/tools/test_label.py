@@ -84,7 +84,10 @@ def test_a_task_is_renamed_or_its_label_taken_away(folder, edge, change, labels)
     ],
 )
 def test_what_cannot_be_changed_leaves_every_file_as_it_was(
-    change, sentence, folder, refused
+    change,
+    sentence,
+    folder,
+    refused,
 ):
     before = (folder / "a.npz").read_bytes()
     assert sentence in refused("label", folder, *change, "--yes")
@@ -100,7 +103,10 @@ def test_nothing_changes_before_it_is_shown_and_agreed_to(folder, refused):
 
 
 def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
-    make_touch, tmp_path, edge, monkeypatch
+    make_touch,
+    tmp_path,
+    edge,
+    monkeypatch,
 ):
     for i in range(4):
         save(tmp_path / f"{i}.npz", make_touch(seed=i))
@@ -226,7 +232,9 @@ def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge, refused):
     shutil.copy(kept / "sure.npz", kept / "wrong.npz")
     newer = (kept / "wrong.npz").read_bytes()
     assert "wrong.npz: exists again; rename it, and undo then" in refused(
-        "label", kept, "--undo"
+        "label",
+        kept,
+        "--undo",
     )
     assert (kept / "wrong.npz").read_bytes() == newer
     (kept / "wrong.npz").rename(kept / "newer.npz")
@@ -258,10 +266,14 @@ def test_a_damaged_journal_is_one_sentence(kept, name, text, refused):
 
 
 def test_undo_of_a_folder_that_is_not_there_changes_nothing_beside_it(
-    kept, edge, refused
+    kept,
+    edge,
+    refused,
 ):
     edge("label", kept, "--accept", "--yes")
     assert "mistyped: --undo takes the folder of the recordings" in refused(
-        "label", kept / "mistyped", "--undo"
+        "label",
+        kept / "mistyped",
+        "--undo",
     )
     assert load(kept / "sure.npz").labels

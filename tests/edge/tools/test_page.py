@@ -22,7 +22,11 @@ from tests.browser import chromium, violations
 from tests.edge.tools.kept import kept_meta
 
 LAYOUT = SkinLayout(
-    rows=4, cols=6, threshold_counts=100, dead=(5,), counts_per_newton=1000.0
+    rows=4,
+    cols=6,
+    threshold_counts=100,
+    dead=(5,),
+    counts_per_newton=1000.0,
 )
 
 
@@ -318,7 +322,9 @@ def luminance(colour):
     """The relative luminance of WCAG 2, of #rrggbb."""
     channels = np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)]) / 255
     linear = np.where(
-        channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4
+        channels <= 0.04045,
+        channels / 12.92,
+        ((channels + 0.055) / 1.055) ** 2.4,
     )
     return float(linear @ (0.2126, 0.7152, 0.0722))
 

@@ -79,7 +79,14 @@ def record(edge, recordings, tmp_path):
 
     def run(*options, fake=recordings / "soft_1.npz", out=tmp_path / "trials"):
         return edge(
-            "record", "--fake", fake, "--label", "object=foam", "--out", out, *options
+            "record",
+            "--fake",
+            fake,
+            "--label",
+            "object=foam",
+            "--out",
+            out,
+            *options,
         )
 
     return run
@@ -115,7 +122,10 @@ def test_record_keeps_the_names_of_a_recordings_joints(record, recordings, tmp_p
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
-    record, recordings, monkeypatch, number
+    record,
+    recordings,
+    monkeypatch,
+    number,
 ):
     push = Trials.push
     pushed = []
@@ -176,7 +186,9 @@ def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
 
 
 def test_record_saves_one_trial_a_contact_and_never_overwrites(
-    record, parted, tmp_path
+    record,
+    parted,
+    tmp_path,
 ):
     options = ("--loop", "--label", "kind=a b/c", "--length", 1.2, "--trials")
     assert [len(record(*options, n, fake=parted)[1]) for n in (2, 1)] == [2, 1]
@@ -251,7 +263,10 @@ def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
 
 
 def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_record(
-    edge, parted, tmp_path, monkeypatch
+    edge,
+    parted,
+    tmp_path,
+    monkeypatch,
 ):
     monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
     given = ("--web", "127.0.0.1:0", "--out", tmp_path / "trials", "--seconds", 1.0)
@@ -260,7 +275,10 @@ def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_re
 
 
 def test_keys_choose_the_label_and_delete_the_last_trial(
-    edge, parted, tmp_path, monkeypatch
+    edge,
+    parted,
+    tmp_path,
+    monkeypatch,
 ):
     """The first of a task's labels holds until the number of another is pressed."""
     trials = tmp_path / "trials"

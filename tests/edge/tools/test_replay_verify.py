@@ -14,7 +14,10 @@ from tests.conftest import ROOT, decided, python
 @pytest.fixture
 def replay(exported, edge):
     return lambda *arguments: edge(
-        "replay", "--model", exported / "model.onnx", *arguments
+        "replay",
+        "--model",
+        exported / "model.onnx",
+        *arguments,
     )
 
 
@@ -72,7 +75,11 @@ def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, 
 @pytest.fixture
 def verify(exported, edge):
     return lambda golden: edge(
-        "verify", "--model", exported / "model.onnx", "--golden", golden
+        "verify",
+        "--model",
+        exported / "model.onnx",
+        "--golden",
+        golden,
     )
 
 
@@ -100,7 +107,13 @@ def test_the_golden_file_is_met(verify, exported):
     ],
 )
 def test_a_difference_names_the_worst_row(
-    verify, exported, tmp_path, key, name, row, change
+    verify,
+    exported,
+    tmp_path,
+    key,
+    name,
+    row,
+    change,
 ):
     arrays = dict(np.load(exported / "golden.npz"))
     arrays[key][row] += np.array(change).astype(arrays[key].dtype)
@@ -155,7 +168,12 @@ def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
     model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
     line = f"{sys.executable} -m edge {' '.join(model)} | head -1"
     piped = subprocess.run(
-        line, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
+        line,
+        shell=True,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert piped.stdout.count("\n") == 1
     assert piped.stderr == ""
@@ -200,7 +218,13 @@ def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
 def test_two_models_are_compared_on_the_same_recordings(exported, recordings, edge):
     path = exported / "model.onnx"
     status, events, err = edge(
-        "replay", "--model", path, "--model", path, recordings, "--summary"
+        "replay",
+        "--model",
+        path,
+        "--model",
+        path,
+        recordings,
+        "--summary",
     )
     assert status == 0
     assert len(decided(events, "task")) == 2 * 2 * 16

@@ -197,7 +197,11 @@ def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_
     ],
 )
 def test_what_cannot_be_taught_is_one_sentence_and_writes_nothing(
-    change, sentence, teach, make_touch, tmp_path
+    change,
+    sentence,
+    teach,
+    make_touch,
+    tmp_path,
 ):
     save(tmp_path / "odd.npz", change(make_touch(seed=1)))
     status, _, messages = teach(tmp_path / "odd.npz")

@@ -79,7 +79,9 @@ def test_a_misspelled_label_is_asked_about_and_another_one_is_not():
 
 
 def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
-    model, exported, tmp_path
+    model,
+    exported,
+    tmp_path,
 ):
     data = (exported / "model.onnx").read_bytes()
     constants = Graph(onnx_file.read(data, "model")).constants

@@ -73,7 +73,11 @@ def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, record):
     ],
 )
 def test_an_arm_that_cannot_be_used_is_refused(
-    files, record, options, said, monkeypatch
+    files,
+    record,
+    options,
+    said,
+    monkeypatch,
 ):
     monkeypatch.chdir(files)
     status, _, err = record(*options)

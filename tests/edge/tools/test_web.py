@@ -20,7 +20,9 @@ def ask(server, path="/", method="GET", body=None, token=None):
     given."""
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=5)
     connection.request(
-        method, f"{path}?token={server.token if token is None else token}", body
+        method,
+        f"{path}?token={server.token if token is None else token}",
+        body,
     )
     answer = connection.getresponse()
     return answer.status, dict(answer.getheaders()), answer.read()

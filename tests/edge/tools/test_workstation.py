@@ -23,7 +23,9 @@ def test_the_exit_status_is_that_of_the_command(capfd):
 
 
 def test_where_there_is_no_checkout_it_says_where_the_command_runs(
-    monkeypatch, tmp_path, capsys
+    monkeypatch,
+    tmp_path,
+    capsys,
 ):
     monkeypatch.setattr("edge.__file__", str(tmp_path / "edge" / "__init__.py"))
     assert workstation.run(["export"]) == 2

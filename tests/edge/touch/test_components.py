@@ -82,7 +82,11 @@ def assert_same(active, wraps):
     seed=st.integers(0, 10**6),
 )
 def test_noise_of_any_density_has_the_components_of_scipy(
-    rows, cols, density, wraps, seed
+    rows,
+    cols,
+    density,
+    wraps,
+    seed,
 ):
     active = np.random.default_rng(seed).random((rows, cols)) < density
     assert_same(active, wraps)

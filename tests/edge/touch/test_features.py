@@ -147,11 +147,15 @@ def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
 def test_motion_is_interpolated_over_frames_without_a_pose():
     motion = [0.0, np.nan, 0.2, np.nan]
     vector = feature_vector(
-        series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion), 1.2, samples=4
+        series([0.0, 0.4, 0.8, 1.2], [1] * 4, motion=motion),
+        1.2,
+        samples=4,
     )
     assert vector[8:] == pytest.approx([0.0, 0.1, 0.2, 0.2])
     none = feature_vector(
-        series([0.0, 1.2], [1, 1], motion=[np.nan] * 2), 1.2, samples=4
+        series([0.0, 1.2], [1, 1], motion=[np.nan] * 2),
+        1.2,
+        samples=4,
     )
     assert none[8:].tolist() == [0.0] * 4
 

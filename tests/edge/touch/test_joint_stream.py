@@ -210,7 +210,9 @@ def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
     assert wire.at() is not None
     known = stream(wire, range(50, 100))
     np.testing.assert_allclose(
-        known, [[i / 100, -i / 100] for i in range(50, 100)], atol=1e-6
+        known,
+        [[i / 100, -i / 100] for i in range(50, 100)],
+        atol=1e-6,
     )
 
 
@@ -224,10 +226,15 @@ def test_a_line_out_of_order_begins_anew(wire):
 
 @pytest.mark.parametrize(("place", "hz"), [(0, 25), (8, 100)])
 def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
-    wire, place, hz
+    wire,
+    place,
+    hz,
 ):
     known = stream(
-        wire, range(2 * hz), hz=hz, ahead=lambda i: 1000.0 + 0.3 * (i == place)
+        wire,
+        range(2 * hz),
+        hz=hz,
+        ahead=lambda i: 1000.0 + 0.3 * (i == place),
     )
     assert None not in known[place + hz :]
 

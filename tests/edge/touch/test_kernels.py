@@ -98,7 +98,9 @@ def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
     )
     touch = kernels.shifted(values, table.shifts)[None].astype(np.float32)
     (theirs,) = minirocket._static_transform_multi(
-        touch, parameters, np.array(HEAVY, np.int32)
+        touch,
+        parameters,
+        np.array(HEAVY, np.int32),
     )
     assert shares(values, table).astype(np.float32).tolist() == theirs.tolist()
 
@@ -127,7 +129,9 @@ def touch():
     patch = {(row, (3, 4, 5)) for row in (2, 3, 4)}
     return [
         pressed(
-            SKIN, 5.0 + 0.04 * i + 1e-9 * (i % 3), dict.fromkeys(patch, 10 + 7 * i % 50)
+            SKIN,
+            5.0 + 0.04 * i + 1e-9 * (i % 3),
+            dict.fromkeys(patch, 10 + 7 * i % 50),
         )
         for i in range(40)
     ]
@@ -152,7 +156,10 @@ def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
         (0,) * channels, (0,) * {"taxel_kernels": 1008, "zone_kernels": 504}[name]
     )
     vector = feature_vector(
-        series_of(frames, name), 1.56, features=[name], tables={name: table}
+        series_of(frames, name),
+        1.56,
+        features=[name],
+        tables={name: table},
     )
     assert vector.tolist() == shares(held, table).tolist()
 

@@ -62,7 +62,10 @@ def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
         True if frame.valid is None else frame.valid
     )
     largest = largest_region(
-        counts, layout.threshold_counts, valid=frame.valid, wraps=layout.wraps
+        counts,
+        layout.threshold_counts,
+        valid=frame.valid,
+        wraps=layout.wraps,
     )
     left = np.zeros(layout.shape, dtype=bool)
     left[:, : layout.cols // 2] = True
@@ -90,7 +93,11 @@ def frame_of(seed: int, shape, density=0.4, high=65535) -> Frame:
     shape=st.sampled_from([(5, 7), (1, 1), (1, 6), (6, 1), (16, 24)]),
 )
 def test_whole_numbers_of_every_place_are_those_of_plain_sums(
-    seed, density, high, wraps, shape
+    seed,
+    density,
+    high,
+    wraps,
+    shape,
 ):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
     frame = frame_of(seed, shape, density, high)
@@ -183,7 +190,9 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     }
     for quantity, truth in exact.items():
         assert value(FLAT, counts, f"skin_{quantity}") == pytest.approx(
-            float(truth), rel=4e-15, abs=1e-14
+            float(truth),
+            rel=4e-15,
+            abs=1e-14,
         )
     # The determinant of a thin contact cancels: see `edge.touch.features`.
     assert value(FLAT, counts, "skin_width") == pytest.approx(
@@ -297,7 +306,9 @@ def test_a_wrong_name_is_one_sentence(wanted, sentence):
 
 def test_a_feature_that_was_not_measured_is_one_sentence():
     series = series_of(
-        FLAT, [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)], ["max_force"]
+        FLAT,
+        [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)],
+        ["max_force"],
     )
     for name in (
         "skin_force",
@@ -315,7 +326,9 @@ def test_a_feature_that_was_not_measured_is_one_sentence():
     [((16, 16), 1, 256), ((16, 24), 2, 96), ((1, 257), 2, 129), ((13, 13), 1, 169)],
 )
 def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(
-    shape, side, count
+    shape,
+    side,
+    count,
 ):
     cells = Cells(SkinLayout(*shape))
     assert cells.side == side
@@ -334,7 +347,9 @@ def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
     rng = np.random.default_rng(seed)
     rows, cols = shape
     dead = rng.choice(
-        rows * cols, size=rng.integers(0, rows * cols // 2), replace=False
+        rows * cols,
+        size=rng.integers(0, rows * cols // 2),
+        replace=False,
     )
     layout = SkinLayout(rows, cols, dead=tuple(sorted(dead.tolist())))
     counts = rng.integers(0, 65536, shape).astype(np.uint16)

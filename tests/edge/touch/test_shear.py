@@ -44,7 +44,10 @@ def sheared_frame(seed, shape, high=32767, t=0.0) -> Frame:
 def measured(layout, frame) -> tuple[dict[str, list[int]], ActiveTaxels]:
     """The whole numbers of every zone, and the frame's active taxels."""
     active = ActiveTaxels(
-        frame.counts, THRESHOLD, valid=frame.valid, wraps=layout.wraps
+        frame.counts,
+        THRESHOLD,
+        valid=frame.valid,
+        wraps=layout.wraps,
     )
     zones = Zones(layout, feature_types(ALL))
     row = zones.measure(active, active.largest(), frame.shear)

@@ -42,7 +42,11 @@ def test_the_threshold_is_twice_the_noise_and_the_onset_half_as_much_again():
     ],
 )
 def test_saving_warns_of_thresholds_and_names_better_ones(
-    skin, warning, make_touch, tmp_path, caplog
+    skin,
+    warning,
+    make_touch,
+    tmp_path,
+    caplog,
 ):
     touch = make_touch()
     frames = np.maximum(touch.frames, QUIET)
@@ -53,7 +57,9 @@ def test_saving_warns_of_thresholds_and_names_better_ones(
 
 
 def test_a_touch_that_only_falls_from_its_start_has_no_better_threshold(
-    make_touch, tmp_path, caplog
+    make_touch,
+    tmp_path,
+    caplog,
 ):
     touch = make_touch(lead_s=0.0)
     save(tmp_path / "a.npz", replace(touch, frames=touch.frames[::-1]))

@@ -59,7 +59,10 @@ def test_a_contact_ends_after_a_time_without_any_taxel():
 @pytest.mark.parametrize("dt", [0.01, 0.005, 0.0025])
 @pytest.mark.parametrize("start", [0.0, 0.07, 123.456, 1.7e9])
 def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(
-    away_s, contacts, dt, start
+    away_s,
+    contacts,
+    dt,
+    start,
 ):
     """At any rate and on any clock: the end is a time, not a number of frames."""
     away = round(away_s / dt)
@@ -160,7 +163,11 @@ def test_times_that_are_not_finite_are_refused(t):
 
 def test_another_scale_brings_the_thresholds_along():
     model = SkinLayout(
-        4, 6, counts_per_newton=1000.0, threshold_counts=100, onset_counts=150
+        4,
+        6,
+        counts_per_newton=1000.0,
+        threshold_counts=100,
+        onset_counts=150,
     )
     device = SkinLayout(4, 6, counts_per_newton=2000.0, threshold_counts=7, dead=(3,))
     adapted = for_device(model, device)

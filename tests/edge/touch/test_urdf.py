@@ -104,7 +104,9 @@ def test_a_urdf_that_is_not_there_is_one_sentence(tmp_path):
     ],
 )
 def test_a_xacro_macro_is_called_one_with_the_command_that_expands_it(
-    tmp_path, name, text
+    tmp_path,
+    name,
+    text,
 ):
     path = tmp_path / name
     path.write_text(text)

@@ -36,7 +36,9 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
     for i, touch in enumerate(touches):
         write_frames(
-            tmp_path / "csv" / f"trial{i}", touch.t, np.maximum(touch.frames, noise)
+            tmp_path / "csv" / f"trial{i}",
+            touch.t,
+            np.maximum(touch.frames, noise),
         )
     given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
     assert main([*given, str(tmp_path / "out")]) == 0

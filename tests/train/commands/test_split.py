@@ -11,7 +11,9 @@ from train.dataset import contacts
 
 
 def test_labels_for_too_many_contacts_stop_before_anything_is_written(
-    make_touch, tmp_path, refusal
+    make_touch,
+    tmp_path,
+    refusal,
 ):
     touch = make_touch(seconds=0.6)
     three = [{"object": "cup"}] * 3
@@ -23,7 +25,9 @@ def test_labels_for_too_many_contacts_stop_before_anything_is_written(
 
 
 def test_recordings_of_one_name_do_not_overwrite_each_other(
-    make_touch, tmp_path, refusal
+    make_touch,
+    tmp_path,
+    refusal,
 ):
     for folder in ("monday", "tuesday"):
         save(tmp_path / folder / "a.npz", make_touch(seconds=0.6))
@@ -33,7 +37,9 @@ def test_recordings_of_one_name_do_not_overwrite_each_other(
 
 
 def test_each_contact_becomes_a_recording_with_its_own_labels(
-    make_touch, tmp_path, capsys
+    make_touch,
+    tmp_path,
+    capsys,
 ):
     two = in_a_row(*[make_touch(seconds=0.6)] * 2)
     each = [{"object": "one"}, {"object": "other"}]

@@ -63,7 +63,9 @@ def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
     quiet = make_touch(seconds=0.0, arm=False)
     with pytest.raises(InputError, match=r"quiet.npz: holds no contact"):
         comparison.draw(
-            [("quiet.npz", quiet)], tmp_path / "a.png", model=Model(demo.MODEL)
+            [("quiet.npz", quiet)],
+            tmp_path / "a.png",
+            model=Model(demo.MODEL),
         )
 
 

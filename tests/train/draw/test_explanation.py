@@ -55,7 +55,10 @@ def test_the_strongest_pull_comes_first(figure):
 
 
 def test_a_folder_without_the_trials_is_one_sentence(
-    exported, tmp_path, make_touch, refusal
+    exported,
+    tmp_path,
+    make_touch,
+    refusal,
 ):
     save(tmp_path / "new.npz", make_touch(kind="soft", seed=9))
     said = refusal("show", tmp_path / "new.npz", "--model", exported / "model.onnx")

@@ -65,7 +65,9 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
     ],
 )
 def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
-    edited, tmp_path, refusal
+    edited,
+    tmp_path,
+    refusal,
 ):
     touch = load(TOUCH)
     file = tmp_path / "edited.npz"

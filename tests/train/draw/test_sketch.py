@@ -19,7 +19,13 @@ def sketch(effects, moved=0.1, since=0.0, **values):
     drawn = {"effects": effects, "values": values}
     now = FIRST.position + np.array([moved, 0.0, 0.0])
     return axis, sketches._object(
-        axis, drawn, FIRST, now, since, color="blue", hatch="//"
+        axis,
+        drawn,
+        FIRST,
+        now,
+        since,
+        color="blue",
+        hatch="//",
     )
 
 

@@ -88,6 +88,8 @@ def test_a_skin_without_an_arm_is_its_own_outline():
     layout = info.layout
     for line in lines:
         np.testing.assert_allclose(
-            np.hypot(line[:, 0], line[:, 1]), layout.radius_m, rtol=1e-12
+            np.hypot(line[:, 0], line[:, 1]),
+            layout.radius_m,
+            rtol=1e-12,
         )
     assert lines[0][0, 2] - lines[1][0, 2] == pytest.approx(15 * layout.pitch_m[0])

@@ -133,7 +133,11 @@ def test_signed_values_lose_their_rest_on_each_axis(folder, imported):
     ],
 )
 def test_what_is_not_three_axes_is_one_sentence(
-    names, options, sentence, folder, refusal
+    names,
+    options,
+    sentence,
+    folder,
+    refusal,
 ):
     write_table(folder, names.split())
     out = folder.parent / "out"

@@ -444,7 +444,9 @@ UNNAMED = {
 
 @pytest.mark.parametrize("kind", UNNAMED)
 def test_a_column_without_a_name_that_may_be_no_taxel_is_asked_for(
-    folder, refusal, kind
+    folder,
+    refusal,
+    kind,
 ):
     files = {f"{i}.txt": "".join(rows) for i, rows in enumerate(UNNAMED[kind])}
     put(folder, files)
@@ -640,7 +642,10 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
     ],
 )
 def test_a_long_table_that_contradicts_itself_is_refused(
-    folder, refusal, table, sentence
+    folder,
+    refusal,
+    table,
+    sentence,
 ):
     path = folder / "all.csv"
     path.write_text(table)

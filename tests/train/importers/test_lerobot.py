@@ -160,7 +160,11 @@ RAGGED = [[1.0] * TAXELS] * (N - 1) + [[1.0, 2.0]]
     ],
 )
 def test_what_does_not_suit_is_one_sentence(
-    tmp_path, refusal, change, options, sentence
+    tmp_path,
+    refusal,
+    change,
+    options,
+    sentence,
 ):
     folder = data_set(tmp_path / "set", "v2.1")
     if change is not None:

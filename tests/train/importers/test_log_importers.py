@@ -275,7 +275,12 @@ def publishers():
     ids=["backwards", "among others", "of two publishers"],
 )
 def test_angles_are_told_apart_by_the_names_of_their_joints(
-    bag, imported, arm, capsys, states, others
+    bag,
+    imported,
+    arm,
+    capsys,
+    states,
+    others,
 ):
     recording = imported(bag(skin(), states), *arm)
     assert differences(recording) == []
@@ -304,7 +309,10 @@ def test_joints_outside_the_arm_may_have_no_angles(bag, imported, arm):
     [((ROWS, COLS), {}), ((), {"skin": {"rows": ROWS, "cols": COLS}})],
 )
 def test_arrays_take_the_shape_from_the_layout_or_from_beside(
-    bag, imported, dims, beside
+    bag,
+    imported,
+    dims,
+    beside,
 ):
     frames = [array(frame, dims=dims) for frame in FRAMES]
     recording = imported(bag(skin(frames), beside=beside))
@@ -403,7 +411,9 @@ def test_angles_across_a_gap_are_unknown(bag, imported, capsys):
 
 
 def test_clocks_that_never_meet_are_joined_by_the_time_of_logging(
-    bag, imported, capsys
+    bag,
+    imported,
+    capsys,
 ):
     pairs = zip(JOINT_T, JOINTS, strict=True)
     states = [joint_state(t - 90.0, q) for t, q in pairs]
@@ -428,7 +438,9 @@ def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
 
 
 def test_a_topic_without_a_readable_definition_is_left_out_and_said(
-    tmp_path, imported, capsys
+    tmp_path,
+    imported,
+    capsys,
 ):
     path = write_mcap(tmp_path / "grasp.mcap", sensor(), unreadable=("/tf",))
     recording = imported(path, "--field", "taxels.z", *SHAPE)
@@ -513,11 +525,22 @@ TWO = (skin(topic="/left"), skin(topic="/right"))
     ],
 )
 def test_what_a_log_lacks_is_one_sentence(
-    bag, tmp_path, refusal, topics, beside, options, sentence
+    bag,
+    tmp_path,
+    refusal,
+    topics,
+    beside,
+    options,
+    sentence,
 ):
     path = bag(*topics, beside=beside)
     assert sentence in refusal(
-        "import", "rosbag", path, "--out", tmp_path / "out", *options
+        "import",
+        "rosbag",
+        path,
+        "--out",
+        tmp_path / "out",
+        *options,
     )
 
 
@@ -535,7 +558,12 @@ def test_what_a_log_lacks_is_one_sentence(
 def test_joints_that_do_not_suit_the_arm(bag, tmp_path, arm, refusal, names, sentence):
     path = bag(skin(), joints(names))
     assert sentence in refusal(
-        "import", "rosbag", path, "--out", tmp_path / "out", *arm
+        "import",
+        "rosbag",
+        path,
+        "--out",
+        tmp_path / "out",
+        *arm,
     )
 
 

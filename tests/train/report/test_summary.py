@@ -38,7 +38,9 @@ def test_each_candidate_has_a_row_with_its_accuracies_and_prices(fitted):
 
 
 def test_flattering_data_and_left_out_recordings_get_a_warning(
-    recordings, make_touch, tmp_path
+    recordings,
+    make_touch,
+    tmp_path,
 ):
     save(tmp_path / "still.npz", make_touch(seconds=0.0))
     save(tmp_path / "odd.npz", make_touch(labels={"category": "soft-fixed"}))

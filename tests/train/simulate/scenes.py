@@ -57,7 +57,9 @@ def run_batch(scene, specs, **options) -> Seen:
     physics = run_physics(scene, specs, **options)
     seen = list(readings(physics))
     return Seen(
-        **vars(physics), counts=np.stack([read.frames() for read in seen]), seen=seen
+        **vars(physics),
+        counts=np.stack([read.frames() for read in seen]),
+        seen=seen,
     )
 
 

@@ -17,7 +17,13 @@ def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, sho
     counts = np.zeros((3, 2, 4), dtype=np.float32)
     counts[1, 1, 2] = count
     reading = Readings(
-        SCENE, None, (), 0, np.arange(3) / 100.0, counts, np.zeros((3, 1))
+        SCENE,
+        None,
+        (),
+        0,
+        np.arange(3) / 100.0,
+        counts,
+        np.zeros((3, 1)),
     )
     want = np.zeros((3, 2, 4), dtype=np.uint16)
     want[1, 1, 2] = shown

@@ -153,7 +153,12 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     far = {"lead_s": 5.0, "after_s": 0.1}
     trial_scene = scene("noise", **far)
     other_scene = scene(
-        "noise", "dropped_frames", "crosstalk", "tilt", "saturation", **far
+        "noise",
+        "dropped_frames",
+        "crosstalk",
+        "tilt",
+        "saturation",
+        **far,
     )
     first, second = (batch_of(s)[0].counts[:, :499] for s in (trial_scene, other_scene))
     assert first.any()
@@ -261,7 +266,9 @@ def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
     for add in ((), ("crosstalk",)):  # which asks for all taxels, and leaks nothing
         trial_scene = scene("noise", "dead_band", *add)
         trial_scene.settings.update(
-            noise={"counts": 5.0}, dead_band={"counts": band}, crosstalk={"part": 0.0}
+            noise={"counts": 5.0},
+            dead_band={"counts": band},
+            crosstalk={"part": 0.0},
         )
         seen.append(batch_of(trial_scene)[0].counts)
     assert seen[0].tobytes() == seen[1].tobytes()

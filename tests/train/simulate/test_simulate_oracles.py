@@ -201,7 +201,12 @@ class TestInertia:
 
         start = [-self.DAMPING / self.STIFFNESS * rate, rate]
         solution = solve_ivp(
-            rates, (0, batch.t[-1]), start, max_step=5e-4, rtol=1e-8, dense_output=True
+            rates,
+            (0, batch.t[-1]),
+            start,
+            max_step=5e-4,
+            rtol=1e-8,
+            dense_output=True,
         )
         return np.array([contact_at(*solution.sol(time))[0] for time in batch.t])
 
@@ -310,7 +315,9 @@ class TestFriction:
         askew = (t.contact.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
         np.testing.assert_allclose(
-            (push * forearm).sum(axis=0) / t.contact.loads[0], 0.0, atol=0.01
+            (push * forearm).sum(axis=0) / t.contact.loads[0],
+            0.0,
+            atol=0.01,
         )
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
@@ -324,7 +331,9 @@ class TestFriction:
         own = t.contact.normal - forearm * (t.contact.normal * forearm).sum(axis=0)
         own /= np.sqrt((own * own).sum(axis=0))
         np.testing.assert_allclose(
-            batch.force[:, -1], (push * own).sum(axis=0), rtol=2e-3
+            batch.force[:, -1],
+            (push * own).sum(axis=0),
+            rtol=2e-3,
         )
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
@@ -375,11 +384,16 @@ class TestTilt:
 
     def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
         trial_scene = make(
-            one_object(width_m=0.05, skin_friction=0.4), "tilt", "inertia"
+            one_object(width_m=0.05, skin_friction=0.4),
+            "tilt",
+            "inertia",
         )
         t = run(trial_scene, 0.0025).trials
         moved = (t.contact.jacobian * (t.arm.q - t.arm.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
         np.testing.assert_allclose(
-            t.contact.depth, t.contact.y_frame + moved, rtol=0.0, atol=1e-13
+            t.contact.depth,
+            t.contact.y_frame + moved,
+            rtol=0.0,
+            atol=1e-13,
         )

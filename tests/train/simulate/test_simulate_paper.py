@@ -62,7 +62,9 @@ def test_each_trial_is_long_enough(dataset):
 
 
 def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_samples(
-    cody18, dataset, tmp_path
+    cody18,
+    dataset,
+    tmp_path,
 ):
     datasets = [dataset]
     for i in range(1, SEEDS):

@@ -83,7 +83,10 @@ def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
     distributed = pytest.importorskip("distributed")
     where = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None}
     with distributed.LocalCluster(
-        2, threads_per_worker=1, processes=False, **where
+        2,
+        threads_per_worker=1,
+        processes=False,
+        **where,
     ) as cluster:
         write(demo, tmp_path, address=cluster.scheduler_address)
     assert digests(tmp_path) == digests(written[0])
@@ -210,7 +213,12 @@ class TestCommand:
         ],
     )
     def test_bad_usage_is_one_sentence(
-        self, arguments, says, refusal, tmp_path, monkeypatch
+        self,
+        arguments,
+        says,
+        refusal,
+        tmp_path,
+        monkeypatch,
     ):
         monkeypatch.chdir(tmp_path)
         assert says in refusal("simulate", *arguments)
@@ -232,7 +240,10 @@ class TestCommand:
     ],
 )
 def test_simulate_warns_of_settings_that_make_trials_useless(
-    tmp_path, capsys, rest, said
+    tmp_path,
+    capsys,
+    rest,
+    said,
 ):
     path = tmp_path / "scene.toml"
     path.write_text(

@@ -171,7 +171,9 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("path", "value", "says"), MISTAKES)
 def test_a_mistake_gets_one_sentence_with_the_key_and_the_values_allowed(
-    path, value, says
+    path,
+    value,
+    says,
 ):
     with pytest.raises(InputError) as error:
         from_dict(changed(path, value), where="scene.toml")

@@ -105,7 +105,10 @@ class TestBed:
             free = float(rng.integers(1, furthest)) / 1024.0
             law = contact.bed_law(gaps[:, None], k[:, None])
             force = contact.closed_form(
-                gaps[:, None], *law, np.array([free]), np.array([c])
+                gaps[:, None],
+                *law,
+                np.array([free]),
+                np.array([c]),
             )[0]
             best = Fraction(0)
             total_k = total_b = Fraction(0)
@@ -205,7 +208,12 @@ class TestAskew:
         ],
     )
     def test_rows_bear_the_loads_of_an_elastic_block(
-        self, degrees, force, depth_mm, peak, rows
+        self,
+        degrees,
+        force,
+        depth_mm,
+        peak,
+        rows,
     ):
         foam = one_object(family="foam", modulus_pa=8e3, depth_m=0.1, relax_ratio=0.0)
         t = run(make(foam)).trials
@@ -370,7 +378,10 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
     viscous = t.states["viscous"]
     elastic = contact.spring_loads(
-        t.touch.line_depth, t.bed.gaps, t.bed.stiffness, t.bed.weight
+        t.touch.line_depth,
+        t.bed.gaps,
+        t.bed.stiffness,
+        t.bed.weight,
     ).sum(axis=0)
     assert (np.ptp(elastic, axis=0) > 0.1).all()
     np.testing.assert_allclose(t.bed.row_force, elastic, atol=1e-3)
@@ -379,16 +390,23 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
     wrap = make(
-        one_object(family="bubbles", pop_n=0.3, width_m=0.08), "tilt", after_s=2.0
+        one_object(family="bubbles", pop_n=0.3, width_m=0.08),
+        "tilt",
+        after_s=2.0,
     )
     t = run(replace(wrap, travel_s=0.6)).trials
     bed = t.bed
     assert (np.ptp(bed.intact.sum(axis=0), axis=0) > 0.0).all()
     loads = contact.spring_loads(
-        t.touch.line_depth, bed.gaps, bed.stiffness, bed.weight
+        t.touch.line_depth,
+        bed.gaps,
+        bed.stiffness,
+        bed.weight,
     )
     np.testing.assert_allclose(
-        bed.row_force, (loads * bed.intact).sum(axis=0), atol=1e-6
+        bed.row_force,
+        (loads * bed.intact).sum(axis=0),
+        atol=1e-6,
     )
 
 

@@ -35,7 +35,10 @@ def simulations(boxes):
 
 class TestLabels:
     def test_a_movable_object_slides_within_the_window(
-        self, boxes, simulations, tmp_path
+        self,
+        boxes,
+        simulations,
+        tmp_path,
     ):
         stuck = (run(boxes).traces["slide_m"][:, :142].max(axis=1) < 0.02).sum()
         assert stuck > 0
@@ -107,10 +110,15 @@ class TestLabels:
     @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles"])
     @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
     def test_an_object_inside_the_arm_is_refused_at_once(
-        self, monkeypatch, family, step_s
+        self,
+        monkeypatch,
+        family,
+        step_s,
     ):
         monkeypatch.setattr(
-            convergence, "measure", lambda *_: pytest.fail("it measured the step first")
+            convergence,
+            "measure",
+            lambda *_: pytest.fail("it measured the step first"),
         )
         wide = {
             "name": "wall",

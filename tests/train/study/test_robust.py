@@ -58,7 +58,9 @@ def test_a_scene_gives_its_recordings_again_even_those_felt_late(context, scene)
 
 @pytest.mark.parametrize("change", ["with crosstalk", "without noise"])
 def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(
-    context, scene, change
+    context,
+    scene,
+    change,
 ):
     data = context.dataset
     changed = variants(scene)[change]

@@ -215,7 +215,10 @@ def test_bad_input_is_one_sentence(given, sentence, recordings, tmp_path, refusa
 def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, refusal):
     for seed in range(20):
         touch = make_touch(
-            seed=seed, seconds=0.3, rate=25.0, labels={"mobility": "fixed"}
+            seed=seed,
+            seconds=0.3,
+            rate=25.0,
+            labels={"mobility": "fixed"},
         )
         save(tmp_path / f"{seed:02d}.npz", touch)
     said = refusal("study", "--data", tmp_path, "--out", tmp_path / "out")

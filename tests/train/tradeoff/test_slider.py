@@ -19,7 +19,11 @@ ANSWERS = {
     1.2: {"mobility": chosen(99, 73), "<b>": chosen(91)},
 }
 RULE = SimpleNamespace(
-    asked=0.1, folds=5, mean_s=0.5, wrong=0.05, result=Promise(95, 100)
+    asked=0.1,
+    folds=5,
+    mean_s=0.5,
+    wrong=0.05,
+    result=Promise(95, 100),
 )
 MEASURED = measured(
     ANSWERS,

@@ -127,7 +127,12 @@ def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, 
     ],
 )
 def test_a_point_that_cannot_be_exported_is_one_sentence(
-    recordings, fronted, tmp_path, capsys, more, sentence
+    recordings,
+    fronted,
+    tmp_path,
+    capsys,
+    more,
+    sentence,
 ):
     given = ["--data", str(recordings), "--out", str(tmp_path), "--front", "fast"]
     if more[0] == "--data":
@@ -168,7 +173,9 @@ class TestCosts:
         ("side", "place"), [(16, "1 bus of AD7147"), (40, "a microcontroller")]
     )
     def test_a_skin_of_any_size_tells_by_how_much_larger_taxels_shorten_a_frame(
-        self, side, place
+        self,
+        side,
+        place,
     ):
         raw = Recordings((), (), "")
         first, *_ = costs._fewer_taxels(raw, SkinLayout(rows=side, cols=side))
@@ -199,7 +206,10 @@ def test_the_cheapest_use_may_be_early_and_its_price_has_an_interval():
     right = np.arange(100) < 94
     rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
     early_or_late = measured(
-        {1.2: {"t": chosen(95)}}, {"t": [rule]}, wrong=10.0, second=1.0
+        {1.2: {"t": chosen(95)}},
+        {"t": [rule]},
+        wrong=10.0,
+        second=1.0,
     )
     (row,) = answer.prices(early_or_late).tables[0].rows
     assert row["best use"] == "early, at most 10% wrong"
@@ -268,7 +278,10 @@ class TestEarly:
         assert min(rules) > early.ERRORS[0]
 
     def test_objects_never_met_are_decided_by_models_that_never_met_them(
-        self, tmp_path, make_touch, monkeypatch
+        self,
+        tmp_path,
+        make_touch,
+        monkeypatch,
     ):
         for kind in ("hard", "soft"):
             for number in range(16):
@@ -292,10 +305,14 @@ class TestEarly:
         )
 
     def test_features_of_kernels_have_the_tables_of_the_other_folds(
-        self, tmp_path, monkeypatch
+        self,
+        tmp_path,
+        monkeypatch,
     ):
         monkeypatch.setattr(
-            early, "fit", partial(early.fit, features=("zone_kernels",))
+            early,
+            "fit",
+            partial(early.fit, features=("zone_kernels",)),
         )
         dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
         assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()

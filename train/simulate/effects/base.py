@@ -216,7 +216,11 @@ def answer(t: Trials, y: Array, c: Array) -> Array:
     gain = bed.gain
     load = bed.load[0]
     elastic = closed_form(
-        bed.law_gaps, bed.slopes, bed.intercepts, y - c * load, c * gain
+        bed.law_gaps,
+        bed.slopes,
+        bed.intercepts,
+        y - c * load,
+        c * gain,
     )
     force = gain * elastic + load
     force = np.where((elastic > 0.0) & (force > 0.0), force, 0.0)

@@ -17,7 +17,9 @@ def clock(readings: Readings) -> None:
     part = np.zeros(len(t))
     deviations = readings.stream("jitter").standard_normal(len(t) - 2)
     part[1:-1] = np.clip(
-        deviations * (readings.scene.setting("jitter", "s") / frame), -0.45, 0.45
+        deviations * (readings.scene.setting("jitter", "s") / frame),
+        -0.45,
+        0.45,
     )
     readings.times = t + part * frame
     series: tuple[NDArray[Any], ...] = readings.joints, counts

@@ -48,7 +48,9 @@ def touched_at(gaps: Array, radius: Array | float, depth: Array) -> Array:
 def widen(t: Trials) -> None:
     """Columns are touched at a larger depth."""
     t.bed.column_gaps = touched_at(
-        t.bed.column_gaps, t.scene.skin.radius_m, t.values["depth_m"]
+        t.bed.column_gaps,
+        t.scene.skin.radius_m,
+        t.values["depth_m"],
     )
 
 

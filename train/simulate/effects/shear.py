@@ -43,7 +43,9 @@ def shared(pull: Array, limits: Array) -> Array:
     sticking = np.maximum((slips < pull).sum(axis=0), 0)
     slipped = np.minimum(sticking, springs - 1)
     lost = np.where(
-        sticking > 0, np.take_along_axis(below, (sticking - 1)[None], axis=0)[0], 0
+        sticking > 0,
+        np.take_along_axis(below, (sticking - 1)[None], axis=0)[0],
+        0,
     )
     level = (pull - lost) / (springs - slipped)
     borne = np.minimum(limits, level)

@@ -74,7 +74,9 @@ class ClassifyNode(Node):
             parameters["skin"], parameters["fake"]
         )
         self._classifier = edge.Classifier(
-            self._model, self._skin.layout, error=number("error", parameters["error"])
+            self._model,
+            self._skin.layout,
+            error=number("error", parameters["error"]),
         )
         self._events = self.create_publisher(String, "~/events", 10)
         self._tasks = {
@@ -133,7 +135,9 @@ class ClassifyNode(Node):
     def _watch(self) -> None:
         with self._skin as skin:
             for event in self._classifier.watch(
-                skin, joints=self._joints, lasts_s=self._lasts_s
+                skin,
+                joints=self._joints,
+                lasts_s=self._lasts_s,
             ):
                 if self._closing:
                     return
