@@ -121,7 +121,7 @@ class Outcome:
         met: transactions that met a fault; positions tried in a sweep.
         wrong: values called valid that no chip felt.
         missing: most invalid taxels of one frame.
-        others: readings lost on chips that the script does not touch.
+        elsewhere: readings lost on chips that the script does not touch.
         missed_ticks: ticks left out.
         back_s: longest time from a fault's end until every taxel was valid; NaN if
             never.
@@ -131,7 +131,7 @@ class Outcome:
     met: int = 0
     wrong: int = 0
     missing: int = 0
-    others: int = 0
+    elsewhere: int = 0
     missed_ticks: int = 0
     back_s: float = 0.0
 
@@ -142,7 +142,7 @@ class Outcome:
             met: self.met,
             "wrong values called valid": self.wrong,
             "taxels missing, worst frame": self.missing,
-            "readings lost on other chips": self.others,
+            "readings lost on other chips": self.elsewhere,
             "ticks left out": self.missed_ticks,
             "all back after, ms": f"{1e3 * self.back_s:.0f}",
         }
@@ -160,7 +160,7 @@ class Watched:
         self.skin = Skin(file, self.buses, clock=clock)
         self.skin.start()
         clock.sleep_until(math.ceil(clock.now() / 0.01) * 0.01)
-        self.wrong = self.missing = self.others = 0
+        self.wrong = self.missing = self.elsewhere = 0
         self.back_at = -math.inf
         """When all taxels were valid again; infinity while one is not."""
         self.spared = np.zeros(file.layout.shape, dtype=bool)
@@ -171,7 +171,7 @@ class Watched:
         invalid = ~frame.valid
         self.wrong += self.feels.wrong(frame)
         self.missing = max(self.missing, int(invalid.sum()))
-        self.others += int((invalid & self.spared).sum())
+        self.elsewhere += int((invalid & self.spared).sum())
         if invalid.any():
             self.back_at = math.inf
         elif self.back_at == math.inf:
@@ -202,7 +202,7 @@ class Watched:
             met,
             self.wrong,
             self.missing,
-            self.others,
+            self.elsewhere,
             missed_ticks,
             back,
         )
@@ -211,8 +211,8 @@ class Watched:
 def touches(fault, bus, chip):
     """Whether a fault may meet a transaction with a chip or its mux."""
     to_chip = Route(chip.address, chip.mux, chip.channel)
-    there = fault.targets(to_chip) or fault.targets(Route(chip.mux))
-    return there and fault.bus in (None, bus.device)
+    meets = fault.targets(to_chip) or fault.targets(Route(chip.mux))
+    return meets and fault.bus in (None, bus.device)
 
 
 def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0, seed=0):
@@ -351,8 +351,8 @@ def plays(seed, overhead_s):
         yield delayed(run)(name, file, faults, seed=seed, **cost)
     for name, file in SKINS.items():
         yield delayed(run)(f"all reset, {name}", file, resets=REPEATED[:1], **cost)
-        again = f"all reset 4 times, {name}"
-        yield delayed(run)(again, file, resets=REPEATED, **cost)
+        words = f"all reset 4 times, {name}"
+        yield delayed(run)(words, file, resets=REPEATED, **cost)
 
 
 def sweeps(every, overhead_s):
@@ -383,13 +383,13 @@ def campaign(overhead_us, every, seed):
     print(table(outcomes[: len(played)], "met"))
     print("\n\\* The protocol cannot tell: see `scripts` in tests/faults.py.\n")
     print(table(outcomes[len(played) :], "positions"))
-    known = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
-    longest = max(known, key=lambda outcome: outcome.back_s)
+    tellable = [outcome for outcome in outcomes if not outcome.name.endswith("*")]
+    longest = max(tellable, key=lambda outcome: outcome.back_s)
     print(
         f"\nLongest time until all were back: {longest.back_s:.3f} s, {longest.name}",
         flush=True,
     )
-    broken = [o for o in known if o.wrong or not o.back_s <= BACK_S]
+    broken = [o for o in tellable if o.wrong or not o.back_s <= BACK_S]
     return [f"{outcome.name} ({overhead_us:g} us)" for outcome in broken]
 
 

@@ -67,8 +67,8 @@ class Fault:
 
     def targets(self, route):
         """Whether its target may be that of a transaction."""
-        there = route._asdict().items()
-        return all(getattr(self, key) in (None, at) for key, at in there)
+        conditions = route._asdict().items()
+        return all(getattr(self, key) in (None, at) for key, at in conditions)
 
 
 class FaultyBus(FakeBus):
@@ -140,12 +140,12 @@ class FaultyBus(FakeBus):
 
     def _misrouted(self, prepared):
         """The messages with the next channel in place of the one that they select."""
-        first, *others = prepared.messages
+        first, *rest = prepared.messages
         to_mux = isinstance(self.chips.get(first.address), FakeTCA9548A)
         if first.read or not to_mux:
             return prepared
         wrong = write(first.address, _another(first.buffer.tobytes()))
-        return Transfer((wrong, *others))
+        return Transfer((wrong, *rest))
 
     def _fail(self, fault, message):
         """Raise the fault's error, which takes its time."""

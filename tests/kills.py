@@ -57,7 +57,7 @@ class Victim:
     finished: Callable[[Path, str], str]
 
 
-def called(*words):
+def output_of(*words):
     """Run a command to its end."""
     return subprocess.run(
         list(map(str, words)),
@@ -115,8 +115,8 @@ def all_or_none(folder, printed):
 def agreeing(folder, printed):
     """The model and its golden file belong together."""
     files = ("--model", folder / "model.onnx", "--golden", folder / "golden.npz")
-    done = called(*EDGE, "verify", *files)
-    return f"{done.stdout}{done.stderr}" if done.returncode else ""
+    result = output_of(*EDGE, "verify", *files)
+    return f"{result.stdout}{result.stderr}" if result.returncode else ""
 
 
 def together(folder):
@@ -254,7 +254,7 @@ class Death:
     complaint: str
 
 
-def tried(victim, moment):
+def killed_once(victim, moment):
     """Kill a victim once."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -263,10 +263,10 @@ def tried(victim, moment):
         alive = killed(command, folder, moment)
         left = temporaries(folder)
         complaint = victim.complaint(folder)
-        again = called(*command)
-        if again.returncode:
-            complaint += again.stderr
-        complaint += victim.finished(folder, again.stderr)
+        second_run = output_of(*command)
+        if second_run.returncode:
+            complaint += second_run.stderr
+        complaint += victim.finished(folder, second_run.stderr)
         remaining = [path for path in left if path.exists()]
         if remaining:
             complaint += f"temporary files stay: {remaining}"
@@ -278,8 +278,8 @@ def whole_s(victim):
     with tempfile.TemporaryDirectory() as folder:
         victim.prepare(Path(folder))
         began = time.perf_counter()
-        done = called(*victim.command(Path(folder)))
-        assert done.returncode == 0, done.stderr
+        result = output_of(*victim.command(Path(folder)))
+        assert result.returncode == 0, result.stderr
         return time.perf_counter() - began
 
 
@@ -290,7 +290,7 @@ def deaths_of(name, victim, count):
     for i in tqdm(range(count), desc=name, leave=False, disable=None):
         changes = stream.randint(1, MOST_CHANGES) if i % 2 else 0
         delay_s = stream.uniform(0.0, CLOSE_S if changes else lasts_s)
-        yield tried(victim, Moment(changes, delay_s))
+        yield killed_once(victim, Moment(changes, delay_s))
 
 
 def row(name, deaths, damages):

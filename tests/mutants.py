@@ -24,13 +24,13 @@ UNNOTICED = ("survived", "no tests")
 
 def output(*arguments):
     """The output of a mutmut command; its errors pass through."""
-    done = subprocess.run(
+    process = subprocess.run(
         [*MUTMUT, *arguments],
         check=True,
         stdout=subprocess.PIPE,
         text=True,
     )
-    return done.stdout
+    return process.stdout
 
 
 def statuses():
@@ -47,14 +47,14 @@ def generate():
     """
     # mutmut copies tests anew, but leaves those that were deleted here since.
     shutil.rmtree("mutants/tests", ignore_errors=True)
-    done = subprocess.run(
+    process = subprocess.run(
         [*MUTMUT, "run", "no such mutant"],
         capture_output=True,
         text=True,
         check=False,
     )
-    if "nothing matches" not in done.stderr:
-        raise SystemExit(done.stdout + done.stderr)
+    if "nothing matches" not in process.stderr:
+        raise SystemExit(process.stdout + process.stderr)
 
 
 def run(names, minutes):

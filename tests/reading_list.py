@@ -30,7 +30,7 @@ finally:
 def loaded(*arguments, environment=None):
     """Paths, below the checkout, of the modules of edge that a command loads."""
     command = [sys.executable, "-c", PROGRAM, *arguments]
-    done = subprocess.run(
+    process = subprocess.run(
         command,
         cwd=ROOT,
         env=environment,
@@ -39,7 +39,7 @@ def loaded(*arguments, environment=None):
         check=False,
     )
     paths = []
-    for line in done.stdout.splitlines():
+    for line in process.stdout.splitlines():
         if line.startswith("module "):
             path = Path(line.removeprefix("module ")).relative_to(ROOT)
             if path.name != "__init__.py":

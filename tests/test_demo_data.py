@@ -24,9 +24,9 @@ def test_the_demo_touches_one_of_each_category_and_gets_them_right(edge):
 
 
 def test_a_wrong_decision_is_a_failure(monkeypatch, tmp_path, edge):
-    other = load(demo.recordings()[0])
-    labels = {**other.labels, "mobility": "movable"}
-    save(tmp_path / "wrong.npz", replace(other, meta={**other.meta, "labels": labels}))
+    touch = load(demo.recordings()[0])
+    labels = {**touch.labels, "mobility": "movable"}
+    save(tmp_path / "wrong.npz", replace(touch, meta={**touch.meta, "labels": labels}))
     monkeypatch.setattr(demo, "recordings", lambda: [tmp_path / "wrong.npz"])
     status, _, err = edge("demo")
     tasks = len(Model(demo.MODEL).info.tasks)

@@ -64,8 +64,8 @@ def test_tables_are_written_into_their_folder_whatever_the_objects_name(
         touch = make_touch(seed=number, seconds=0.0, labels={"object": name})
         edge.save(tmp_path / "touches" / f"{number}.npz", touch)
     tables = tmp_path / "tables"
-    done = python(EXAMPLES / "to_csv.py", tmp_path / "touches", tables)
-    assert done.stderr == ""
+    result = python(EXAMPLES / "to_csv.py", tmp_path / "touches", tables)
+    assert result.stderr == ""
     paths = [path.relative_to(tables).as_posix() for path in tables.rglob("*.csv")]
     assert sorted(paths) == ["-etc-x/2.csv", "-up/1.csv", "foam-block/0.csv"]
 
@@ -292,8 +292,8 @@ def test_the_ros_node_names_an_error_that_is_no_number(monkeypatch, capsys):
 def test_the_ros_node_tells_whether_its_chips_are_read(monkeypatch):
     ros = Ros()
     assert ros.run(monkeypatch) == 0
-    (told,) = ros.topics["/diagnostics"]
-    (status,) = told.status
+    (message,) = ros.topics["/diagnostics"]
+    (status,) = message.status
     assert status.level == status.OK
     assert status.message == "all chips are read"
     values = {pair.key: pair.value for pair in status.values}

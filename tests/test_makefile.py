@@ -19,26 +19,26 @@ def make(*words, **options):
     ],
 )
 def test_data_that_is_not_there_is_refused(words, sentence):
-    done = make("export", *words)
-    assert done.returncode == 2
-    assert sentence in done.stderr
+    result = make("export", *words)
+    assert result.returncode == 2
+    assert sentence in result.stderr
 
 
 def test_a_dry_run_says_what_it_would_do_with_data_that_are_not_there_yet():
-    done = make("-n", "export", "DATA=later kept")
-    assert "--data later kept" in done.stdout
+    result = make("-n", "export", "DATA=later kept")
+    assert "--data later kept" in result.stdout
 
 
 def test_a_front_that_was_never_measured_is_named(tmp_path):
     words = ("export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
-    done = make(*words, cwd=tmp_path)  # where no earlier run has left a front
-    assert done.returncode == 2
-    assert "FRONT needs the points of `make tradeoff`" in done.stderr
+    result = make(*words, cwd=tmp_path)  # where no earlier run has left a front
+    assert result.returncode == 2
+    assert "FRONT needs the points of `make tradeoff`" in result.stderr
 
 
 def test_a_front_of_its_own_folder_comes_first(tmp_path):
     (tmp_path / "tradeoff").mkdir()
     (tmp_path / "tradeoff" / "front.json").write_text("{}")
-    done = make("-n", "export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
-    assert done.returncode == 0
-    assert f"--front fast --fronts {tmp_path}/tradeoff/front.json" in done.stdout
+    result = make("-n", "export", f"DATA={tmp_path}", f"OUT={tmp_path}", "FRONT=fast")
+    assert result.returncode == 0
+    assert f"--front fast --fronts {tmp_path}/tradeoff/front.json" in result.stdout

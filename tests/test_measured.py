@@ -67,8 +67,8 @@ def test_a_page_of_the_site_includes_its_tables():
 
 
 def test_every_hard_case_is_in_its_table():
-    _, *parts = TABLES["hard_cases"].rstrip().split("\n\n")
-    assert len(parts) == 2
-    for part in parts:
+    _, *markdown_tables = TABLES["hard_cases"].rstrip().split("\n\n")
+    assert len(markdown_tables) == 2
+    for part in markdown_tables:
         names = [row.split(" | ")[0].removeprefix("| ") for row in part.splitlines()]
         assert names[2:] == [case.key for case in CASES]

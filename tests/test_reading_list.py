@@ -51,8 +51,8 @@ def core(tmp_path_factory):
 
 
 def test_a_run_reads_the_skin_and_decides_with_a_model(core):
-    needed = ("edge/bus/linux.py", "edge/chips/ad7147.py", "edge/model/engines.py")
-    assert set(needed) <= set(core)
+    modules = ("edge/bus/linux.py", "edge/chips/ad7147.py", "edge/model/engines.py")
+    assert set(modules) <= set(core)
 
 
 def test_the_core_loads_neither_tools_nor_fakes(core):

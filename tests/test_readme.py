@@ -130,9 +130,9 @@ def test_a_command_of_the_workstation_does_as_it_is_written(
 @pytest.mark.parametrize("command", MAKE)
 def test_a_make_command_says_what_it_would_do(command):
     written = re.sub("[][…]", "", command)
-    done = ended(*shlex.split(written), "--dry-run")
-    assert done.returncode == 0, done.stderr
-    assert "python" in done.stdout
+    process = ended(*shlex.split(written), "--dry-run")
+    assert process.returncode == 0, process.stderr
+    assert "python" in process.stdout
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -14,15 +14,14 @@ from tests.bench.program import start
 from train.__main__ import main as train_command
 from train.progress import bar
 
-SCENES = tables.ROOT / "train" / "scenes"
-
 
 def recorded(folder, grasps):
     """Sets of recordings, which are simulated or imported into a folder: name, folder,
     options of the fit."""
     for scene in ("cody18", "household"):
         out = folder / scene
-        train_command(["simulate", str(SCENES / f"{scene}.toml"), "--out", str(out)])
+        path = tables.SCENES / f"{scene}.toml"
+        train_command(["simulate", str(path), "--out", str(out)])
         yield f"`{scene}`, simulated", out, {}
     if grasps:
         out = folder / "sdh2"

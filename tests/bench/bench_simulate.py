@@ -12,10 +12,10 @@ from string import Template
 import mujoco
 import pytest
 
+from tests.bench import tables
 from train.simulate.run import batches_of, simulate_trials
 from train.simulate.scene import load
 
-SCENES = Path(__file__).parents[2] / "train" / "scenes"
 PEERS = {
     "fixed": ("", ""),
     "movable": ("", '<joint type="slide" axis="1 0 0" frictionloss="3.4"/>'),
@@ -32,9 +32,8 @@ FOREARM = Template(Path(__file__).with_name("forearm.xml").read_text())
 
 def mujoco_trial(solref, joint):
     """A function that runs a trial of the forearm against a box in MuJoCo."""
-    model = mujoco.MjModel.from_xml_string(
-        FOREARM.substitute(solref=solref, joint=joint)
-    )
+    xml = FOREARM.substitute(solref=solref, joint=joint)
+    model = mujoco.MjModel.from_xml_string(xml)
     assert model.nsensor == 384
 
     def trial():
@@ -51,7 +50,7 @@ def mujoco_trial(solref, joint):
 
 @pytest.mark.parametrize("name", FASTER)
 def bench_simulate(against, note, name):
-    scene = load(SCENES / f"{name}.toml")
+    scene = load(tables.SCENES / f"{name}.toml")
     batches = batches_of(scene)
     trials = [trial for batch in batches for trial in batch]
     kinds = [t.condition if t.object.family == "rigid" else "soft" for t in trials]

@@ -11,11 +11,8 @@ in which more answers are wrong than the smallest error that the set certifies. 
 the share of the shifts of `make shifts` that are told, as is explained there.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
 from io import StringIO
 from itertools import chain
 from pathlib import Path
@@ -24,15 +21,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from edge.classifier import Classifier
-from edge.events import Decided
-from edge.model.calibration import UNKNOWN
+from edge.model.info import UNKNOWN
 from edge.model.model import Model
 from export.__main__ import main
 from tests.bench import tables
 from tests.bench.program import start
 from tests.bench.risk import SCENE, trust
-from tests.bench.shifts import SHIFTS, answers
+from tests.bench.shifts import SHIFTS, answers, decisions, is_told, trusted
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import simulate, write
@@ -41,72 +36,39 @@ FRESH_SEED = 1 << 20
 """Beyond those of the data sets."""
 
 
-@dataclass(frozen=True)
-class Answered:
-    """A touch, and the decisions on it.
-
-    Attributes:
-        labels: {task: label} of the touch.
-        decisions: {task: the first decision}.
-    """
-
-    labels: dict[str, str]
-    decisions: dict[str, Decided]
+def first_decisions(model, touches, error=None):
+    """{task: a row for the first decision on each touch}."""
+    rows = decisions(model, touches, error).drop_duplicates(["task", "touch"])
+    return dict(list(rows.groupby("task", sort=False)))
 
 
-def answered(model, recordings, error=None):
-    """The recordings on which a classifier decides, with its decisions."""
-    classifier = Classifier(model, error=error)
-    for recording in recordings:
-        decisions = {}
-        for event in classifier.classify(recording):
-            if isinstance(event, Decided):
-                decisions.setdefault(event.task, event)
-        if decisions:
-            yield Answered(recording.labels, decisions)
+def usual(rows):
+    """How far confidence can be trusted on touches like those of training."""
+    right = np.array([answer.label for answer in rows["decision"]]) == rows["truth"]
+    votes = np.array([answer.votes for answer in rows["decision"]])
+    unknown = np.array([UNKNOWN in flags for flags in rows["flags"]])
+    judged = trust(right, rows["confidence"], unknown)
+    return judged | {"of votes": ((votes - right) ** 2).mean()}
 
 
-def usual(model, touches):
-    """{task: how far confidence can be trusted} on touches like those of training."""
-    judged = list(answered(model, touches))
-    rows = {}
-    for task in model.info.tasks:
-        events = [touch.decisions[task] for touch in judged]
-        labels = np.array([touch.labels[task] for touch in judged])
-        right = np.array([event.decision.label for event in events]) == labels
-        confidence = np.array([event.confidence for event in events])
-        unknown = np.array([UNKNOWN in event.flags for event in events])
-        votes = np.array([event.decision.votes for event in events])
-        rows[task] = trust(right, confidence, unknown)
-        rows[task]["of votes"] = ((votes - right) ** 2).mean()
-    return rows
-
-
-def above(model, touches):
-    """{task: whether more decisions are wrong than its smallest certified error}."""
-    errors = {
-        task: model.info.stopping[task].smallest_error for task in model.info.tasks
-    }
-    early = {error: list(answered(model, touches, error)) for error in errors.values()}
-    exceeded = {}
-    for task, error in errors.items():
-        wrong = []
-        for touch in early[error]:
-            label = touch.decisions[task].label
-            wrong.append(label not in (UNKNOWN, touch.labels[task]))
-        exceeded[task] = np.mean(wrong) > error
-    return exceeded
+def is_above(model, task, touches):
+    """Whether more decisions are wrong than the task's smallest certified error."""
+    error = model.info.stopping[task].smallest_error
+    rows = first_decisions(model, touches, error)[task]
+    wrong = (rows["label"] != rows["truth"]) & (rows["label"] != UNKNOWN)
+    return wrong.mean() > error
 
 
 def shifts_told(model, touches):
     """{task: the share of the shifts that are told}."""
-    told = defaultdict(list)
-    accuracy = {}
+    courses = defaultdict(list)
     for shift in SHIFTS.values():
         for task, judged in answers(model, touches, shift).items():
-            accuracy.setdefault(task, judged.trusted)
-            told[task].append(judged.is_told(accuracy[task]))
-    return {task: np.mean(shifts) for task, shifts in told.items()}
+            courses[task].append(judged)
+    shares = {}
+    for task, (first, *_) in courses.items():
+        shares[task] = np.mean([is_told(of, trusted(first)) for of in courses[task]])
+    return shares
 
 
 def judged(seed, fresh, shifted):
@@ -118,14 +80,16 @@ def judged(seed, fresh, shifted):
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             main(["--data", str(data), "--out", out, "--jobs", "1"])
         model = Model(Path(out) / "model.onnx")
-    touches = [r for _, r in simulate(scenes.load(SCENE, seed=FRESH_SEED, count=fresh))]
-    few = [r for _, r in simulate(scenes.load(SCENE, seed=FRESH_SEED, count=shifted))]
-    told = shifts_told(model, few)
-    exceeded = above(model, touches)
-    return [
-        {"task": task, **row, "above": exceeded[task], "told": told[task]}
-        for task, row in usual(model, touches).items()
-    ]
+    touches, few = (
+        [r for _, r in simulate(scenes.load(SCENE, seed=FRESH_SEED, count=count))]
+        for count in (fresh, shifted)
+    )
+    shares = shifts_told(model, few)
+    judged_rows = []
+    for task, rows in first_decisions(model, touches).items():
+        row = {"task": task, **usual(rows), "above": is_above(model, task, touches)}
+        judged_rows.append(row | {"told": shares[task]})
+    return judged_rows
 
 
 def measure(sets, trials, shifted, seed, jobs):
@@ -138,9 +102,8 @@ def measure(sets, trials, shifted, seed, jobs):
         means = of_task.drop(columns=["task", "above"]).mean()
         row = {"task": task, "sets": len(of_task)}
         row |= {name: f"{mean:.3f}" for name, mean in means.items()}
-        least = of_task["flagged unknown"].min()
-        most = of_task["flagged unknown"].max()
-        row["flagged unknown"] += f" ({least:.3f} to {most:.3f})"
+        flagged = of_task["flagged unknown"]
+        row[flagged.name] += f" ({flagged.min():.3f} to {flagged.max():.3f})"
         row["above"] = of_task["above"].sum()
         written.append(row)
     tables.write("exports", [written])

@@ -51,28 +51,20 @@ def layer_xml(thing):
         part = of_row * of_col
         y = (c - cols / 2) * dy
         z = ABOVE_FLOOR_M + (r - rows / 2) * dz
-        knots += knot_xml(n, (y, z), k * part, mass * part, thing.thick_m)
-        for below in numbers[r + 1 : r + 2, c]:
-            springs += spring_xml(n, below, shear * (dy / dz * of_col))
-        for beside in numbers[r, c + 1 : c + 2]:
-            springs += spring_xml(n, beside, shear * (dz / dy * of_row))
+        # A body with a face may have no damped joint, so the face hangs on a second.
+        knots += (
+            f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{n}" '
+            f'stiffness="{k * part}" damping="{0.06 * (k * part) + 0.02}" '
+            f'range="0 {thing.thick_m * 0.9}"/><inertial pos="0 0 0" '
+            f'mass="{mass * part}" diaginertia="1e-6 1e-6 1e-6"/><body '
+            f'name="n{n}"><inertial pos="0 0 0" mass="1e-5" '
+            'diaginertia="1e-9 1e-9 1e-9"/></body></body>'
+        )
+        if r < rows:
+            springs += spring_xml(n, n + cols + 1, shear * (dy / dz * of_col))
+        if c < cols:
+            springs += spring_xml(n, n + 1, shear * (dz / dy * of_row))
     return knots, f"<tendon>{springs}</tendon>{face_xml(numbers)}"
-
-
-def knot_xml(number, place, stiffness, mass, thick_m):
-    """A knot on a spring of its own along the push.
-
-    A body with a face may have no damped joint, so the face hangs on a second body.
-    """
-    y, z = place
-    return (
-        f'<body pos="{FACE_M} {y} {z}"><joint class="knot" name="b{number}" '
-        f'stiffness="{stiffness}" damping="{0.06 * stiffness + 0.02}" '
-        f'range="0 {thick_m * 0.9}"/><inertial pos="0 0 0" '
-        f'mass="{mass}" diaginertia="1e-6 1e-6 1e-6"/><body '
-        f'name="n{number}"><inertial pos="0 0 0" mass="1e-5" '
-        'diaginertia="1e-9 1e-9 1e-9"/></body></body>'
-    )
 
 
 def spring_xml(first, second, stiffness):
@@ -109,16 +101,14 @@ class Rub:
     bear loads of no real net.
     """
 
-    def __init__(self, model, friction):
+    def __init__(self, model, pads, friction):
         self.model = model
+        self.pads = pads
         self.friction = friction
         self.stretch = 0.0
         self.pull = 0.0
         """Newtons on the arm from elbow to wrist in the last step."""
-        self.pads = [
-            i for i in range(model.nbody) if model.body(i).name.startswith("pad")
-        ]
-        self.arm = model.body_parentid[self.pads[0]]
+        self.arm = model.body_parentid[pads[0]]
         self.thing = model.body("thing").id
 
     def hold(self, data, loads):
@@ -130,35 +120,22 @@ class Rub:
             return
         point = loads @ data.xpos[self.pads] / loads.sum()
         along = data.xmat[self.arm].reshape(3, 3)[:, 2]
-        slips = along @ (
-            self._speed(data, self.arm, point) - self._speed(data, self.thing, point)
-        )
+        arm, thing = (self._speed(data, i, point) for i in (self.arm, self.thing))
+        slips = along @ (arm - thing)
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
         self.pull = np.clip(pull, -most, most)
         longest = most / SHEAR_N_M
         stretch = self.stretch + slips * self.model.opt.timestep
         self.stretch = np.clip(stretch, -longest, longest)
         force = self.pull * along
+        applied = data.qfrc_applied
+        zero = np.zeros(3)
         for body, push in ((self.arm, -force), (self.thing, force)):
-            mujoco.mj_applyFT(
-                self.model,
-                data,
-                push,
-                np.zeros(3),
-                point,
-                body,
-                data.qfrc_applied,
-            )
+            mujoco.mj_applyFT(self.model, data, push, zero, point, body, applied)
 
     def _speed(self, data, body, point):
         """(3,) m/s of a point of a body."""
         spatial = np.zeros(6)
-        mujoco.mj_objectVelocity(
-            self.model,
-            data,
-            mujoco.mjtObj.mjOBJ_BODY,
-            body,
-            spatial,
-            0,
-        )
+        kind = mujoco.mjtObj.mjOBJ_BODY
+        mujoco.mj_objectVelocity(self.model, data, kind, body, spatial, 0)
         return np.asarray(spatial[3:] + np.cross(spatial[:3], point - data.xpos[body]))

@@ -1,53 +1,44 @@
 """The tangential force of each pad of `mujoco_touch`, from MuJoCo's contacts."""
 
+from itertools import count
+
 import mujoco
 import numpy as np
 
 from train.simulate.scene import CODY_SKIN
 
+DEGREES = np.array(CODY_SKIN["column_angles_deg"])
+TURN = np.sign((DEGREES[1] - DEGREES[0] + 180.0) % 360.0 - 180.0)
+"""The sense around the arm in which columns follow each other."""
 
-class Tangents:
-    """Reads the tangential forces of a model's pads.
+
+def tangents(model, data, pads, columns, loads, pull):
+    """(n, 2) newtons on each pad along the rows and around the columns.
+
+    The pull of a soft layer's skin friction is shared by the pads' loads.
 
     Args:
-        model: MuJoCo's.
-        columns: (pads,) of the skin.
+        model, data: MuJoCo's.
+        pads, columns: (n,) body and column of each pad.
+        loads: (n,) newtons on each pad along its normal.
+        pull: newtons of a soft layer's skin friction.
     """
-
-    def __init__(self, model, columns):
-        self._model = model
-        bodies = [model.body(f"pad{number}").id for number in range(len(columns))]
-        geoms = (int(model.body_geomadr[body]) for body in bodies)
-        self._pad_of_geom = {geom: number for number, geom in enumerate(geoms)}
-        self._arm = model.body_parentid[bodies[0]]
-        degrees = np.array(CODY_SKIN["column_angles_deg"])
-        angles = np.radians(degrees)[columns]
-        turn = (degrees[1] - degrees[0] + 180.0) % 360.0 - 180.0
-        around = [-np.sin(angles), np.cos(angles), np.zeros(len(columns))]
-        self._around = np.sign(turn) * np.column_stack(around)
-        """(pads, 3) towards the next column, in the arm's link."""
-
-    def read(self, data, loads, pull):
-        """(pads, 2) newtons on each pad along the rows and around the columns.
-
-        The pull of a soft layer's skin friction is shared by the pads' loads.
-        """
-        forces = np.zeros((len(loads), 3))
-        wrench = np.zeros(6)
-        for number in range(data.ncon):
-            contact = data.contact[number]
-            first, second = (self._pad_of_geom.get(int(geom)) for geom in contact.geom)
-            if first is second is None:
-                continue
-            mujoco.mj_contactForce(self._model, data, number, wrench)
-            # The contact's normal points from its first geom to its second.
-            force = contact.frame.reshape(3, 3).T @ wrench[:3]
-            if second is None:
-                forces[first] -= force
-            else:
-                forces[second] += force
-        local = forces @ data.xmat[self._arm].reshape(3, 3)
-        along = -local[:, 2]
-        if loads.any():
-            along += pull * loads / loads.sum()
-        return np.column_stack([along, (local * self._around).sum(axis=1)])
+    places = dict(zip(model.body_geomadr[pads].tolist(), count()))
+    forces = np.zeros((len(loads), 3))
+    wrench = np.zeros(6)
+    for number in range(data.ncon):
+        contact = data.contact[number]
+        mujoco.mj_contactForce(model, data, number, wrench)
+        force = contact.frame.reshape(3, 3).T @ wrench[:3]
+        # The contact's normal points from its first geom to its second.
+        for geom, sign in zip(contact.geom.tolist(), (-1.0, 1.0), strict=True):
+            if geom in places:
+                forces[places[geom]] += sign * force
+    arm = model.body_parentid[pads[0]]
+    x, y, z = (forces @ data.xmat[arm].reshape(3, 3)).T
+    angles = np.radians(DEGREES)[columns]
+    around = TURN * (np.cos(angles) * y - np.sin(angles) * x)
+    along = -z
+    if loads.any():
+        along += pull * loads / loads.sum()
+    return np.column_stack([along, around])

@@ -21,7 +21,7 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from tests.bench import mujoco_layer
 from tests.bench.mujoco_layer import ABOVE_FLOOR_M
-from tests.bench.mujoco_shear import Tangents
+from tests.bench.mujoco_shear import tangents
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
 MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
@@ -40,6 +40,8 @@ ONSET_COUNTS = 60
 LEAST_COUNTS = 35.0
 MOST_COUNTS = 17e3
 """The electronics shows less as nothing, and no more."""
+NOISE_COUNTS = 6.0
+"""Standard deviation."""
 RADIUS_M = 0.04604
 ROWS = 16
 FACING_DEG = 76.0
@@ -110,7 +112,7 @@ class Touch:
         taxel_n_m: stiffness of the pads.
         speed, stiffness: of the arm, in units of Cody's; its damping ratio stays.
         elbow: speed of the elbow, in units of the shoulder's.
-        noise: standard deviation in counts, and its stream.
+        noise: the stream of the readings' noise, if they have any.
     """
 
     thing: Thing
@@ -124,7 +126,7 @@ class Touch:
     speed: float = 1.0
     stiffness: float = 1.0
     elbow: float = 0.0
-    noise: tuple[float, np.random.Generator] | None = None
+    noise: np.random.Generator | None = None
 
     @property
     def pad_n_m(self):
@@ -147,15 +149,11 @@ class Touch:
         return directions * math.radians(RATE_DEG_S * self.speed)
 
     @property
-    def lag_rad(self):
-        """(dof,) by which each joint trails its equilibrium point in free motion."""
-        seconds = np.divide(CODY_DAMPING, CODY_STIFFNESS) / math.sqrt(self.stiffness)
-        return seconds * self.rate_rad_s
-
-    @property
     def begin_rad(self):
-        """(dof,) the arm's angles at the beginning."""
-        return self.equilibrium_rad - self.lag_rad
+        """(dof,) the arm's angles at the beginning: each joint trails its equilibrium
+        point as in free motion."""
+        lag_s = np.divide(CODY_DAMPING, CODY_STIFFNESS) / math.sqrt(self.stiffness)
+        return self.equilibrium_rad - lag_s * self.rate_rad_s
 
     @property
     def labels(self):
@@ -296,45 +294,6 @@ def model_of(touch):
     return mujoco.MjModel.from_xml_string(MODEL.substitute(words)), where
 
 
-class Running:
-    """A touch that is being simulated.
-
-    Attributes:
-        data: MuJoCo's state.
-        pads: (2, n) row and column of each pad.
-    """
-
-    def __init__(self, touch):
-        self._touch = touch
-        self._model, where = model_of(touch)
-        self.data = mujoco.MjData(self._model)
-        self.data.qpos[: ARM.dof] = touch.begin_rad
-        self.data.qvel[: ARM.dof] = touch.rate_rad_s
-        mujoco.mj_forward(self._model, self.data)
-        self.pads = np.array(where).T
-        self._tangents = Tangents(self._model, self.pads[1])
-        friction = touch.thing.skin if touch.thing.layered else 0.0
-        self._rub = mujoco_layer.Rub(self._model, friction)
-
-    def loads(self):
-        """(pads,) newtons; the pads' joints follow the arm's."""
-        pushed = self.data.qpos[ARM.dof : ARM.dof + self.pads.shape[1]]
-        return np.maximum(-self._touch.pad_n_m * pushed, 0.0)
-
-    def pulls(self):
-        """(pads, 2) newtons along the rows and around the columns."""
-        return self._tangents.read(self.data, self.loads(), self._rub.pull)
-
-    def advance(self):
-        """Step to the next frame, with the arm's equilibrium point moving on."""
-        touch = self._touch
-        for _ in range(round(1.0 / (RATE_HZ * self._model.opt.timestep))):
-            turned = touch.rate_rad_s * self.data.time
-            self.data.ctrl[:] = touch.equilibrium_rad + turned
-            self._rub.hold(self.data, self.loads())
-            mujoco.mj_step(self._model, self.data)
-
-
 def simulate(touch):
     """One touch, as the board would have recorded it.
 
@@ -342,7 +301,22 @@ def simulate(touch):
         The recording; (n,) newtons that the pads bear; (n,) metres that the thing has
         moved at the height of the contact. The skin cannot see the last two.
     """
-    running = Running(touch)
+    model, where = model_of(touch)
+    row, column = np.array(where).T
+    pads = [model.body(f"pad{number}").id for number in range(len(where))]
+    rub = mujoco_layer.Rub(
+        model, pads, touch.thing.skin if touch.thing.layered else 0.0
+    )
+    data = mujoco.MjData(model)
+    data.qpos[: ARM.dof] = touch.begin_rad
+    data.qvel[: ARM.dof] = touch.rate_rad_s
+    mujoco.mj_forward(model, data)
+    pushed = data.qpos[ARM.dof : ARM.dof + len(pads)]
+    """The pads' joints, which follow the arm's, in a view."""
+
+    def felt():
+        return np.maximum(-touch.pad_n_m * pushed, 0.0)
+
     # A soft thing is felt later, the more so the slower the arm.
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
@@ -350,14 +324,16 @@ def simulate(touch):
     pulls = np.zeros((*loads.shape, 2))
     joints = np.zeros((len(t), ARM.dof))
     places = np.zeros((len(t), 3))
-    row, column = running.pads
-    body = running.data.body("thing")
+    body = data.body("thing")
     for i in range(len(t)):
-        loads[i, row, column] = running.loads()
-        pulls[i, row, column] = running.pulls()
-        joints[i] = running.data.qpos[: ARM.dof]
+        loads[i, row, column] = felt()
+        pulls[i, row, column] = tangents(model, data, pads, column, felt(), rub.pull)
+        joints[i] = data.qpos[: ARM.dof]
         places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
-        running.advance()
+        for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
+            data.ctrl[:] = touch.equilibrium_rad + touch.rate_rad_s * data.time
+            rub.hold(data, felt())
+            mujoco.mj_step(model, data)
     frames, shear = readings(touch, loads, pulls)
     skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
@@ -374,13 +350,13 @@ def readings(touch, loads, pulls):
     counts = loads * COUNTS_PER_NEWTON
     shear = pulls * COUNTS_PER_NEWTON
     if touch.noise is not None:
-        size, generator = touch.noise
-        counts += generator.normal(0.0, size, counts.shape)
-        shear += generator.spawn(1)[0].normal(0.0, size, shear.shape)
-    shear = np.where(
-        np.abs(shear) < LEAST_COUNTS,
-        0.0,
-        shear.clip(-MOST_COUNTS, MOST_COUNTS),
-    )
-    counts = np.where(counts < LEAST_COUNTS, 0.0, np.minimum(counts, MOST_COUNTS))
-    return counts.astype(np.uint16), np.rint(shear).astype(np.int16)
+        counts += touch.noise.normal(0.0, NOISE_COUNTS, counts.shape)
+        shear += touch.noise.spawn(1)[0].normal(0.0, NOISE_COUNTS, shear.shape)
+    counts = limited(counts.clip(0.0)).astype(np.uint16)
+    return counts, np.rint(limited(shear)).astype(np.int16)
+
+
+def limited(counts):
+    """Counts as the electronics shows them."""
+    within = counts.clip(-MOST_COUNTS, MOST_COUNTS)
+    return np.where(np.abs(counts) < LEAST_COUNTS, 0.0, within)

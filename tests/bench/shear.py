@@ -22,7 +22,7 @@ from train.simulate import run, scene
 from train.tradeoff import shear
 from train.tradeoff.choices import WINDOWS_S, followed
 
-SCENE = tables.ROOT / "train" / "scenes" / "cody18_shear.toml"
+SCENE = tables.SCENES / "cody18_shear.toml"
 SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the table of gains."""
 PICTURE = tables.ROOT / "docs" / "shear.png"
@@ -31,9 +31,8 @@ PICTURED = "mobility"
 
 def compared(seed, folder, jobs):
     """The answers with shear and without on the trials of one seed."""
-    loaded = scene.load(SCENE, seed=seed)
     data = folder / str(seed)
-    run.write(loaded, data, jobs=jobs)
+    run.write(scene.load(SCENE, seed=seed), data, jobs=jobs)
     dataset = followed(read([str(data)]))
     workers = Workers(jobs)
     sheared = shear.answers(dataset, WINDOWS_S, workers)

@@ -16,33 +16,26 @@ from tests.bench.transfer import judged_tasks, touches
 from train.fitting import fit
 from train.simulate import run, scene
 
-SCENE = tables.ROOT / "train" / "scenes" / "household_shear.toml"
+SCENE = tables.SCENES / "household_shear.toml"
 CHOICES = {
     "without shear": ["contact", "joints"],
     "with shear": ["contact", "joints", "shear"],
 }
 
 
-def models(out, jobs):
-    """The two models, fitted on the same simulated touches."""
+def measure(seeds, trials, jobs, out):
+    """Fit, simulate the other engine's touches, and write the table."""
     data = out / "simulated"
     run.write(scene.load(SCENE), data, jobs=jobs)
-    fitted = {}
+    models = {}
     for name, features in CHOICES.items():
         path = out / f"{name.replace(' ', '-')}.onnx"
         save(path, fit(str(data), features=features, jobs=jobs))
-        fitted[name] = Model(path)
-    return fitted
-
-
-def measure(seeds, trials, jobs, out):
-    """Fit, simulate the other engine's touches, and write the table."""
-    out.mkdir(parents=True, exist_ok=True)
-    fitted = models(out, jobs)
+        models[name] = Model(path)
     rows = []
     for seed in range(1, seeds + 1):
         recordings = [recording for _, _, recording in touches(seed, trials)]
-        for name, model in fitted.items():
+        for name, model in models.items():
             summary = Summary(judged_tasks(model))
             for number, recording in enumerate(recordings):
                 events = decide(model, recording, f"touch {number}")

@@ -11,12 +11,11 @@ touches are in doubt, or the answers without a doubt are right about as often as
 on touches that are not shifted.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from edge.classifier import Classifier
 from edge.events import Decided
@@ -28,7 +27,7 @@ from train.progress import bar
 from train.simulate import scene as scenes
 from train.simulate.run import simulate
 
-SCENE = tables.ROOT / "train" / "scenes" / "cody18.toml"
+SCENE = tables.SCENES / "cody18.toml"
 FRESH_SEED = 77
 ENOUGH = 0.6
 """Share of a shift's touches that are in doubt, at the least."""
@@ -119,31 +118,31 @@ SHIFTS = {
 }
 
 
-@dataclass(frozen=True)
-class Answers:
-    """The answers to a task.
+def decisions(model, recordings, error=None):
+    """A row for each decision on recordings, with the number of the touch and its true
+    label; a touch that is not felt has none."""
+    classifier = Classifier(model, error=error)
+    rows = []
+    for touch, recording in enumerate(recordings):
+        for event in classifier.classify(recording):
+            if isinstance(event, Decided):
+                rows.append(
+                    (*vars(event).values(), touch, recording.labels[event.task])
+                )
+    return pd.DataFrame(rows, columns=[*Decided.__annotations__, "touch", "truth"])
 
-    Attributes:
-        right: (n,) whether the label is the recording's.
-        doubtful: (n,) whether there is a flag, or the label is less likely right than
-            wrong.
-        sure: (n,) whether there is no flag and a high confidence.
-    """
 
-    right: np.ndarray
-    doubtful: np.ndarray
-    sure: np.ndarray
-
-    @property
-    def trusted(self):
-        """The share of the answers without a doubt that are right; 0 of none."""
-        plain = self.right[~self.doubtful]
-        return plain.mean() if len(plain) else 0.0
-
-    def is_told(self, usual):
-        """Whether most touches are in doubt, or the answers without a doubt are right
-        about as often as the `usual` ones."""
-        return share(self.doubtful) >= ENOUGH or self.trusted >= usual - WORSE
+def answers(model, recordings, shift):
+    """{task: a row for each answer to shifted touches}: whether it is right; whether it
+    is in doubt, by a flag or as it is less likely right than wrong; whether it is
+    sure, without a flag and with a high confidence."""
+    rows = decisions(model, map(shift, recordings))
+    likely = rows["confidence"].astype(float)
+    flagged = rows["flags"].map(len) > 0
+    rows["right"] = rows["label"] == rows["truth"]
+    rows["doubtful"] = flagged | ~(likely >= UNSURE)
+    rows["sure"] = ~flagged & (likely >= SURE)
+    return {task: rows[rows["task"] == task] for task in model.info.tasks}
 
 
 def share(facts):
@@ -151,40 +150,29 @@ def share(facts):
     return facts.sum() / max(len(facts), 1)
 
 
-def answers(model, recordings, shift):
-    """{task: the answers to shifted touches}; a touch that is not felt has none."""
-    events = {task: [] for task in model.info.tasks}
-    classifier = Classifier(model)
-    for recording in recordings:
-        for event in classifier.classify(shift(recording)):
-            if isinstance(event, Decided):
-                right = event.label == recording.labels[event.task]
-                events[event.task].append((right, event))
-    judged = {}
-    for task, pairs in events.items():
-        likely = np.array([event.confidence or 0.0 for _, event in pairs])
-        flagged = np.array([bool(event.flags) for _, event in pairs], dtype=bool)
-        judged[task] = Answers(
-            right=np.array([right for right, _ in pairs], dtype=bool),
-            doubtful=flagged | (likely < UNSURE),
-            sure=~flagged & (likely >= SURE),
-        )
-    return judged
+def trusted(judged):
+    """The share of the answers without a doubt that are right."""
+    return share(judged["right"][~judged["doubtful"]])
+
+
+def is_told(judged, usual):
+    """Whether most touches are in doubt, or the answers without a doubt are right about
+    as often as the `usual` ones."""
+    return share(judged["doubtful"]) >= ENOUGH or trusted(judged) >= usual - WORSE
 
 
 def row(name, task, judged, usual):
     """The row of a shift and a task, beside the accuracy on usual touches."""
+    plain = "-" if judged["doubtful"].all() else f"{trusted(judged):.0%}"
     return {
         "shift": name,
         "task": task,
-        "answers": len(judged.right),
-        "right": f"{share(judged.right):.0%}",
-        "in doubt": f"{share(judged.doubtful):.0%}",
-        "right without doubt": "-"
-        if judged.doubtful.all()
-        else f"{judged.trusted:.0%}",
-        "wrong and sure": (judged.sure & ~judged.right).sum(),
-        "held": "yes" if judged.is_told(usual) else "no",
+        "answers": len(judged),
+        "right": f"{share(judged['right']):.0%}",
+        "in doubt": f"{share(judged['doubtful']):.0%}",
+        "right without doubt": plain,
+        "wrong and sure": (judged["sure"] & ~judged["right"]).sum(),
+        "held": "yes" if is_told(judged, usual) else "no",
     }
 
 
@@ -197,7 +185,7 @@ def measure(model, trials):
     usual = {}
     for name, shift in bar(SHIFTS.items(), desc="shifts", total=len(SHIFTS)):
         for task, judged in answers(loaded, fresh, shift).items():
-            accuracy = usual.setdefault(task, judged.trusted)
+            accuracy = usual.setdefault(task, trusted(judged))
             rows.append(row(name, task, judged, accuracy))
     tables.write("shifts", [rows], "make shifts")
 

@@ -14,7 +14,7 @@ import gc
 import os
 import socket
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,29 +41,17 @@ GROWTH_KB = 2048
 hours."""
 
 
-@dataclass(frozen=True)
-class Soaked:
-    """The run: a row of the table every so many minutes, and what it has lost."""
-
-    rows: list[dict[str, float]]
-    lost: int
-    """Lines that were not written, and ticks left out."""
-    placed: int
-    """Contacts on the map."""
-
-    @property
-    def flat(self):
-        """Whether memory and descriptors stay, and nothing is lost."""
-        early = self.rows[max(len(self.rows) // 10 - 1, 0)]
-        grown_kb = max(row["kB"] for row in self.rows) - early["kB"]
-        descriptors = self.rows[-1]["descriptors"]
-        if grown_kb > GROWTH_KB or descriptors != early["descriptors"]:
-            return False
-        return self.lost == 0 and self.placed > 0
+def is_flat(rows):
+    """Whether memory and descriptors stay."""
+    early = rows[max(len(rows) // 10 - 1, 0)]
+    grown_kb = max(row["kB"] for row in rows) - early["kB"]
+    return grown_kb <= GROWTH_KB and rows[-1]["descriptors"] == early["descriptors"]
 
 
 def soak(minutes, every, rate_hz):
-    """Run the loop for so many virtual minutes, with a row for each `every` of them."""
+    """Run the loop for so many virtual minutes; a row of the table for each
+    `every` of them, the lines that were not written and ticks left out, and the
+    contacts on the map."""
     model = Model(demo.MODEL)
     process = psutil.Process()
     rng = np.random.default_rng(0)
@@ -112,17 +100,17 @@ def soak(minutes, every, rate_hz):
         lines.close()
         placed = sum(1 for _ in TouchMap(place))
     lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
-    return Soaked(rows, lost, placed)
+    return rows, lost, placed
 
 
 def measure(minutes, every, rate):
     """Run and print; 1 where something was not flat."""
     if every > minutes:
         raise InputError(f"--every {every:g} is longer than --minutes {minutes:g}")
-    soaked = soak(minutes, every, rate)
-    tables.write("soak", [soaked.rows])
-    print(f"{soaked.placed} contacts on the map")
-    return 0 if soaked.flat else 1
+    rows, lost, placed = soak(minutes, every, rate)
+    tables.write("soak", [rows])
+    print(f"{placed} contacts on the map")
+    return 0 if is_flat(rows) and lost == 0 and placed > 0 else 1
 
 
 if __name__ == "__main__":

@@ -22,9 +22,7 @@ about the paper's three features at each frame until then, every 0.2 s. aeon tea
 TEASER which answers to trust by answers to whole series.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from aeon.classification.early_classification import (
@@ -41,7 +39,7 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from edge.model.calibration import StoppingRule
+from edge.model.info import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
 from tests.bench import tables
 from tests.bench.program import start
@@ -68,6 +66,8 @@ SETS = (
 )
 """The features of the extra trees and of CALIMERA."""
 NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
+FIXED = "fixed window, % wrong"
+SURE = "when sure"
 TREES_FIXED = "extra trees, fixed window"
 PEERS = ("extra trees", "their SPRT", "CALIMERA")
 MARGINS = np.linspace(0.0, 8.0, 33)
@@ -108,7 +108,7 @@ def extra_trees(X, labels, folds):
     return fixed, sure, once_certain(lead, right, MARGINS)
 
 
-def halts(known, new, waiting):
+def halts(calibrating, new, waiting):
     """(m,) the point at which CALIMERA decides: the first at which no later one is
     cheaper.
 
@@ -117,19 +117,19 @@ def halts(known, new, waiting):
     first.
 
     Args:
-        known: (points, n, classes) probabilities of trials that no part of their model
-            has seen.
+        calibrating: (points, n, classes) probabilities of trials that no part of their
+            model has seen.
         new: (points, m, classes) probabilities of the trials to decide.
         waiting: (points,) price of waiting, in wrong decisions.
     """
-    known = np.sort(known)[..., -2:]
-    new = np.sort(new)[..., -2:]
-    prices = 1.0 - known[..., -1] + waiting[:, None]
+    calibrating, new = (np.sort(shares)[..., -2:] for shares in (calibrating, new))
+    prices = 1.0 - calibrating[..., -1] + waiting[:, None]
     best = prices[-1]
     at = np.full(new.shape[1], len(waiting) - 1)
     for point in range(len(waiting) - 2, -1, -1):
-        model = KernelRidge(kernel="rbf").fit(known[point], prices[point] - best)
-        best = np.where(model.predict(known[point]) <= 0.0, prices[point], best)
+        shares = calibrating[point]
+        model = KernelRidge(kernel="rbf").fit(shares, prices[point] - best)
+        best = np.where(model.predict(shares) <= 0.0, prices[point], best)
         at[model.predict(new[point]) <= 0.0] = point
     return at
 
@@ -143,16 +143,17 @@ def calimera(X, labels, folds):
     model = CalibratedClassifierCV(ridge, cv=2)
     for fold in range(FOLDS):
         test = folds == fold
-        known = []
+        calibrating = []
         new = []
         for point, vectors in enumerate(X):
             train = vectors[~test], labels[~test]
-            known.append(cross_val_predict(model, *train, cv=3, method="predict_proba"))
+            options = {"cv": 3, "method": "predict_proba"}
+            calibrating.append(cross_val_predict(model, *train, **options))
             new.append(model.fit(*train).predict_proba(vectors[test]))
             right[point, test] = model.classes_[new[-1].argmax(axis=1)] == labels[test]
         for i, price in enumerate(WAITING):
             waiting = price * SECONDS / SECONDS[-1]
-            stops[i, test] = halts(np.array(known), np.array(new), waiting)
+            stops[i, test] = halts(calibrating, new, waiting)
     return [decided(at, right) for at in stops]
 
 
@@ -184,9 +185,11 @@ def peers(by_set, series, labels, folds):
         curves["extra trees"].append(sure)
         curves["their SPRT"].append(ratio)
         curves["CALIMERA"].append(calimera(X, labels, folds))
-    rules = AEON if series is not None else {}
-    points = {name: of_aeon(rules[name], series, labels, folds) for name in rules}
-    return curves, points
+    if series is None:
+        return curves, {}
+    return curves, {
+        name: of_aeon(rule, series, labels, folds) for name, rule in AEON.items()
+    }
 
 
 def at(curves, seconds):
@@ -204,39 +207,30 @@ def cell(percentage):
     return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
-@dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """What a task's early decisions about one data set cost.
 
     Attributes:
         ours: our comparison (see `train.tradeoff.early`).
-        rivals: {peer: its curves, one for each set of features}.
+        curves: {fixed window, when sure, or peer: its curves, one for each set of
+            features}.
         aeon: {rule of aeon: (mean seconds, share wrong)}.
     """
 
     ours: Any
-    rivals: Any
+    curves: Any
     aeon: Any
 
-    @property
-    def trials(self):
-        """Number of trials."""
-        return self.ours.right.shape[1]
 
-    @property
-    def fixed(self):
-        """Our curve of fixed windows."""
-        return list(zip(SECONDS, 1.0 - self.ours.right.mean(axis=1), strict=True))
-
-    @cached_property
-    def sure(self):
-        """Our curve of stopping when sure, at each threshold."""
-        curve = []
-        for threshold in (NEVER, *THRESHOLDS.tolist()):
-            rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
-            stops, wrong = self.ours.course.under(rule)
-            curve.append((SECONDS[stops].mean(), wrong.mean()))
-        return curve
+def our_curves(ours):
+    """Our curves of fixed windows, and of stopping when sure at each threshold."""
+    fixed = list(zip(SECONDS, 1.0 - ours.right.mean(axis=1), strict=True))
+    sure = []
+    for threshold in (NEVER, *THRESHOLDS.tolist()):
+        rule = StoppingRule(1.0, 0.0, threshold, len(SECONDS) - 1)
+        stops, wrong = ours.course.under(rule)
+        sure.append((SECONDS[stops].mean(), wrong.mean()))
+    return {FIXED: [fixed], SURE: [sure]}
 
 
 def judge(data, quick, jobs, is_first):
@@ -260,7 +254,7 @@ def judge(data, quick, jobs, is_first):
     rivals = Workers(jobs).map("peers", peers, cases)
     judged = {}
     for (task, ours), (curves, points) in zip(compared.items(), rivals, strict=True):
-        judged[task] = Judged(ours, curves, points)
+        judged[task] = Judged(ours, our_curves(ours) | curves, points)
     return judged
 
 
@@ -278,7 +272,7 @@ def measure(data, quick, jobs):
         for name, (seconds, wrong) in first.aeon.items():
             row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
             row["wrong, %"] = cell(100 * wrong)
-            row["when sure, at that time"] = cell(at([first.sure], seconds))
+            row["when sure, at that time"] = cell(at(first.curves[SURE], seconds))
             at_own_time.append(row)
         for rule in first.ours.certified:
             row = {"task": task, "at most wrong": f"{rule.asked:g}"}
@@ -293,37 +287,32 @@ def measure(data, quick, jobs):
 def compare(judged, seconds):
     """Percentages wrong at a mean time, as means over the data sets: fixed window, when
     sure, and the peers; and differences with their standard errors."""
-    fixed = np.array([at([of_set.fixed], seconds) for of_set in judged])
-    sure = np.array([at([of_set.sure], seconds) for of_set in judged])
-    rivals = np.array(
-        [[at(of_set.rivals[name], seconds) for of_set in judged] for name in PEERS]
-    )
-    means = rivals.mean(axis=1)
-    best = rivals[np.nan_to_num(means, nan=np.inf).argmin()]
-    trials = judged[0].trials
-    trees = [at(of_set.rivals[TREES_FIXED], seconds) for of_set in judged]
-    return {
-        "fixed window, % wrong": cell(fixed.mean()),
-        TREES_FIXED: cell(np.mean(trees)),
-        "when sure": cell(sure.mean()),
-        "gain": difference(fixed, sure, trials),
-        **dict(zip(PEERS, map(cell, means), strict=True)),
-        "best of these less when sure": difference(best, sure, trials),
+    wrong = {
+        name: np.array([at(of_set.curves[name], seconds) for of_set in judged])
+        for name in (FIXED, TREES_FIXED, SURE, *PEERS)
     }
+    means = {name: of_sets.mean() for name, of_sets in wrong.items()}
+    best = min(PEERS, key=lambda name: np.nan_to_num(means[name], nan=np.inf))
+    trials = judged[0].ours.right.shape[1]
+    row = {name: cell(means[name]) for name in (FIXED, TREES_FIXED, SURE)}
+    row["gain"] = difference(wrong[FIXED], wrong[SURE], trials)
+    row |= {name: cell(means[name]) for name in PEERS}
+    row["best of these less when sure"] = difference(wrong[best], wrong[SURE], trials)
+    return row
 
 
-def difference(percentages, others, trials):
+def difference(minuend, subtrahend, trials):
     """The mean difference of percentages wrong and its standard error, over the data
     sets, or for one of them over its trials."""
-    mean = (percentages - others).mean()
-    if np.isnan(mean):
+    differences = minuend - subtrahend
+    if np.isnan(differences.mean()):
         return "-"
-    if len(percentages) > 1:
-        error = sem(percentages - others)
+    if len(differences) > 1:
+        error = sem(differences)
     else:
-        both = np.stack([percentages, others])
-        error = np.sqrt((both * (100 - both)).sum() / trials)
-    return f"{mean:+.1f} ± {error:.1f}"
+        percentages = np.stack([minuend, subtrahend])
+        error = np.sqrt((percentages * (100 - percentages)).sum() / trials)
+    return f"{differences.mean():+.1f} ± {error:.1f}"
 
 
 if __name__ == "__main__":

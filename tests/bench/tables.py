@@ -17,6 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "measured"
+SCENES = ROOT / "train" / "scenes"
 
 
 def markdown(rows):
@@ -39,14 +40,9 @@ def processor():
 def commit():
     """The commit that is checked out, marked where a tracked file differs from it."""
     command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
-    done = subprocess.run(
-        command,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.stdout.strip() or "unknown"
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    described = subprocess.run(command, cwd=ROOT, text=True, **pipes)
+    return described.stdout.strip() or "unknown"
 
 
 def write(name, tables, command=""):

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
-from edge.model.calibration import UNKNOWN
+from edge.model.info import UNKNOWN
 from edge.model.model import Model
 from edge.saving import save
 from edge.tools.replay import Summary, decide
@@ -122,7 +122,7 @@ def draw_touch(thing, fixed, rng, habit):
         yaw_rad=rng.normal(0.0, 0.03),
         slope_rad=math.radians(rng.normal(0.0, 0.7)),
         taxel_n_m=log_uniform(rng, 5e3, 1.5e4),
-        noise=(6.0, rng),
+        noise=rng,
     )
     changed = {}
     for name, by in HABITS[habit].items():
@@ -141,8 +141,8 @@ def touch_object(index, seed, habit):
     while True:
         thing = draw(streams.stream(seed, f"object.{attempt}", "transfer", index))
         first, second = (
-            streams.stream(seed, f"trial.{attempt}", "transfer", number)
-            for number in (2 * index, 2 * index + 1)
+            streams.stream(seed, f"trial.{attempt}", "transfer", 2 * index + number)
+            for number in range(2)
         )
         free, _, moved_m = simulate(draw_touch(thing, False, second, habit))
         onset = int(np.argmax(free.frames.max(axis=(1, 2)) > ONSET_COUNTS))
@@ -158,8 +158,8 @@ def touches(seed, trials):
     pairs = Parallel(n_jobs=cpu_count(), return_as="generator")(
         delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
     )
-    shown = bar(pairs, total=len(habits), unit=" objects", desc="MuJoCo")
-    for number, (habit, pair) in enumerate(zip(habits, shown, strict=True)):
+    pairs = bar(pairs, total=len(habits), unit=" objects", desc="MuJoCo")
+    for number, (habit, pair) in enumerate(zip(habits, pairs, strict=True)):
         for recording in pair:
             yield number, habit, recording
 

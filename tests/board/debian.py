@@ -92,12 +92,14 @@ def run(command, hint=""):
         Unavailable: it fails; the sentence has the hint and the command's last words.
     """
     try:
-        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        process = subprocess.run(command, check=False, capture_output=True, text=True)
     except FileNotFoundError:
         raise Unavailable(
             f"{command[0]} is not on this machine; use Debian or Ubuntu"
         ) from None
-    if done.returncode:
-        last = "; ".join((done.stderr.strip() or done.stdout.strip()).splitlines()[-2:])
+    if process.returncode:
+        last = "; ".join(
+            (process.stderr.strip() or process.stdout.strip()).splitlines()[-2:]
+        )
         raise Unavailable(f"{hint or command[0]}: {last}")
-    return done.stdout.strip()
+    return process.stdout.strip()

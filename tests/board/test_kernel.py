@@ -68,17 +68,17 @@ def run_in_guest(command):
     qemu = ["timeout", str(LONGEST_S), *program(system, "qemu-system-x86_64")]
     qemu += QEMU.format(system=system, kernel=kernel, initrd=initrd).split()
     accelerators = next(system.rglob("accel-tcg-x86_64.so")).parent
-    done = subprocess.run(
+    process = subprocess.run(
         [*qemu, "console=ttyS0 panic=-1 quiet"],
         env={**os.environ, "QEMU_MODULE_DIR": str(accelerators)},
         check=False,
         stdin=subprocess.DEVNULL,
         capture_output=True,
     )
-    printed, ended, rest = done.stdout.decode(errors="replace").rpartition(ENDED)
+    printed, ended, rest = process.stdout.decode(errors="replace").rpartition(ENDED)
     if not ended:
         raise RuntimeError(
-            f"the guest did not reach its end:\n{rest}\n{done.stderr.decode()}"
+            f"the guest did not reach its end:\n{rest}\n{process.stderr.decode()}"
         )
     return int(rest.split()[0]), printed
 

@@ -69,50 +69,50 @@ def test_it_holds_edge_alone_and_all_of_it(contents):
 def test_it_names_three_dependencies_one_version_and_a_licence(contents):
     (metadata,) = (v for k, v in contents.items() if k.endswith(".dist-info/METADATA"))
     fields = Parser().parsestr(metadata.decode())
-    needed = [
+    dependencies = [
         n.split(">")[0] for n in fields.get_all("Requires-Dist") if "extra ==" not in n
     ]
-    assert sorted(needed) == ["numpy", "onnxruntime", "smbus2"]
+    assert sorted(dependencies) == ["numpy", "onnxruntime", "smbus2"]
     assert fields["Version"] == edge.__version__
     assert fields["License-Expression"] == "BSD-3-Clause"
     assert any(name.endswith("/LICENSE") for name in contents)
 
 
 def test_the_demo_decides_rightly_and_meets_its_golden_outputs(command):
-    done = command("demo")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == "edge-classify: 12 of 12 decisions are right\n"
+    result = command("demo")
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == "edge-classify: 12 of 12 decisions are right\n"
     where = command("-c", "import edge.demo; print(edge.demo.MODEL)", program="python")
     golden = CHECKOUT / "tests" / "golden" / "demo.npz"
-    done = command("verify", "--model", where.stdout.strip(), "--golden", golden)
-    assert done.returncode == 0, done.stderr
+    result = command("verify", "--model", where.stdout.strip(), "--golden", golden)
+    assert result.returncode == 0, result.stderr
 
 
 def test_a_command_without_hardware_says_so_in_one_sentence(command):
-    done = command("run", "--model", "model.onnx", "--skin", "skin.toml")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith("edge-classify: ")
+    result = command("run", "--model", "model.onnx", "--skin", "skin.toml")
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("edge-classify: ")
 
 
 def test_numpy_runs_the_models_where_onnxruntime_is_missing(bare_command, exported):
     assert bare_command("-c", "import onnxruntime", program="python").returncode != 0
-    done = bare_command("demo")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("numpy runs the model, with the same bits") == 1
+    result = bare_command("demo")
+    assert result.returncode == 0, result.stderr
+    assert result.stderr.count("numpy runs the model, with the same bits") == 1
     files = ("--model", exported / "model.onnx", "--golden", exported / "golden.npz")
-    done = bare_command("verify", *files)
-    assert done.returncode == 0, done.stderr
-    passed = [json.loads(line)["passed"] for line in done.stdout.splitlines()]
+    result = bare_command("verify", *files)
+    assert result.returncode == 0, result.stderr
+    passed = [json.loads(line)["passed"] for line in result.stdout.splitlines()]
     assert passed
     assert all(passed)
 
 
 def test_both_engines_print_the_same_decisions(bare_command, command):
     def decisions(run):
-        done = run("demo", "--json")
-        lines = map(json.loads, done.stdout.splitlines())
+        result = run("demo", "--json")
+        lines = map(json.loads, result.stdout.splitlines())
         return [{**line, "latency_ms": 0} for line in lines]
 
     expected = decisions(command)

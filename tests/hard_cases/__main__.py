@@ -23,12 +23,12 @@ def number(value):
 def place(worst):
     """The parameters of the largest error, as a person writes them."""
     if worst.error == 0.0:
-        return f"none in {worst.tried} tried"
+        return f"none in {worst.count} tried"
     parameters = [
         f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
         for name, value in worst.at.items()
     ]
-    return f"{number(worst.error)} at {', '.join(parameters)} of {worst.tried} tried"
+    return f"{number(worst.error)} at {', '.join(parameters)} of {worst.count} tried"
 
 
 @dataclass(frozen=True)

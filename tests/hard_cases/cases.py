@@ -22,12 +22,12 @@ class Worst:
     Attributes:
         error: the error.
         at: the parameters it was at; the first tried where all are equal.
-        tried: how many were tried.
+        count: how many were tried.
     """
 
     error: float
     at: Mapping[str, Any]
-    tried: int
+    count: int
 
 
 @dataclass(frozen=True)

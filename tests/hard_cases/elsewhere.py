@@ -45,7 +45,7 @@ def ask(golden, python, path=""):
     # -P: the current folder, which may be the checkout, offers no modules.
     command = [*python, "-P", "-c", GUEST, *map(str, sets(golden))]
     environment = {**os.environ, "PYTHONPATH": path}
-    done = subprocess.run(
+    process = subprocess.run(
         command,
         env=environment,
         stdout=subprocess.PIPE,
@@ -55,7 +55,7 @@ def ask(golden, python, path=""):
     machine = {}
     shares = {}
     name = ""
-    for line in map(json.loads, done.stdout.splitlines()):
+    for line in map(json.loads, process.stdout.splitlines()):
         if line["event"] == "set":
             name = line["name"]
         elif line["event"] == "check":

@@ -176,8 +176,12 @@ def usual_neighbours(X, queries, components=6):
     numbers = np.arange(len(X))
     pipe = usual_pipeline(X, components, 1, numbers)
     pca = pipe[0]
-    both = exact.unrounded(np.concatenate([X, queries]), pca.mean_, pca.components_.T)
-    truth = [exact.nearest(both[: len(X)], point, 1)[0][0] for point in both[len(X) :]]
+    vectors = exact.unrounded(
+        np.concatenate([X, queries]), pca.mean_, pca.components_.T
+    )
+    truth = [
+        exact.nearest(vectors[: len(X)], point, 1)[0][0] for point in vectors[len(X) :]
+    ]
     answers = answers_of_usual(pipe, X, queries)
     ours = Ours(X, choice=Choice("none", components, 1))
     answers["ours, on its grid"] = ours.alone(queries)["neighbours"][:, 0]

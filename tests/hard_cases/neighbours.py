@@ -157,8 +157,8 @@ class Outlier:
         p = ours.projection
         rows = ours.fitted.rows_[ours.fitted.spaces_["t"]]
         self.named = coarseness(rows, p.grid_.unit) < FEWEST_UNITS
-        both = np.concatenate([X, queries])
-        points = exact.unrounded(both, p.mean_, p.weights_)
+        vectors = np.concatenate([X, queries])
+        points = exact.unrounded(vectors, p.mean_, p.weights_)
         truth = [exact.nearest(points[:160], point, 1)[0][0] for point in points[160:]]
         nearest = ours.alone(queries)["neighbours"][:, 0]
         self.changed = float(np.mean(nearest != truth))

@@ -160,7 +160,7 @@ class Whole:
 def _far(label, labels, squares, scale):
     """The mean distance of a label's nearest twentieth, at least three, in log odds."""
     distances = sorted(
-        s for s, other in zip(squares, labels, strict=True) if other == label
+        s for s, row_label in zip(squares, labels, strict=True) if row_label == label
     )
     count = min(len(distances), max(-(-len(distances) // 20), 3))
     wholes = [round(exact.root(square)) for square in distances[:count]]
@@ -263,12 +263,12 @@ def confidence_error(kind, point, factor, seed):
             rule = info.stopping[task]
             with mpmath.workdps(50):
                 far = [mpmath.mpf(float(d)) for d in decision.label_distances]
-                others = min(d for i, d in enumerate(far) if i != label)
+                rival = min(d for i, d in enumerate(far) if i != label)
                 typical = mpmath.mpf(info.novelty.limits[point][0])
                 novelty = mpmath.mpf(decision.novelty) / typical
                 excess = mpmath.log(novelty) if novelty > 1 else mpmath.mpf(0)
                 terms = [
-                    mpmath.mpf(rule.slopes[point]) * (others - far[label]),
+                    mpmath.mpf(rule.slopes[point]) * (rival - far[label]),
                     mpmath.mpf(rule.intercepts[point]),
                     -mpmath.mpf(rule.doubts[point]) * excess,
                 ]

@@ -67,12 +67,12 @@ class Costs:
         Work that effects share is parted among those of them that the trial calls for.
         So the parts of all trials add up to the run.
         """
-        parts = {name: self.by_effect.get(name, 0.0) for name in (BASE, *effects)}
+        seconds = {name: self.by_effect.get(name, 0.0) for name in (BASE, *effects)}
         for module, sharing in SHARED.items():
             callers = [effect for effect in effects if effect in sharing]
             for effect in callers:
-                parts[effect] += self.by_effect.get(module, 0.0) / len(callers)
-        return parts
+                seconds[effect] += self.by_effect.get(module, 0.0) / len(callers)
+        return seconds
 
 
 def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
@@ -158,12 +158,12 @@ def _of_kind(
 ) -> list[str]:
     """The lines of a kind of trials."""
     first = {spec.key: spec for spec in specs}
-    parts = {name: 1e6 * seconds for name, seconds in spent.of(effects).items()}
+    micros = {name: 1e6 * seconds for name, seconds in spent.of(effects).items()}
     lines = [
         f"{', '.join(sorted(first))}: {len(specs)} trials",
         _step_line(specs[0].step_s, convergence, scene),
         f"  {'effect':<16}{'us/trial':>9}  called for by",
-        f"  {BASE:<16}{parts[BASE]:>9.0f}",
+        f"  {BASE:<16}{micros[BASE]:>9.0f}",
     ]
     for effect in effects:
         reasons = {
@@ -171,8 +171,8 @@ def _of_kind(
             for spec in first.values()
         }
         why = ", ".join(sorted(reasons))
-        lines.append(f"  {effect:<16}{parts[effect]:>9.0f}  {why}")
-    lines.append(f"  {'together':<16}{sum(parts.values()):>9.0f}")
+        lines.append(f"  {effect:<16}{micros[effect]:>9.0f}  {why}")
+    lines.append(f"  {'together':<16}{sum(micros.values()):>9.0f}")
     return lines
 
 

@@ -114,7 +114,7 @@ class _Kind:
     forces: list[Array] = field(default_factory=list)
 
     @property
-    def tried(self) -> bool:
+    def has_run(self) -> bool:
         """Whether the step that the trials have is among those tried."""
         return self.specs[0].step_s in self.steps_s
 
@@ -175,8 +175,8 @@ def measure(
 def _forces_as_given(scene: Scene, kinds: list[_Kind]) -> list[Array]:
     """The forces at the steps that the trials have, of which those not tried yet are
     run."""
-    as_given = [kind if kind.tried else _Kind(kind.specs) for kind in kinds]
-    untried = [kind for kind in as_given if not kind.tried]
+    as_given = [kind if kind.has_run else _Kind(kind.specs) for kind in kinds]
+    untried = [kind for kind in as_given if not kind.has_run]
     _run(scene, [(kind, kind.specs[0].step_s) for kind in untried])
     return [kind.force_as_given for kind in as_given]
 

@@ -241,8 +241,8 @@ def run_physics(
         if len(starts):
             start_frames(starts)
         active.run(*STEP)
-        active.clock.left -= 1
-        ends = active.only(active.clock.left == 0)
+        active.clock.steps_left -= 1
+        ends = active.only(active.clock.steps_left == 0)
         if len(ends):
             ends.clock.frame += 1
             # A frame ends at its own time: sums of steps would drift from it.
@@ -273,7 +273,7 @@ def start_frames(starts: Trials) -> None:
         changed_starts.clock.h = np.asarray(1.0 / rate_hz, dtype=float)
         changed_starts.run(*TUNE)
     starts.run(*FRAME)
-    clock.left = clock.steps
+    clock.steps_left = clock.steps
 
 
 def check_energy(batch: Batch, joints: Array, times: Array) -> None:

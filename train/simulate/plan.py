@@ -121,7 +121,7 @@ def plan_of(effects: tuple[tuple[str, ...], ...]) -> Plan:
     calls: dict[str, Mask] = {}
     for name in (*SHARED, *EFFECTS):
         callers = {name, *SHARED.get(name, ())}
-        mask = np.array([not callers.isdisjoint(called) for called in effects])
+        mask = np.array([not callers.isdisjoint(of_trial) for of_trial in effects])
         if mask.any():
             calls[name] = mask
     everyone = np.ones(len(effects), dtype=bool)
@@ -167,7 +167,7 @@ def _reason(scene: Scene, item: SceneObject, condition: str, name: str) -> str:
         return condition
     if info.axes:
         return f"skin.axes = {info.axes}" if info.axes == scene.skin.axes else ""
-    if info.keys and item.given.issuperset(info.keys):
+    if info.keys and item.file_keys.issuperset(info.keys):
         return " and ".join(info.keys)
     if name in FAMILIES[item.family].effects:
         return f"family {item.family}"
@@ -250,7 +250,11 @@ def check_heeded(scene: Scene, where: str) -> None:
         for condition in item.conditions:
             heeded |= required_effects(scene, item, condition).keys()
         for name, info in EFFECTS.items():
-            if info.keys and item.given.issuperset(info.keys) and name not in heeded:
+            if (
+                info.keys
+                and item.file_keys.issuperset(info.keys)
+                and name not in heeded
+            ):
                 needs = " and ".join(info.needs) or "another family"
                 raise InputError(
                     f"{where}: object {item.name!r} gives {' and '.join(info.keys)}, "
@@ -279,13 +283,13 @@ def summary(scene: Scene) -> list[str]:
         trials += scene.count
         for effect in required_effects(scene, item, condition):
             counts[effect] += scene.count
-    called = [f"{name} ({n})" for name, n in counts.items() if n]
+    entries = [f"{name} ({n})" for name, n in counts.items() if n]
     unused = [name for name, n in counts.items() if not n]
     pairs = sum(counts.values())
     every = trials * len(EFFECTS)
     return [
         f"effects, with the trials of {trials} that call for them: "
-        f"{', '.join(called) or 'none'}",
+        f"{', '.join(entries) or 'none'}",
         f"not called for, and not loaded: {', '.join(unused) or 'none'}",
         f"so {pairs} effects of trials are computed, and {every - pairs} of {every} "
         f"({1.0 - pairs / every:.0%}) are not; --explain gives their times",

@@ -141,7 +141,7 @@ def write(
     batch: int | None = None,
     jobs: int = 1,
     address: str | None = None,
-    progress: Callable[[int], Any] = lambda done: None,
+    progress: Callable[[int], Any] = lambda count: None,
 ) -> Written:
     """Write the recordings of a scene into a folder.
 

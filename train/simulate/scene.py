@@ -147,12 +147,12 @@ def _check_places(scene: Scene, where: str) -> None:
 
 def _check_spread(scene: Scene, where: str) -> None:
     """Refuse a spread around 0 that no object differs by."""
-    for key, needed in schema.SPREAD_OF_MOVABLE.items():
-        differs = any(key in item.given for item in scene.objects)
+    for key, partner in schema.SPREAD_OF_MOVABLE.items():
+        differs = any(key in item.file_keys for item in scene.objects)
         if scene.spread[key] > 0.0 and not differs:
             raise InputError(
                 f"{where}: spread.{key} has nothing to differ in: give a movable "
-                f"object {needed}, or leave spread.{key} out"
+                f"object {partner}, or leave spread.{key} out"
             )
 
 
@@ -345,8 +345,8 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     # A spread around 0 also applies to an object that gives no value for it.
     differs = {
         key
-        for key, needed in schema.SPREAD_OF_MOVABLE.items()
-        if spread[key] > 0.0 and movable and table.has(needed)
+        for key, partner in schema.SPREAD_OF_MOVABLE.items()
+        if spread[key] > 0.0 and movable and table.has(partner)
     }
     values = _object_values(table, family, differs)
     _check_needs(table, movable)

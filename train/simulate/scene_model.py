@@ -39,9 +39,9 @@ class SceneTable(ConfigTable):
             return float(self.whole(key, value, allowed))
         return self.number(key, value, field.low, field.high, open_low=field.open_low)
 
-    def fields(self, known: Mapping[str, Field]) -> dict[str, float]:
+    def fields(self, fields: Mapping[str, Field]) -> dict[str, float]:
         """The numbers of a table that may have no other keys."""
-        out = {key: self.field(key, field) for key, field in known.items()}
+        out = {key: self.field(key, field) for key, field in fields.items()}
         self.done()
         return out
 
@@ -91,7 +91,7 @@ class SceneObject:
     family: str
     conditions: tuple[str, ...]
     values: dict[str, Value]
-    given: frozenset[str]
+    file_keys: frozenset[str]
     """Keys that the file gives; the other values are the family's defaults."""
 
     @cached_property

@@ -192,11 +192,11 @@ FAMILIES = {
 def keys_of(family: str) -> dict[str, float | None]:
     """{key of `OBJECT` that an object of a family may have: its default, or None}."""
     family_info = FAMILIES[family]
-    others = {key for other in FAMILIES.values() for key in other.keys} - {
+    foreign = {key for of_family in FAMILIES.values() for key in of_family.keys} - {
         *family_info.keys
     }
     defaults = {
-        key: field.default for key, field in OBJECT.items() if key not in others
+        key: field.default for key, field in OBJECT.items() if key not in foreign
     }
     return {**defaults, **family_info.defaults}
 

@@ -73,7 +73,7 @@ class Clock(Group):
     """Each trial's own clock, (n,) each.
 
     Attributes:
-        usual, steps, left: number of steps in a frame away from jolts, in the present
+        usual, steps, steps_left: number of steps in a frame away from jolts, in the present
             frame, and still to come in it.
         frame: number of frames ended.
         t, h: seconds now, and seconds of a step.
@@ -82,7 +82,7 @@ class Clock(Group):
 
     usual: Places
     steps: Places
-    left: Places
+    steps_left: Places
     frame: Places
     t: Array
     h: Array
@@ -287,7 +287,7 @@ class Batch:
             Clock,
             usual=usual,
             steps=usual,
-            left=0,
+            steps_left=0,
             frame=0,
             h=h,
             longest_s=np.inf,
@@ -415,10 +415,10 @@ class Trials:
         for call, callers in self.calls(*stages):
             call.function(callers)
 
-    def add_state(self, effect: str, group: type[Group], **given: Any) -> None:
-        """Add an effect's state; arrays (..., m) that are not given begin at 0."""
+    def add_state(self, effect: str, group: type[Group], **arrays: Any) -> None:
+        """Add an effect's state; arrays (..., m) that are left out begin at 0."""
         state = self.batch.begin(group)
-        for name, values in given.items():
+        for name, values in arrays.items():
             shape = *np.shape(values)[:-1], self.batch.n
             array = np.zeros(shape, dtype=np.asarray(values).dtype)
             array[..., self.places] = values

@@ -50,16 +50,16 @@ class Seen(PhysicsRun):
     """A run with its readings, and their counts (n, frames, rows, cols)."""
 
     counts: np.ndarray
-    seen: list[Readings]
+    all_readings: list[Readings]
 
 
 def run_batch(scene, specs, **options) -> Seen:
     physics = run_physics(scene, specs, **options)
-    seen = list(readings(physics))
+    all_readings = list(readings(physics))
     return Seen(
         **vars(physics),
-        counts=np.stack([read.frames() for read in seen]),
-        seen=seen,
+        counts=np.stack([read.frames() for read in all_readings]),
+        all_readings=all_readings,
     )
 
 
@@ -120,7 +120,7 @@ class Rig:
 
     def run(self, steps: int) -> Trace:
         t = self.trials
-        seen = []
+        rows = []
         still = SimpleNamespace(slide=np.zeros(t.n), speed=np.zeros(t.n))
         mover = t.states.get("sliding", still)
         for _ in range(steps):
@@ -134,8 +134,8 @@ class Rig:
                 speed=mover.speed,
                 depth=t.contact.depth[0],
             )
-            seen.append(np.array(now))
-        return Trace(*np.moveaxis(seen, 1, 0))
+            rows.append(np.array(now))
+        return Trace(*np.moveaxis(rows, 1, 0))
 
 
 def slider(h, mass, static, kinetic, **rig) -> Rig:

@@ -92,8 +92,8 @@ class Beds:
         _, held = self.springs(y)
         k = held.sum(axis=1)
         stiffness = k.sum(axis=0)
-        some = np.where(stiffness > 0.0, stiffness, 1.0)
-        mean = (k * self.lever).sum(axis=0) / some
+        divisors = np.where(stiffness > 0.0, stiffness, 1.0)
+        mean = (k * self.lever).sum(axis=0) / divisors
         spread = (k * (self.lever - mean) ** 2).sum(axis=0)
         r0, r1 = self.way(self.loads(y) - loads)
         # (I + C H) p = r, about the mean lever, where H is diagonal.
@@ -101,8 +101,8 @@ class Beds:
         a01 = c01 + mean * c11
         a00 = c00 + mean * (c01 + a01)
         r0 = r0 + mean * r1
-        both = (a00 * c11 - a01 * a01) * stiffness * spread
-        det = 1.0 + a00 * stiffness + c11 * spread + both
+        product = (a00 * c11 - a01 * a01) * stiffness * spread
+        det = 1.0 + a00 * stiffness + c11 * spread + product
         p0 = ((1.0 + c11 * spread) * r0 - a01 * spread * r1) / det
         p1 = ((1.0 + a00 * stiffness) * r1 - a01 * stiffness * r0) / det
         return np.abs(p0 - mean * p1) + 0.1 * np.abs(p1)

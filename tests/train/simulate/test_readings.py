@@ -10,10 +10,10 @@ SCENE = scene(one_object(), skin={"rows": 2, "cols": 4}, motion={"place_m": 0.18
 
 
 @pytest.mark.parametrize(
-    ("count", "shown"),
+    ("count", "whole"),
     [(0.5, 0), (1.5, 2), (2.4, 2), (-3.0, 0), (FULL - 0.4, 65535), (1e9, 65535)],
 )
-def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, shown):
+def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, whole):
     counts = np.zeros((3, 2, 4), dtype=np.float32)
     counts[1, 1, 2] = count
     reading = Readings(
@@ -26,6 +26,6 @@ def test_a_count_is_the_nearest_whole_one_that_the_converter_can_read(count, sho
         np.zeros((3, 1)),
     )
     want = np.zeros((3, 2, 4), dtype=np.uint16)
-    want[1, 1, 2] = shown
+    want[1, 1, 2] = whole
     assert reading.frames().dtype == np.uint16
     np.testing.assert_array_equal(reading.frames(), want)

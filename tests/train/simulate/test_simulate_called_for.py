@@ -111,8 +111,8 @@ STATE = set("stems tilt inertia friction sliding turning tipping viscous".split(
 @pytest.fixture(scope="module")
 def batches():
     """A batch of each kind of trials, and the effects that it calls for."""
-    called = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
-    trial_scene = scene(*called, objects=everything())
+    effects = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
+    trial_scene = scene(*effects, objects=everything())
     return [batch_of(trial_scene, i) for i in range(len(kinds(trial_scene)))]
 
 
@@ -130,9 +130,9 @@ def test_3_only_the_called_effects_leave_traces(batches):
 
 @pytest.mark.parametrize("name", ["times", "kept", "valid"])
 def test_3_only_the_called_sensors_effects_leave_theirs(batches, name):
-    assert all(getattr(batch.seen[0], name) is not None for batch, _ in batches)
+    assert all(getattr(batch.all_readings[0], name) is not None for batch, _ in batches)
     bare, _ = batch_of(scene())
-    assert getattr(bare.seen[0], name) is None
+    assert getattr(bare.all_readings[0], name) is None
 
 
 def test_3_without_effects_there_is_only_the_depth():
@@ -196,7 +196,7 @@ def test_5_these_trials_call_for_every_effect(plan):
 def bits(batch, i):
     """{name: bytes} of what a trial's recording is made of."""
     names = ("times", "kept", "valid")
-    arrays = {name: getattr(batch.seen[i], name) for name in names}
+    arrays = {name: getattr(batch.all_readings[i], name) for name in names}
     arrays |= {name: getattr(batch, name)[i] for name in ("counts", "joints", "force")}
     return {name: a.tobytes() for name, a in arrays.items() if a is not None}
 
@@ -213,25 +213,25 @@ def test_6_results_do_not_depend_on_the_batch(sensors, arrays):
     assert len(bits(together, 0)) == arrays
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
-        some = run_batch(trial_scene, specs)
+        chosen = run_batch(trial_scene, specs)
         for i, spec in enumerate(specs):
-            assert bits(some, i) == bits(together, every.index(spec)), spec.key
+            assert bits(chosen, i) == bits(together, every.index(spec)), spec.key
 
 
 def test_each_required_effect_has_its_reason():
     trial_scene = scene("noise", "stribeck", objects=everything())
     foam = next(o for o in trial_scene.objects if o.family == "foam")
-    called = required_effects(trial_scene, foam, "movable")
+    required = required_effects(trial_scene, foam, "movable")
     reasons = {"relaxation": "family foam", "sliding": "movable", "cover": "cover_n_m"}
     reasons |= {"tipping": "base_m and height_m", "noise": "effects.add"}
-    assert called.items() >= reasons.items()
+    assert required.items() >= reasons.items()
     assert not {"sliding", "stribeck"} & set(
         required_effects(trial_scene, foam, "fixed")
     )
     trial_scene = scene(leave_out=["relaxation"], objects=everything())
-    called = required_effects(trial_scene, foam, "fixed")
-    assert "foundation" in called
-    assert "relaxation" not in called
+    required = required_effects(trial_scene, foam, "fixed")
+    assert "foundation" in required
+    assert "relaxation" not in required
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
@@ -253,16 +253,16 @@ def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
     )
     assert pushed.values["slope_deg"].low == 0.0
     assert "slope_deg" not in still.values
-    for key, needed in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
+    for key, partner in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
         with pytest.raises(
-            InputError, match=f"spread.{key} .*: give a movable object {needed}"
+            InputError, match=f"spread.{key} .*: give a movable object {partner}"
         ):
             from_dict({"object": [wall], "spread": {key: 1e-3}})
 
 
 @pytest.mark.parametrize("band", [10.0, 30.0])
 def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
-    seen = []
+    frames = []
     for add in ((), ("crosstalk",)):  # which asks for all taxels, and leaks nothing
         trial_scene = scene("noise", "dead_band", *add)
         trial_scene.settings.update(
@@ -270,15 +270,15 @@ def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
             dead_band={"counts": band},
             crosstalk={"part": 0.0},
         )
-        seen.append(batch_of(trial_scene)[0].counts)
-    assert seen[0].tobytes() == seen[1].tobytes()
-    noisy = (seen[0][:, 0] > 0).any()
+        frames.append(batch_of(trial_scene)[0].counts)
+    assert frames[0].tobytes() == frames[1].tobytes()
+    noisy = (frames[0][:, 0] > 0).any()
     assert noisy if band < 21.0 else not noisy
 
 
 def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
-    called, unused, saved, *_ = summary(scene("noise"))
-    counts = dict(re.findall(r"(\w+) \((\d+)\)", called))
+    counted, unused, saved, *_ = summary(scene("noise"))
+    counts = dict(re.findall(r"(\w+) \((\d+)\)", counted))
     assert counts
     assert not set(counts) & set(unused.partition(": ")[2].split(", "))
     assert len(counts) + len(unused.partition(": ")[2].split(", ")) == len(EFFECTS)

@@ -140,9 +140,9 @@ def lean(t, mover):
     it back."""
     if "tipping" not in t.states:
         return 0.0
-    own = t.states["tipping"]
-    stored = own.force * (mover.slide - mover.slide**2 / (2.0 * own.travel))
-    return np.where(own.tips, stored, 0.0)
+    state = t.states["tipping"]
+    stored = state.force * (mover.slide - mover.slide**2 / (2.0 * state.travel))
+    return np.where(state.tips, stored, 0.0)
 
 
 def pair_scene(first, second):
@@ -153,17 +153,20 @@ def pair_scene(first, second):
     common = sorted(set.intersection(*families or [{"rigid"}]))
     if not common:
         return None
-    called = chain(*(EFFECTS[name].keys for name in pair))
-    keys = {key: RANGES[key] for key in ("width_m", *MOVES, *called)}
+    keys = chain(*(EFFECTS[name].keys for name in pair))
+    keys = {key: RANGES[key] for key in ("width_m", *MOVES, *keys)}
     family = common[0]
     condition = "movable" if "sliding" in pair else "fixed"
     thing = {"name": "thing", "family": family, "conditions": [condition], **keys}
-    own = set(FAMILIES[family].effects[1:])
+    family_effects = set(FAMILIES[family].effects[1:])
     trial_scene = scene(
         [{**thing, **OWN_RANGES.get(family, {})}],
         trials={"count": 6, "lead_s": 0.1, "after_s": 0.7},
         spread={"place_m": 0.02, "yaw_deg": 3.0},
-        effects={"add": sorted(pair - {"shear"}), "leave_out": sorted(own - pair)},
+        effects={
+            "add": sorted(pair - {"shear"}),
+            "leave_out": sorted(family_effects - pair),
+        },
         skin={"axes": 3 if "shear" in pair else 1},
     )
     assert pair <= set(next(iter(kinds(trial_scene)))), pair

@@ -328,11 +328,11 @@ class TestFriction:
             + t.contact.pull * t.contact.along_face
         )
         forearm = t.scene.kinematics.pose(t.arm.q).rotation[2]
-        own = t.contact.normal - forearm * (t.contact.normal * forearm).sum(axis=0)
-        own /= np.sqrt((own * own).sum(axis=0))
+        across = t.contact.normal - forearm * (t.contact.normal * forearm).sum(axis=0)
+        across /= np.sqrt((across * across).sum(axis=0))
         np.testing.assert_allclose(
             batch.force[:, -1],
-            (push * own).sum(axis=0),
+            (push * across).sum(axis=0),
             rtol=2e-3,
         )
 

@@ -99,8 +99,8 @@ def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     cody18 = replace(
         cody18, add=tuple(name for name in cody18.add if name != "inertia")
     )
-    some = dict(list(kinds(cody18).items())[2:10:3])
-    for convergence in measure(cody18, some).values():
+    sample = dict(list(kinds(cody18).items())[2:10:3])
+    for convergence in measure(cody18, sample).values():
         # Of the window that labels are judged in; of the longer trials it is a quarter
         # less.
         assert convergence.error_as_given < 0.02

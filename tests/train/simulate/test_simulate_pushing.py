@@ -119,9 +119,9 @@ class TestToppling:
     def test_beyond_its_balance_it_falls_as_a_pendulum_does(self, batch):
         # s'' = k (s - travel) / m about the balance: m v^2 - k (s - travel)^2 stays as
         # it is.
-        own = batch.trials.states["tipping"]
+        state = batch.trials.states["tipping"]
         mover = batch.trials.states["sliding"]
-        travel = own.travel[0]
+        travel = state.travel[0]
         lies = mover.lies[0]
         slide = batch.traces["slide_m"][0]
         force = batch.force[0]
@@ -129,7 +129,7 @@ class TestToppling:
         free = (slide > 1.2 * travel) & (slide < 0.8 * lies) & (force == 0.0)
         free[1:-1] &= (force[:-2] == 0.0) & (force[2:] == 0.0)
         assert free.sum() >= 5
-        stiffness = own.force[0] / travel
+        stiffness = state.force[0] / travel
         energy = mover.inertia[0] * speed**2 - stiffness * (slide - travel) ** 2
         scale = (mover.inertia[0] * speed**2)[free].max()
         assert np.ptp(energy[free]) < 0.03 * scale
@@ -152,20 +152,20 @@ class TestToppling:
 def test_what_slides_at_the_skin_bears_force_at_every_step_of_a_frame():
     """Were the contact located once a frame, it would jump there, and the skin's loss
     would let go of what it presses."""
-    given = replace(scenes.load(CODY18), spread={})
-    of_kind = (specs for specs in kinds(given).values())
+    level_scene = replace(scenes.load(CODY18), spread={})
+    of_kind = (specs for specs in kinds(level_scene).values())
     every = [replace(spec, step_s=5e-4) for specs in of_kind for spec in specs]
     spec = next(spec for spec in every if spec.key == "plastic-bin-movable")
-    plan = make_plan(given, (spec,)).with_hooks(pace=[])
-    *others, last = plan.stages["settle"]
+    plan = make_plan(level_scene, (spec,)).with_hooks(pace=[])
+    *hooks, last = plan.stages["settle"]
     forces = []
 
     def settle(t):
         last.function(t)
         forces.append(float(t.contact.loads[0, 0]))
 
-    plan = plan.with_hooks(settle=[*others, replace(last, function=settle)])
-    run_physics(given, (spec,), plan=plan, images=False)
+    plan = plan.with_hooks(settle=[*hooks, replace(last, function=settle)])
+    run_physics(level_scene, (spec,), plan=plan, images=False)
 
     first = int(np.argmax(np.array(forces) > 0.0))
     sliding = np.array(forces[first + 400 : first + 1800])

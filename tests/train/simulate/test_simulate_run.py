@@ -66,10 +66,10 @@ def test_a_recordings_arrays_are_as_the_contract_says(demo, trial):
 
 @pytest.mark.parametrize("how", [{"batch": 3}, {"jobs": 2}])
 def test_the_same_bytes_whatever_the_batch_or_the_cores(demo, written, tmp_path, how):
-    seen = []
-    write(demo, tmp_path, progress=seen.append, **how)
+    steps = []
+    write(demo, tmp_path, progress=steps.append, **how)
     assert digests(tmp_path) == digests(written[0])
-    assert sum(seen) == 16
+    assert sum(steps) == 16
 
 
 def test_long_trials_are_simulated_fewer_side_by_side():
@@ -98,9 +98,9 @@ def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(
     write(scenes.load(DEMO, seed=99, count=1), tmp_path / "seed")
     write(scenes.load(DEMO, count=3), tmp_path / "more")
     first = digests(written[0])
-    other = digests(tmp_path / "seed")
+    second_seed = digests(tmp_path / "seed")
     more = digests(tmp_path / "more")
-    assert all(first[name] != digest for name, digest in other.items())
+    assert all(first[name] != digest for name, digest in second_seed.items())
     assert all(more[name] == digest for name, digest in first.items())
 
 
@@ -178,8 +178,8 @@ class TestCommand:
     def test_a_former_runs_recordings_are_named(self, tmp_path, capsys):
         (tmp_path / "former.npz").touch()
         main(["simulate", str(DEMO), "--trials", "1", "--out", str(tmp_path)])
-        said = "holds other recordings too: 1, such as former.npz"
-        assert said in capsys.readouterr().err
+        sentence = "holds other recordings too: 1, such as former.npz"
+        assert sentence in capsys.readouterr().err
 
     def test_explain_lists_effects_reasons_and_costs(self, tmp_path, capsys):
         path = tmp_path / "one.toml"
@@ -225,7 +225,7 @@ class TestCommand:
 
 
 @pytest.mark.parametrize(
-    ("rest", "said"),
+    ("rest", "sentence"),
     [
         (
             "step_s.base = 0.01\ntrials.after_s = 0.3\neffects.dead_band.counts = "
@@ -243,7 +243,7 @@ def test_simulate_warns_of_settings_that_make_trials_useless(
     tmp_path,
     capsys,
     rest,
-    said,
+    sentence,
 ):
     path = tmp_path / "scene.toml"
     path.write_text(
@@ -253,7 +253,7 @@ def test_simulate_warns_of_settings_that_make_trials_useless(
     )
     assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 0
     err = capsys.readouterr().err
-    assert said in err
+    assert sentence in err
     assert "feather-fixed" not in err
 
 

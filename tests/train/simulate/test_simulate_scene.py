@@ -193,10 +193,10 @@ def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
         'name = "one"\n[trials]\ncount = 3\nafter_s = 1.5\n[spread]\nyaw_deg = 2.0\n'
         '[[object]]\nname = "wall"\nfamily = "rigid"\nconditions = ["fixed"]\n'
     )
-    other = tmp_path / "other.toml"
-    other.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
+    second_file = tmp_path / "other.toml"
+    second_file.write_text('like = "one.toml"\nname = "other"\n[trials]\ncount = 4\n')
     first = scenes.load(tmp_path / "one.toml")
-    second = scenes.load(other)
+    second = scenes.load(second_file)
     assert first.trials["count"] == 3
     assert second.trials["count"] == 4
     assert second.name == "other"
@@ -206,9 +206,9 @@ def test_a_scene_may_be_like_another_but_for_its_own_values(tmp_path):
     (tmp_path / "third.toml").write_text('like = "other.toml"\n')
     with pytest.raises(InputError, match="itself like another scene"):
         scenes.load(tmp_path / "third.toml")
-    other.write_text("like = 3\n")
+    second_file.write_text("like = 3\n")
     with pytest.raises(InputError, match="like must be"):
-        scenes.load(other)
+        scenes.load(second_file)
 
 
 def test_a_skin_of_other_columns_has_them_evenly_around():
@@ -251,19 +251,19 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
         '<origin xyz="0 0 -0.4"/></joint></robot>'
     )
     urdf = tmp_path / "arm.urdf"
-    here = str(tmp_path / "scene.toml")
+    place = str(tmp_path / "scene.toml")
     arm = {"chain": "arm.urdf", "base": "a", "tip": "c"}
     arm |= {"stiffness_nm_rad": [12.0], "damping_nms_rad": [0.4]}
     table = {**GOOD, "arm": arm, "motion": {"start_deg": [0.0], "rate_deg_s": [30.0]}}
     urdf.write_text(robot.format("revolute"))
-    scene = from_dict(table, here)
+    scene = from_dict(table, place)
     assert scene.arm.to_dict() == Chain.from_urdf(urdf, "a", "c").to_dict()
     assert next(simulate(scene))[1].frames.max() > 0
     urdf.write_text(robot.format("prismatic"))
     with pytest.raises(
         InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"
     ):
-        from_dict(table, here)
+        from_dict(table, place)
 
 
 def test_a_key_that_no_condition_of_the_object_heeds_is_refused():

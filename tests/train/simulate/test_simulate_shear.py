@@ -36,15 +36,16 @@ def traction(batch):
 def water_level(pull: int, limits: list[int]) -> list[Fraction]:
     """Pulls shared by springs, one spring at a time, in fractions."""
     borne = [Fraction(0)] * len(limits)
-    left = Fraction(pull)
+    remainder = Fraction(pull)
     open_springs = [i for i, limit in enumerate(limits) if limit]
-    while open_springs and left:
+    while open_springs and remainder:
         step = min(
-            left / len(open_springs), min(limits[i] - borne[i] for i in open_springs)
+            remainder / len(open_springs),
+            min(limits[i] - borne[i] for i in open_springs),
         )
         for i in open_springs:
             borne[i] += step
-            left -= step
+            remainder -= step
         open_springs = [i for i in open_springs if borne[i] < limits[i]]
     return borne
 
@@ -56,15 +57,15 @@ def water_level(pull: int, limits: list[int]) -> list[Fraction]:
 )
 def test_springs_share_a_pull_until_each_slips(limits, part):
     pull = int(part * sum(limits))
-    seen = shared(np.array([float(pull)]), np.array(limits, float)[:, None])[:, 0]
+    shares = shared(np.array([float(pull)]), np.array(limits, float)[:, None])[:, 0]
     expected = [float(value) for value in water_level(pull, limits)]
-    assert seen.tolist() == pytest.approx(expected, abs=1e-12)
-    assert seen.sum() == pytest.approx(pull, rel=1e-14)
+    assert shares.tolist() == pytest.approx(expected, abs=1e-12)
+    assert shares.sum() == pytest.approx(pull, rel=1e-14)
 
 
 def test_a_pull_beyond_all_limits_is_shared_by_them():
-    seen = shared(np.array([9.0]), np.array([[1.0], [2.0], [0.0]]))[:, 0]
-    assert seen.tolist() == pytest.approx([3.0, 6.0, 0.0], rel=1e-15)
+    shares = shared(np.array([9.0]), np.array([[1.0], [2.0], [0.0]]))[:, 0]
+    assert shares.tolist() == pytest.approx([3.0, 6.0, 0.0], rel=1e-15)
 
 
 @pytest.mark.parametrize("mu", [0.05, 0.4, 5.0])

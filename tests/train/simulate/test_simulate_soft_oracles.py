@@ -330,10 +330,10 @@ class TestBubbles:
         t = self.wrap(pop_n=0.5, width_m=0.05).trials
         weight = t.bed.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
-        left = weight * t.bed.intact[..., 0] * t.bed.stiffness[:, :1]
+        intact = weight * t.bed.intact[..., 0] * t.bed.stiffness[:, :1]
         law = [t.bed.slopes[-1, 0], t.bed.intercepts[-1, 0]]
         gaps = t.bed.line_gap[:, 0] + t.bed.gaps[:, :1]
-        want = [left.sum(), (left[left > 0.0] * gaps[left > 0.0]).sum()]
+        want = [intact.sum(), (intact[intact > 0.0] * gaps[intact > 0.0]).sum()]
         assert law == pytest.approx(want, rel=1e-12)
 
 
@@ -350,8 +350,8 @@ def test_the_stems_that_are_held_bear_by_their_own_bends():
     # Between two rows, each stem's load is nearer to the one that it stands nearer to.
     row = stems.taxel // len(batch.trials.bed.columns) + stems.part
     middle = (row * stems.stiffness * bent).sum(axis=0) / want
-    seen = batch.counts[:, -1].sum(axis=2, dtype=float)
-    measured = (seen * np.arange(16)).sum(axis=1) / seen.sum(axis=1)
+    counts = batch.counts[:, -1].sum(axis=2, dtype=float)
+    measured = (counts * np.arange(16)).sum(axis=1) / counts.sum(axis=1)
     np.testing.assert_allclose(measured, middle, atol=0.01)
 
 

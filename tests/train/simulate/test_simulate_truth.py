@@ -48,9 +48,9 @@ class TestLabels:
     def test_drawn_again_means_from_the_same_range_by_a_stream_of_the_same_name(
         self, simulations
     ):
-        again = [t["values"]["mass_kg"] for t in simulations if t["redrawn"]]
-        assert all(0.5 <= mass <= 6.0 for mass in again)
-        assert len(set(again)) == len(again) > 0
+        masses = [t["values"]["mass_kg"] for t in simulations if t["redrawn"]]
+        assert all(0.5 <= mass <= 6.0 for mass in masses)
+        assert len(set(masses)) == len(masses) > 0
 
     def test_redraws_do_not_depend_on_the_batch(self):
         trial_scene = scene(BOX)
@@ -168,9 +168,9 @@ class TestFamilies:
             assert mu * value["mass_kg"] * 9.80665 <= most
 
     def test_the_draws_are_the_familys_own(self):
-        other = {**FAMILY, "name": "trunk"}
-        both = scene(families=[other, FAMILY])
-        assert both.objects[6:] == scene(families=[FAMILY]).objects
+        trunk = {**FAMILY, "name": "trunk"}
+        two_families = scene(families=[trunk, FAMILY])
+        assert two_families.objects[6:] == scene(families=[FAMILY]).objects
         assert (
             scene(families=[FAMILY], seed=5).objects != scene(families=[FAMILY]).objects
         )

@@ -24,7 +24,7 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
 
 
 @pytest.mark.parametrize(
-    "other",
+    "second",
     [
         (2, "noise", "soft", 0),
         (1, "drift", "soft", 0),
@@ -34,17 +34,17 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
         (1, "soft", "noise", 0),
     ],
 )
-def test_seed_name_condition_and_trial_each_give_another_stream(other):
+def test_seed_name_condition_and_trial_each_give_another_stream(second):
     numbers = streams.stream(1, "noise", "soft", 0).random(4)
-    assert not np.isin(streams.stream(*other).random(4), numbers).any()
+    assert not np.isin(streams.stream(*second).random(4), numbers).any()
 
 
 @pytest.mark.parametrize("kind", ["random", "standard_normal"])
 def test_a_trials_draw_does_not_depend_on_the_trials_beside_it(kind):
     every = streams.draws(3, "yaw", "soft", np.arange(50), kind)
-    some = np.array([7, 2, 31])
+    numbers = np.array([7, 2, 31])
     np.testing.assert_array_equal(
-        streams.draws(3, "yaw", "soft", some, kind), every[some]
+        streams.draws(3, "yaw", "soft", numbers, kind), every[numbers]
     )
     want = getattr(streams.stream(3, "yaw", "soft"), kind)(50)
     np.testing.assert_array_equal(every, np.clip(want, -2.5, 2.5))
@@ -63,10 +63,10 @@ def test_noise_is_normal_and_each_number_takes_two_bytes():
     assert abs(float(values.mean())) < 12 / np.sqrt(values.size)
     assert float(values.std()) == pytest.approx(3.0, abs=0.03)
     assert 12.6 < float(np.abs(values).max()) < 13.2
-    again = np.random.default_rng(0)
-    again.bytes(2 * values.size)
+    generator_again = np.random.default_rng(0)
+    generator_again.bytes(2 * values.size)
     fresh = np.random.default_rng(0)
     numbers = np.full_like(values, 7.0)
     streams.add_normal(fresh, 3.0, numbers)
-    assert fresh.random() == again.random()
+    assert fresh.random() == generator_again.random()
     np.testing.assert_array_equal(numbers, np.float32(7.0) + values)

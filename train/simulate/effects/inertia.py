@@ -36,14 +36,14 @@ class Momentum(Group):
     Attributes:
         speed, before: (dof, n) rad/s of each joint, and its angle before the step.
         weight: (dof, n) I / h.
-        left: (n,) number of further frames with finer steps.
+        frames_left: (n,) number of further frames with finer steps.
         depth, force, change, peak: (n,) of the last frame, and the peak of all so far.
     """
 
     speed: PerJoint
     before: PerJoint
     weight: PerJoint
-    left: Array
+    frames_left: Array
     depth: Array
     force: Array
     change: Array
@@ -69,14 +69,14 @@ def pace(t: Trials) -> None:
     change = force - last.force
     peak = np.maximum(last.peak, force)
     jolts = np.abs(change - last.change) > JOLT * peak
-    frames_left = np.where(jolts, np.ceil(LASTS_S * t.scene.rate_hz), last.left)
+    frames_left = np.where(jolts, np.ceil(LASTS_S * t.scene.rate_hz), last.frames_left)
     approaching = (force == 0.0) & (depth + NEAR * closing > 0.0)
     finer = approaching | (frames_left > 0)
     last.depth = depth
     last.force = force
     last.change = change
     last.peak = peak
-    last.left = np.maximum(frames_left - 1, 0)
+    last.frames_left = np.maximum(frames_left - 1, 0)
     t.clock.steps = np.where(finer, FINER, 1) * t.clock.usual
 
 
@@ -96,8 +96,8 @@ def follow(t: Trials) -> None:
     up in a single short step, these are a speed at which the dashpot lets go.
     """
     clock = t.clock
-    usual = clock.left % (clock.steps // clock.usual) == 0
-    within = usual & (clock.left < clock.steps) & (t.contact.loads[0] > 0.0)
+    usual = clock.steps_left % (clock.steps // clock.usual) == 0
+    within = usual & (clock.steps_left < clock.steps) & (t.contact.loads[0] > 0.0)
     if within.any():
         t.only(within).run(*FRAME)
 

@@ -116,16 +116,16 @@ def move(t: Trials) -> None:
     lands = leans & ((ends <= 0.0) | (ends >= lies))
     goes = moving & (leans | (after > 0.0)) & ~lands
     stops = moving & ~goes
-    again = stops | (~moving & (force > mover.hold))
-    if again.any():
+    changes = stops | (~moving & (force > mover.hold))
+    if changes.any():
         y = np.where(stops, mover.rest, mover.shifted)
         soft = np.where(stops, 0.0, gain * h)
-        loads = t.solve_loads(y, t.contact.compliance[0] + soft, where=again)
+        loads = t.solve_loads(y, t.contact.compliance[0] + soft, where=changes)
         started = np.where(stops, 0.0, gain * (loads[0] - resist))
         right = stops | (started > 0.0)
-        t.contact.loads = np.where(again & right, loads, t.contact.loads)
-        after = np.where(again, started, after)
-        goes = np.where(again, started > 0.0, goes)
+        t.contact.loads = np.where(changes & right, loads, t.contact.loads)
+        after = np.where(changes, started, after)
+        goes = np.where(changes, started > 0.0, goes)
     after = np.where(goes, after, 0.0)
     step = h * after
     mover.speed = after
