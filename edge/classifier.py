@@ -12,7 +12,7 @@ import numpy as np
 
 from edge.errors import OutOfRange
 from edge.events import Aside, Decided, Event, Onset, Release
-from edge.model.calibration import NOVELTY_RATE, UNKNOWN, check_rate
+from edge.model.info import NOVELTY_RATE, UNKNOWN, check_rate
 from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import flags_of, frame_doubts
@@ -85,7 +85,7 @@ class Classifier:
 
     With an error rate, each task follows the fastest stopping rule that the model holds
     certified for that rate: it is decided at the first decision point that is sure
-    enough, and at the rule's last in any case (see `edge.model.calibration`). A task for
+    enough, and at the rule's last in any case (see `edge.model.info`). A task for
     which no rule is certified is decided at the full window, flagged `uncertified`. A
     task that is the product of two others, as category is of softness and mobility,
     never contradicts them: it is decided when both are, by their labels, and they
@@ -352,14 +352,18 @@ class Classifier:
         blank = self._blank(pending, series, window_s, short)
         try:
             vector = self.model.info.vector(series, window_s)
-            decisions = self.model.decide(vector, None if self.error is None else point)
+            decisions = self.model.decide(vector, point)
         except OutOfRange:
             blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
             answers = [replace(blank, task=task) for task in pending.tasks]
         else:
             unknown = self._is_unknown(point, decisions)
             if unknown and point == self._last:
-                blank = replace(blank, unusual=self.model.info.unusual(vector))
+                from edge.model.unusual import unusual  # few contacts are unknown
+
+                info = self.model.info
+                phrase = unusual(vector, info.widths, info.usual)
+                blank = replace(blank, unusual=phrase)
             answers = self._answers(pending, blank, decisions, unknown)
         pending.decision_point += 1
         for answer in answers:

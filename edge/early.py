@@ -5,13 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Protocol
 
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
-from edge.model.calibration import UNKNOWN, StoppingRule, check_rate
-from edge.model.info import ModelInfo
+from edge.model.info import UNKNOWN, ModelInfo, StoppingRule, check_rate
 from edge.model.model import Decision, Model
 from edge.model.refusal import refusal
 
@@ -32,24 +30,6 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
             kind = Product if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
-
-
-class Policy(Protocol):
-    """When and how a task is decided."""
-
-    def answer(
-        self,
-        candidate: Decided,
-        point: int,
-        decided: Mapping[str, Decided],
-    ) -> Decided | None:
-        """The answer at a decision point; None if the task goes on waiting.
-
-        Args:
-            asked: the model's answer.
-            point: index of the decision point.
-            decided: the answers to the contact's other tasks so far.
-        """
 
 
 class Uncertified:
@@ -105,6 +85,11 @@ class Early:
         """The answer at a decision point; None if the task goes on waiting.
 
         An unknown contact waits for the full window.
+
+        Args:
+            candidate: the model's answer.
+            point: index of the decision point.
+            decided: the answers to the contact's other tasks so far.
         """
         unknown = UNKNOWN in candidate.flags
         sure = self._is_sure(candidate, point)
@@ -173,6 +158,10 @@ class Product(Early):
             decision=decision,
         )
         return self._answered(candidate, point, sure)
+
+
+Policy = Uncertified | Early
+"""When and how a task is decided."""
 
 
 def _decision(candidate: Decided) -> Decision:

@@ -334,7 +334,7 @@ def to_onnx(model: Fitted, info: ModelInfo) -> bytes:
 
     A `SequentialClassifier` gives a second input, `decision_point` int64 (1,), whose
     default is the last one, and for each task the output `<task>_label_distances` (n,
-    labels); see `edge.model.calibration`.
+    labels); see `edge.model.info`.
     """
     kind = type(model)
     update_registered_converter(

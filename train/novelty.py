@@ -27,7 +27,7 @@ from joblib import Parallel, delayed
 from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
-from edge.model.calibration import Novelty
+from edge.model.info import Novelty
 from train.threads import single_thread
 from train.vectors import Booleans, Floats, Integers, Strings
 

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import beta
 
-from edge.model.calibration import TEST_SHARE, StoppingRule
+from edge.model.info import TEST_SHARE, StoppingRule
 from train.vectors import Booleans, Floats, Integers
 
 RISK = 0.1

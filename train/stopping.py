@@ -8,7 +8,7 @@ into folds, and each fold is decided by a model that was fitted, and whose setti
 chosen, without it.
 
 **Confidence.** The margin says how much nearer the training trials of the named label
-lie than those of any other (`edge.model.calibration.margin`). Logistic regression at each
+lie than those of any other (`edge.model.info.margin`). Logistic regression at each
 decision point turns it into the probability that the label is right (Platt,
 Probabilistic outputs for support vector machines, 1999). A label's distance is that of
 its nearest twentieth (`train.pipeline.label_distances`). So it is the same for the
@@ -37,7 +37,7 @@ from scipy.optimize import brentq
 from scipy.special import expit
 
 from edge.errors import InputError
-from edge.model.calibration import (
+from edge.model.info import (
     NOVELTY_RATE,
     Novelty,
     Stopping,

@@ -24,9 +24,8 @@ from edge.commands.options import (
 from edge.commands.output import LOG, counted
 from edge.commands.source import Opened, reading
 from edge.events import MOST_PLACES, Aside, Decided, Event
-from edge.model.calibration import UNKNOWN
+from edge.model.info import UNKNOWN
 from edge.model.model import Model
-from edge.output.event_writer import LineWriter
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
 from edge.touch.layout import differences
@@ -100,8 +99,8 @@ class UnknownTouches:
         for event in events:
             if isinstance(event, Decided):
                 touch = event.onset_s, event.contact
-                unknown = UNKNOWN in event.flags
-                self._touches[touch] = unknown or self._touches.get(touch, False)
+                former = self._touches.get(touch, False)
+                self._touches[touch] = former or UNKNOWN in event.flags
         for touch in list(self._touches)[:-LAST_TOUCHES]:
             del self._touches[touch]
         count = sum(self._touches.values())
@@ -170,7 +169,11 @@ def run(arguments: argparse.Namespace) -> int:
             max_contacts=1 if arguments.map is None else MAX_CONTACTS,
             motion_on_skin=on_skin,
         )
-        writers = _map_writers(arguments.map, model)
+        writers = []
+        if arguments.map is not None:
+            from edge.output.touch_map import map_writer  # few runs keep a map
+
+            writers.append(map_writer(arguments.map, model.info))
         with (
             closing(live.lines(arguments.udp, writers)) as lines,
             _listeners(arguments, model, live.opened) as listeners,
@@ -219,12 +222,3 @@ def _listeners(
             stack.callback(notifier.stopping)
             listeners.append(lambda frame, events: notifier.alive())
         yield listeners
-
-
-def _map_writers(path: str | None, model: Model) -> list[LineWriter]:
-    """The writer of the map, where one is asked for."""
-    if path is None:
-        return []
-    from edge.output.touch_map import map_writer  # few runs keep a map
-
-    return [map_writer(path, model.info)]

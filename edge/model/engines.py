@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
-
-from numpy.typing import NDArray
 
 from edge.errors import EdgeError, InputError
 from edge.files import parsing
@@ -60,10 +58,14 @@ def open_engine(
 
 
 class OnnxRuntime:
-    """ONNX Runtime with one thread; `edge.model.graph.Graph` has the same methods.
+    """ONNX Runtime with one thread; `edge.model.graph.Graph` has the same attributes.
 
     Attributes:
         name: one of `ENGINES`.
+        run: gives the outputs of a list of names for {input: its value}; it raises
+            exceptions of many kinds where the graph cannot be computed.
+        inputs: {input: its type and shape}; a size that is not known is no number.
+        outputs: {output: its type and shape}.
     """
 
     name = "onnxruntime"
@@ -85,7 +87,7 @@ class OnnxRuntime:
         options.graph_optimization_level = level
         options.enable_cpu_mem_arena = False
         try:
-            self._session = runtime.InferenceSession(
+            session = runtime.InferenceSession(
                 contents.data,
                 options,
                 providers=["CPUExecutionProvider"],
@@ -96,34 +98,11 @@ class OnnxRuntime:
                 f"{path}: ONNX Runtime refuses it ({type(error).__name__}); export it "
                 "again"
             ) from None
-
-    def run(
-        self,
-        names: Sequence[str],
-        inputs: Mapping[str, NDArray[Any]],
-    ) -> list[NDArray[Any]]:
-        """The named outputs of the graph.
-
-        Raises:
-            InputError: the graph cannot be computed.
-        """
-        try:
-            values: list[NDArray[Any]] = self._session.run(list(names), dict(inputs))
-        # An index past its tensor, or shapes that do not match.
-        except Exception as error:
-            raise InputError(str(error)) from None
-        return values
-
-    def inputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{input: its type and shape}; a size that is not known is no number."""
-        session = self._session
-        return _declared(
+        self.run = session.run
+        self.inputs = _declared(
             [*session.get_inputs(), *session.get_overridable_initializers()]
         )
-
-    def outputs(self) -> dict[str, tuple[str, list[Any]]]:
-        """{output: its type and shape}."""
-        return _declared(self._session.get_outputs())
+        self.outputs = _declared(session.get_outputs())
 
 
 def _declared(values: Sequence[Any]) -> dict[str, tuple[str, list[Any]]]:

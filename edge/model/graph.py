@@ -182,6 +182,8 @@ class Graph:
     Attributes:
         makers: {value: the node that makes it}.
         constants: {name: value}.
+        inputs: {input: its type and shape}, as the file declares them.
+        outputs: {output: its type and shape}, as the file declares them.
     """
 
     name = "numpy"
@@ -194,22 +196,14 @@ class Graph:
         """
         tensors = contents.tensors.items()
         self.constants = {name: _constant(tensor) for name, tensor in tensors}
-        self._inputs = dict(map(_declared, contents.inputs))
-        self._outputs = dict(map(_declared, contents.outputs))
+        self.inputs = dict(map(_declared, contents.inputs))
+        self.outputs = dict(map(_declared, contents.outputs))
         self.makers: dict[str, Node] = {}
         self._plans: dict[tuple[str, ...], list[Node]] = {}
         self._nodes = contents.nodes
         for node in contents.nodes:
             for output in node.outputs:
                 self.makers[output] = node
-
-    def inputs(self) -> dict[str, Declared]:
-        """{input: its type and shape}, as the file declares them."""
-        return self._inputs
-
-    def outputs(self) -> dict[str, Declared]:
-        """{output: its type and shape}, as the file declares them."""
-        return self._outputs
 
     def run(self, names: Sequence[str], inputs: Mapping[str, Array]) -> list[Array]:
         """Values of the graph, in the order of the names.

@@ -1,29 +1,47 @@
-"""The metadata of a model file, which the board reads beside the graph."""
+"""What a model's file says beside its graph: its tasks, its features, and its calibration:
+how sure a decision is, when it may come early, and which contacts are unlike everything
+in training."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, parse_json, shown
 from edge.errors import InputError
-from edge.model.calibration import Novelty, Stopping
-from edge.touch.contact import FeatureSeries, feature_types
-from edge.touch.feature import KERNELS
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import WatchfulTracker
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain
+    from edge.touch.contact import FeatureSeries
     from edge.touch.kernels import KernelTable
 
 METADATA_KEY = "edge-classify"
 FORMAT = 7
+UNKNOWN = "unknown"
+"""The label of a contact that is unlike everything in training."""
+NOVELTY_RATE = 0.02
+"""Rate at which contacts with trained objects may be called unknown. Such answers are
+counted among the certified errors."""
+TEST_SHARE = 0.5
+"""Part of the risk that the tests on calibration trials take. The rest covers the
+exported model, which errs more or less often than the folds' models do on average."""
+
+
+def check_rate(value: float, name: str) -> None:
+    """Refuse a rate outside (0, 1).
+
+    Raises:
+        InputError: the sentence begins with `name`.
+    """
+    if not 0.0 < value < 1.0:
+        raise InputError(f"{name} must be above 0 and below 1, not {value:g}")
 
 
 @dataclass(frozen=True)
@@ -55,6 +73,156 @@ class Task:
     left_out: str = "trial"
     no_contact: str | None = None
     factors: Mapping[str, Sequence[int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Novelty:
+    """When a contact is unlike everything in training.
+
+    The graph scores every contact in a space of its own (`train.novelty`).
+
+    Attributes:
+        task: with most labels. It names no label for an unknown contact: a new object
+            can still be called soft or movable.
+        rates: shares of trained contacts that score higher than the limits, falling
+            from one half.
+        limits: (decision points, rates) of the score.
+    """
+
+    task: str
+    rates: tuple[float, ...]
+    limits: tuple[tuple[float, ...], ...]
+
+    def rate(self, decision_point: int, score: float) -> float:
+        """The smallest novelty rate at which a score counts as unknown; 1 if it never
+        does."""
+        limits = zip(self.rates, self.limits[decision_point], strict=True)
+        return min((rate for rate, limit in limits if score > limit), default=1.0)
+
+    def excess(self, decision_point: int, score: float) -> float:
+        """The logarithm of a score over that of half of the trained contacts; 0 below
+        it."""
+        typical = self.limits[decision_point][0]
+        return math.log(score / typical) if score > typical > 0.0 else 0.0
+
+
+def margin(distances: Sequence[float], label: int) -> float:
+    """Evidence for a label: how much farther the training trials of the nearest other
+    one lie.
+
+    Args:
+        distances: (labels,) of `edge.model.Decision.label_distances`.
+        label: index of the label.
+
+    Returns:
+        The difference. It is minus infinity if the label's own trials are infinitely
+        far away, and 0 if there is no other label.
+    """
+    distance = distances[label]
+    rivals = [*distances[:label], *distances[label + 1 :]]
+    nearest_rival = min(rivals, default=distance)
+    return nearest_rival - distance if distance < math.inf else -math.inf
+
+
+def _logistic(x: float) -> float:
+    return 0.5 + 0.5 * math.tanh(0.5 * x)
+
+
+@dataclass(frozen=True)
+class StoppingRule:
+    """Decide at the first decision point that is sure enough, and at the last one in
+    any case.
+
+    A contact that is unknown there waits until it no longer is, or for the full window.
+
+    Attributes:
+        error: certified: decisions are wrong at most this often.
+        mean_s: mean seconds from onset to decision, on the calibration trials.
+        confidence: decide from this confidence on, by the curve of all decision points.
+            Above 1 no confidence is enough, so the rule waits for a fixed window.
+        last: decision point at which to decide in any case.
+    """
+
+    error: float
+    mean_s: float
+    confidence: float
+    last: int
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the rule waits for a fixed window."""
+        return self.confidence > 1.0
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """The calibration of one task's early decisions, which `train.stopping` makes.
+
+    Attributes:
+        slopes, intercepts, doubts: of each decision point: the probability that the
+            label is right is the logistic function of slope * `margin` + intercept -
+            doubt * `Novelty.excess`.
+        slope, intercept, doubt: the same of all decision points together, for the
+            rules. A point's own curve seldom rises high early, so with it the rules
+            would wait on clear contacts too.
+        rules: in the order of rising error. Mean times fall along them, except from a
+            factor's own rules to those that it shares with its product (see
+            `edge.model.agreement`).
+        trials: number of trials that certify the rules.
+        wrong: number of these trials that are decided wrongly at the full window.
+        risk: probability that a rule errs more often than its certificate says.
+    """
+
+    slopes: tuple[float, ...]
+    intercepts: tuple[float, ...]
+    doubts: tuple[float, ...]
+    slope: float
+    intercept: float
+    doubt: float
+    rules: tuple[StoppingRule, ...]
+    trials: int
+    wrong: int
+    risk: float
+
+    @property
+    def smallest_error(self) -> float:
+        """The smallest error rate that is certified."""
+        return self.rules[0].error
+
+    def confidence(
+        self,
+        decision_point: int,
+        distances: Sequence[float],
+        label: int,
+        excess: float,
+    ) -> float:
+        """Probability, 0 to 1, that a label is right.
+
+        Args:
+            decision_point: its index.
+            distances: (labels,) of `edge.model.Decision.label_distances`.
+            label: its index.
+            excess: the contact's `Novelty.excess`.
+        """
+        log_odds = self.slopes[decision_point] * margin(distances, label)
+        log_odds += self.intercepts[decision_point]
+        return _logistic(log_odds - self.doubts[decision_point] * excess)
+
+    def sure(
+        self,
+        rule: StoppingRule,
+        distances: Sequence[float],
+        label: int,
+        excess: float,
+    ) -> bool:
+        """Whether a label is sure enough for a rule; see `confidence`."""
+        log_odds = self.slope * margin(distances, label) + self.intercept
+        return _logistic(log_odds - self.doubt * excess) >= rule.confidence
+
+    def rule(self, error: float) -> StoppingRule | None:
+        """The fastest rule that is certified for an error rate; or None."""
+        certified = [rule for rule in self.rules if rule.error <= error]
+        return certified[-1] if certified else None
 
 
 @dataclass(frozen=True)
@@ -130,17 +298,6 @@ class ModelInfo:
             self.kernels,
         )
 
-    def unusual(self, vector: NDArray[np.float64]) -> str | None:
-        """The property of a vector of the full window that is most unlike training, as a
-        phrase."""
-        if not self.usual:
-            return None
-        from edge.model.unusual import unusual  # few contacts are unknown
-
-        ends = np.cumsum(self.widths)[:-1]
-        means = [float(part.mean()) for part in np.split(vector, ends)]
-        return unusual(means, self.usual)
-
     @property
     def products(self) -> dict[str, Mapping[str, Sequence[int]]]:
         """{task: its factors} of tasks that are decided together with two others."""
@@ -172,216 +329,3 @@ class ModelInfo:
             joints=self.joints,
             max_contacts=max_contacts,
         )
-
-    @classmethod
-    def from_json(cls, text: str, name: str) -> Self:
-        """Read the text that `edge.model.metadata.to_json` wrote.
-
-        Raises:
-            InputError: something is missing or of the wrong kind; the sentence names
-                `name`.
-        """
-        where = f"{name}: its metadata"
-        try:
-            meta = ConfigTable(parse_json(text, where), where)
-            if meta.whole("format") != FORMAT:
-                raise InputError(
-                    f"{where} is of format {shown(meta.raw['format'])}, but this "
-                    f"edge-classify reads {FORMAT}"
-                )
-            info = cls._read(meta)
-        except InputError as error:
-            raise InputError(f"{error}; export it again") from None
-        _check_features(info, name)
-        _check(info, name)
-        return info
-
-    @classmethod
-    def _read(cls, meta: ConfigTable) -> Self:
-        """Read the table of a model's metadata."""
-        where = meta.where
-        tasks = {}
-        for task in meta.table("tasks").raw:
-            tasks[str(task)] = _task(meta.table("tasks").table(task))
-        tracking = meta.table("tracking")
-        points = meta.numbers("decision_points_s", default=())
-        names = meta.texts("features")
-        units = meta.table("units")
-        layout = SkinLayout.from_dict(meta.get("skin"), where=where)
-        versions = {}
-        for program, version in meta.table("versions", {}).raw.items():
-            versions[str(program)] = str(version)
-        info = cls(
-            tasks=tasks,
-            layout=layout,
-            debounce=tracking.whole("debounce", allowed=range(1, 1001)),
-            window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
-            samples=meta.whole("samples", allowed=range(2, 10_001)),
-            features=names,
-            units={name: units.text(name) for name in names},
-            motion_frame=meta.choice("motion_frame", ("world", "skin")),
-            chain=_chain(meta),
-            rows=meta.whole("rows"),
-            data_digest=meta.text("data_digest", empty=True),
-            versions=versions,
-            decision_points_s=points,
-            stopping=_stopping(meta, len(points)),
-            novelty=_novelty(meta, len(points)),
-            joints=meta.whole("joints", 0, allowed=range(0, 1001)),
-            kernels=_kernels(meta, names, layout),
-            name=meta.text("name", "", empty=True),
-            trials=meta.texts("trials", ()),
-            usual=_usual(meta, names),
-            several=meta.number("several", 1.0, low=0.0, high=1.0),
-            taught=meta.whole("taught", 0, allowed=range(1 << 31)),
-        )
-        tracking.done()
-        return info
-
-
-def _chain(meta: ConfigTable) -> Chain | None:
-    """The arm, where the model has one."""
-    arm = meta.get("arm", None)
-    if arm is None:
-        return None
-    from edge.touch.arm import Chain
-
-    return Chain.from_dict(arm, where=f"{meta.where}: arm")
-
-
-def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
-    """The stopping rules of each task, where the model has decision points."""
-    if not points:
-        return {}
-    rules = meta.table("stopping")
-    return {task: Stopping.from_table(rules.table(task), points) for task in rules.raw}
-
-
-def _novelty(meta: ConfigTable, points: int) -> Novelty | None:
-    """The limits of novelty, where the model has decision points."""
-    return Novelty.from_table(meta.table("novelty"), points) if points else None
-
-
-def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
-    """The usual range of each feature, where the model has them."""
-    if not meta.has("usual"):
-        return {}
-    table = meta.table("usual")
-    usual: dict[str, Sequence[float]] = {}
-    for name in names:
-        least, greatest = table.numbers(name, 2)
-        if least > greatest:
-            raise table.fail(name, "two numbers that rise")
-        usual[name] = least, greatest
-    return usual
-
-
-def _kernels(
-    meta: ConfigTable,
-    names: Sequence[str],
-    layout: SkinLayout,
-) -> dict[str, KernelTable]:
-    """{feature: its table} of convolution features."""
-    tables = {}
-    for name in names:
-        if name in KERNELS:
-            from edge.touch.kernels import KernelTable
-
-            table = meta.table("kernels").table(name)
-            tables[name] = KernelTable.from_table(table, name, layout)
-    return tables
-
-
-def _check_features(info: ModelInfo, name: str) -> None:
-    """Refuse features that do not exist, or contradict the joints."""
-    try:
-        types = feature_types(info.features)
-    except InputError as error:
-        raise InputError(
-            f"{name}: was made for the features {', '.join(info.features)}; {error}; "
-            "export it with this version of edge-classify"
-        ) from None
-    of_joints = any(feature.of_joints for feature in types)
-    dof = info.joints if info.chain is None else info.chain.dof
-    expected = dof if of_joints else 0
-    if info.joints != expected or (of_joints and not info.joints):
-        features = "joint features" if of_joints else "no joint features"
-        raise InputError(
-            f"{name}: names {features} but gives {info.joints} joints; export it again"
-        )
-
-
-def _check(info: ModelInfo, name: str) -> None:
-    """Refuse metadata that contradict themselves."""
-    for contradiction in _contradictions(info):
-        raise InputError(f"{name}: {contradiction}; export it again")
-
-
-def _contradictions(info: ModelInfo) -> Iterator[str]:
-    """Contradictions in the metadata, as sentences."""
-    if not info.tasks:
-        yield "its metadata names no task"
-    if info.decision_points_s and not _points_fit(info):
-        yield "its decision points are impossible"
-    if info.trials and len(info.trials) != info.rows:
-        yield f"names {len(info.trials)} of {info.rows} trials"
-    if (info.motion_frame == "world") != (info.chain is not None):
-        yield "its motion frame contradicts its arm"
-    yield from _unprintable(info)
-    yield from _contradictions_of_tasks(info)
-
-
-def _unprintable(info: ModelInfo) -> Iterator[str]:
-    without_contact = [task.no_contact or "" for task in info.tasks.values()]
-    if not "".join([info.name, *info.tasks, *without_contact]).isprintable():
-        yield "its name, its tasks' names and its answers must be printable"
-    if not "".join(info.trials).isprintable():
-        yield "its trials' names must be printable"
-
-
-def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
-    """Contradictions in the tasks, as sentences."""
-    for name, task in info.tasks.items():
-        if task.components > info.width:
-            yield (
-                f"task {name!r} has {task.components} components of {info.width} "
-                "features"
-            )
-    labels = {name: task.labels for name, task in info.tasks.items()}
-    for name, factors in info.products.items():
-        from edge.model.agreement import factors_fit  # few models have products
-
-        if not factors_fit(factors, labels, name):
-            yield f"task {name!r} is not the product of its factors"
-
-
-def _points_fit(info: ModelInfo) -> bool:
-    """Whether decision points rise to the window, and each task has its rules."""
-    points = info.decision_points_s
-    rising = (0.0, *points) == tuple(sorted({0.0, *points}))
-    if not rising or points[-1] != info.window_s:
-        return False
-    named = info.novelty is not None and info.novelty.task in info.tasks
-    return named and info.stopping.keys() == info.tasks.keys()
-
-
-def _task(table: ConfigTable) -> Task:
-    labels = table.texts("labels")
-    bare = {label.strip() for label in labels} - {""}
-    if not bare or len(bare) < len(labels) or not "".join(labels).isprintable():
-        raise table.fail("labels", "a list of different, printable texts")
-    factors = table.table("factors")
-    task = Task(
-        labels,
-        k=table.whole("k", allowed=range(1, 1 << 31)),
-        components=table.whole("components", allowed=range(1 << 31)),
-        scaling=table.text("scaling"),
-        accuracy=table.number("accuracy", low=0.0, high=1.0),
-        projection=table.text("projection"),
-        features=table.texts("features"),
-        left_out=table.text("left_out"),
-        no_contact=table.text("no_contact") if table.has("no_contact") else None,
-        factors={f: factors.wholes(f) for f in factors.raw},
-    )
-    table.done()
-    return task

@@ -11,7 +11,7 @@ OPTIONAL = (
 
 
 def to_json(info: ModelInfo) -> str:
-    """The metadata as JSON text, which `ModelInfo.from_json` reads."""
+    """The metadata as JSON text, which `edge.model.metadata_reader.from_json` reads."""
     entries = vars(info) | {
         "format": FORMAT,
         "skin": info.layout.to_dict(),

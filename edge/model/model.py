@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from edge.errors import InputError, OutOfRange
+from edge.errors import InputError, OutOfRange, printable
 from edge.files import read_bytes
 from edge.model import onnx_file
 from edge.model.engines import open_engine
 from edge.model.info import METADATA_KEY, ModelInfo
+from edge.model.metadata_reader import from_json
 
 LARGEST_BYTES = 1 << 30
 
@@ -46,7 +47,7 @@ class Decision(NamedTuple):
         out_of_range: the features lie so far outside those of the training trials that
             the model cut them off; see `train.projection.Grid`.
         novelty: how unlike all training trials the features are (see
-            `edge.model.calibration`), of a model with decision points.
+            `edge.model.info.Novelty`), of a model with decision points.
     """
 
     label: str
@@ -77,6 +78,7 @@ class Model:
         contents: of the file.
         info: its metadata.
         version: the first eight digits of the file's SHA-256.
+        engine: the program that runs the graph, one of `edge.model.engines.ENGINES`.
 
     Raises:
         InputError: the file is missing, is not an exported model, or contradicts
@@ -105,10 +107,11 @@ class Model:
         self.version = hashlib.sha256(data).hexdigest()[:8]
         # First the format: an older one has other operators, but is named by its
         # number.
-        self.info = ModelInfo.from_json(text, name)
+        self.info = from_json(text, name)
         onnx_file.check(self.contents, name)
         self._outputs = _outputs(self.info)
         self._engine = open_engine(name, self.contents, engine)
+        self.engine = self._engine.name
         self._check()
         if self.info.products:
             # Few models have products; the first decision is not to wait for an import.
@@ -116,18 +119,12 @@ class Model:
 
             self._agreed = agreed
 
-    @property
-    def engine(self) -> str:
-        """The program that runs the graph, one of `edge.model.engines.ENGINES`."""
-        return self._engine.name
-
     def _check(self) -> None:
         """Refuse a graph whose inputs and outputs are not those of its metadata."""
         expected = {"features": ("tensor(double)", [self.info.width]), **self._outputs}
         if self.info.decision_points_s:
             expected["decision_point"] = "tensor(int64)", []
-        inputs = self._engine.inputs()
-        declared = {**inputs, **self._engine.outputs()}
+        declared = {**self._engine.inputs, **self._engine.outputs}
         for name, (kind, shape) in expected.items():
             declared_kind, sizes = declared.get(name, (None, []))
             # Older versions of ONNX Runtime leave some sizes open; `run` checks these.
@@ -139,7 +136,7 @@ class Model:
                     f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
                     "which its metadata describes; export it again"
                 )
-        for name in inputs:
+        for name in self._engine.inputs:
             if name not in expected:
                 raise InputError(
                     f"{self.path}: has an input {name}, which no exported model has; "
@@ -198,8 +195,9 @@ class Model:
             inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
             values = self._engine.run(list(self._outputs), inputs)
-        except InputError as error:
-            raise self._broken(str(error)) from None
+        # An index past its tensor, or shapes that do not match.
+        except Exception as error:
+            raise self._broken(printable(str(error))) from None
         outputs = dict(zip(self._outputs, values, strict=True))
         for name, (_, shape) in self._outputs.items():
             if outputs[name].shape != (len(vectors), *shape):
@@ -237,10 +235,12 @@ class Model:
             distances[task] = answers.get(f"{task}_label_distances")
         if min(labels.values()) < 0:
             raise self._refusal(x)
-        if self.info.products:
-            self._agree(labels, distances)
-        last = len(self.decision_points_s) - 1
-        point = last if decision_point is None else decision_point
+        for product, factors in self.info.products.items():
+            # The nearest answer in which the three tasks agree.
+            agreed_labels, agreed_distances = self._agreed(product, factors, distances)
+            labels |= agreed_labels
+            distances |= agreed_distances
+        point = -1 if decision_point is None else decision_point
         return {
             task: self._decision(task, point, int(label), distances[task], answers)
             for task, label in labels.items()
@@ -249,16 +249,16 @@ class Model:
     def _decision(
         self,
         task: str,
-        decision_point: int,
+        point: int,
         label: int,
-        distances: NDArray[np.float64] | None,
+        distances: Any,
         answers: Mapping[str, NDArray[Any]],
     ) -> Decision:
         """A task's decision.
 
         Args:
             task: its name.
-            decision_point: index of the point that was asked for.
+            point: index of the decision point that was asked for.
             label: index of the label in which the tasks agree.
             distances: (labels,) of the nearest answers with each label, if any.
             answers: {output of the graph: its value}.
@@ -271,15 +271,17 @@ class Model:
         if label >= len(shares) or not 0.0 <= shares[label] <= 1.0:
             raise self._broken(f"{task} is answered by label {label} of {len(shares)}")
         novelty = float(answers.get("novelty", 0.0))
+        confidence = None
+        if self.info.novelty is not None:
+            confidence = self.info.stopping[task].confidence(
+                point,
+                distances.tolist(),
+                label,
+                self.info.novelty.excess(point, novelty),
+            )
         return Decision(
             label=self.info.tasks[task].labels[label],
-            confidence=self._confidence(
-                task,
-                decision_point,
-                distances,
-                label,
-                novelty,
-            ),
+            confidence=confidence,
             votes=shares[label],
             scores=scores,
             distances=answers[f"{task}_distances"],
@@ -289,28 +291,6 @@ class Model:
             out_of_range=bool(answers["out_of_range"] > 0.0),
             novelty=novelty,
         )
-
-    def _confidence(
-        self,
-        task: str,
-        decision_point: int,
-        distances: NDArray[np.float64] | None,
-        label: int,
-        novelty: float,
-    ) -> float | None:
-        """The calibrated probability that a label is right; None uncalibrated."""
-        stopping = self.info.stopping.get(task)
-        if stopping is None or self.info.novelty is None or distances is None:
-            return None
-        excess = self.info.novelty.excess(decision_point, novelty)
-        return stopping.confidence(decision_point, distances.tolist(), label, excess)
-
-    def _agree(self, labels: dict[str, Any], distances: dict[str, Any]) -> None:
-        """Give products and their factors the nearest answer in which they agree."""
-        for task, factors in self.info.products.items():
-            agreed_labels, agreed_distances = self._agreed(task, factors, distances)
-            labels |= agreed_labels
-            distances |= agreed_distances
 
     def _broken(self, reason: str) -> InputError:
         """The error for a file that loads, but does not answer as an exported model

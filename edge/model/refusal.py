@@ -2,7 +2,7 @@
 
 import math
 
-from edge.model.calibration import TEST_SHARE, Stopping
+from edge.model.info import TEST_SHARE, Stopping
 
 
 def refusal(stopping: Stopping, error: float) -> str:

@@ -12,8 +12,7 @@ from edge.commands.output import LOG, counted
 from edge.commands.source import Opened
 from edge.errors import EdgeError, InputError
 from edge.events import Decided, Event
-from edge.model.calibration import UNKNOWN
-from edge.model.info import ModelInfo
+from edge.model.info import UNKNOWN, ModelInfo
 from edge.saving import save
 from edge.tools.record import Trials, recording, shared_meta
 from edge.tools.review import UNSURE, decisions_of

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from edge.events import Decided
-from edge.model.calibration import UNKNOWN
+from edge.model.info import UNKNOWN
 from edge.recording import Recording
 
 UNSURE = 0.8
@@ -23,9 +23,9 @@ def curve(recording: Recording, points: int = CURVE) -> list[int]:
     """The largest count of a touch over time, in percent of its highest; the largest of
     each part of the recording."""
     peaks = recording.frames.reshape(len(recording.t), -1).max(axis=1)
-    parts = np.array_split(peaks, min(points, len(peaks)))
+    spans = np.array_split(peaks, min(points, len(peaks)))
     highest = max(int(peaks.max()), 1)
-    return [int(part.max()) * 100 // highest for part in parts]
+    return [int(span.max()) * 100 // highest for span in spans]
 
 
 def sparkline(percent: Sequence[int]) -> str:

@@ -23,6 +23,8 @@ class Feature:
         samples: times at which it is taken; 0 for the model's number.
         zones: the zones whose sums it needs, besides the region's own peak and area.
         wide: whether it has many values a frame.
+        single: whether it is one number for the window (for each cell, kernel or joint).
+        of_joints: whether it is made of the joint angles.
         kernels: how many values kernels make of it; 0 of a feature without kernels.
     """
 
@@ -34,17 +36,9 @@ class Feature:
     samples: int = 0
     zones: tuple[str, ...] = ()
     wide: bool = False
+    single: bool = False
+    of_joints: bool = False
     kernels: int = 0
-
-    @property
-    def of_joints(self) -> bool:
-        """Whether it is made of the joint angles."""
-        return self.zone == "arm"
-
-    @property
-    def single(self) -> bool:
-        """Whether it is one number for the window (for each cell, kernel or joint)."""
-        return self.summary not in ("", "rate") or self.kernels > 0
 
 
 OF_PAPER = {

@@ -155,7 +155,14 @@ class _Course:
         """Values of features of one kind, one after another."""
         first = group[0]
         if first.kernels:
-            return self._kernel_shares(first.name)
+            from edge.touch import kernels  # few models have convolution features
+
+            return kernels.shares_of(
+                self._series,
+                self._window_s,
+                first.name,
+                self._tables,
+            )
         samples = first.samples or samples
         step = self._window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
@@ -166,14 +173,6 @@ class _Course:
             values = transforms.summarised(values, first.summary, step)
         return values.reshape(-1)
 
-    def _kernel_shares(self, name: str) -> NDArray[np.float64]:
-        from edge.touch import kernels  # few models have convolution features
-
-        channels = kernels.kernel_channels(self._series, self._window_s, name)
-        if name not in self._tables:
-            raise InputError(f"{name} needs a table that training made")
-        return kernels.shares(channels, self._tables[name])
-
     def _sampled(
         self,
         group: tuple[Feature, ...],
@@ -182,7 +181,10 @@ class _Course:
         """(rows, times) features of one value a frame, or of one wide feature."""
         first = group[0]
         t = self._series.t
-        values = self._measured(first).T if first.wide else self._rows(group)
+        if first.wide:
+            values = self._measured(first).T
+        else:
+            values = np.array(list(map(self._measured, group)), dtype=np.float64)
         finite = np.isfinite(values)
         complete = finite.all(axis=1)
         for feature, row in zip(group, values, strict=False):
@@ -199,16 +201,12 @@ class _Course:
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
 
-    def _rows(self, group: Sequence[Feature]) -> NDArray[np.float64]:
-        return np.array(
-            [self._measured(feature) for feature in group], dtype=np.float64
-        )
-
     def _measured(self, feature: Feature) -> NDArray[Any]:
         """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
         known."""
         series = self._series
         of_region = {
+            ("contact", "max_force"): series.peak / self._scale,
             ("contact", "motion"): series.motion,
             ("contact", "force_motion"): series.force_motion,
             ("contact", "area"): series.area,
@@ -216,13 +214,8 @@ class _Course:
             ("arm", "joint_angle"): series.joints,
             ("arm", "joint_change"): series.joints,
         }
-        place = feature.zone, feature.quantity
-        if place == ("contact", "max_force"):
-            return series.peak / self._scale
-        values: NDArray[Any] | None
-        if place in of_region:
-            values = of_region[place]
-        else:
+        values = of_region.get((feature.zone, feature.quantity))
+        if values is None:
             values = self._zones.get(feature.zone, {}).get(feature.quantity)
         if values is None:
             raise not_measured(feature.name)

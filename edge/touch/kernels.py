@@ -11,7 +11,7 @@ share is a whole number below 2^21, so every machine finds the same bits.
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
@@ -21,6 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from edge.config import ConfigTable
+from edge.errors import InputError
 from edge.touch.cells import KERNEL_CELLS, Cells
 from edge.touch.contact import CLOCK_ROUNDING_S, FeatureSeries
 from edge.touch.feature import KERNELS, not_measured
@@ -173,6 +174,23 @@ def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float6
     above = of_bias > np.array([table.biases], np.int32).T
     counts = np.count_nonzero(above, axis=1)
     return np.asarray(counts / _samples_of_bias(biases))
+
+
+def shares_of(
+    series: FeatureSeries,
+    window_s: float,
+    name: str,
+    tables: Mapping[str, KernelTable],
+) -> NDArray[np.float64]:
+    """The `shares` of a feature in a contact's window, by its table.
+
+    Raises:
+        InputError: the feature was not measured, or has no table.
+    """
+    channels = kernel_channels(series, window_s, name)
+    if name not in tables:
+        raise InputError(f"{name} needs a table that training made")
+    return shares(channels, tables[name])
 
 
 def kernel_channels(

@@ -34,7 +34,7 @@ class OpenVino(Graph):
         """The named outputs, in the types that the graph declares."""
         ports = [port.any_name for port in self._compiled.inputs]
         results = self._compiled({name: inputs[name] for name in ports})
-        kinds = {name: kind for name, (kind, _) in self.outputs().items()}
+        kinds = {name: kind for name, (kind, _) in self.outputs.items()}
         whole = {name: "int64" in kind for name, kind in kinds.items()}
         return [
             np.asarray(results[name], np.int64 if whole[name] else np.float64)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from edge.model.calibration import TEST_SHARE, StoppingRule
+from edge.model.info import TEST_SHARE, StoppingRule
 from train.rules import NEVER, RISK, Course, certify, following, stops, upper_limit
 
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.special import expit, logit
 
 from edge.errors import InputError
-from edge.model.calibration import NOVELTY_RATE
+from edge.model.info import NOVELTY_RATE
 from train.evaluate import stratified_folds
 from train.pipeline import Choice
 from train.stopping import (

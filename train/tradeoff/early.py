@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from edge.model.calibration import Stopping, StoppingRule
+from edge.model.info import Stopping, StoppingRule
 from train.dataset import DataSet
 from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
 from train.fitting import fit

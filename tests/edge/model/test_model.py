@@ -13,8 +13,9 @@ from onnx import TensorProto, helper, numpy_helper
 from edge.errors import InputError
 from edge.model import onnx_file
 from edge.model.graph import Graph
-from edge.model.info import FORMAT, METADATA_KEY, ModelInfo
+from edge.model.info import FORMAT, METADATA_KEY
 from edge.model.metadata import to_json
+from edge.model.metadata_reader import from_json
 from edge.model.model import Model
 
 
@@ -61,7 +62,7 @@ def test_metadata_say_how_features_are_measured(model):
 
 def test_metadata_are_read_as_they_were_written(model):
     info = model.info
-    assert to_json(info.from_json(to_json(info), "again")) == to_json(info)
+    assert to_json(from_json(to_json(info), "again")) == to_json(info)
 
 
 def test_a_decision_is_the_graphs_answer_and_stays_so_after_further_ones(model, golden):
@@ -250,13 +251,13 @@ def with_factors(info, labels, softness, mobility):
 def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
     names = ("rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable")
     text = with_factors(model.info, names, [0, 0, 1, 1], [0, 1, 0, 1])
-    assert ModelInfo.from_json(text, "m").tasks["category"].labels == names
+    assert from_json(text, "m").tasks["category"].labels == names
     lying = with_factors(model.info, names, [1, 1, 0, 0], [0, 1, 0, 1])
     with pytest.raises(InputError, match="'category' is not the product of its"):
-        ModelInfo.from_json(lying, "m")
+        from_json(lying, "m")
     others = ("wall", "box", "sofa", "pillow")
     free = with_factors(model.info, others, [1, 1, 0, 0], [0, 1, 0, 1])
-    assert ModelInfo.from_json(free, "m").tasks["category"].labels == others
+    assert from_json(free, "m").tasks["category"].labels == others
 
 
 @pytest.mark.parametrize("frames", [1, 1000])
@@ -290,8 +291,8 @@ def test_nodes_are_those_that_onnx_reads(contents, proto):
 
 def test_constants_inputs_and_outputs_are_those_that_onnx_reads(contents, proto):
     graph = Graph(contents)
-    assert graph.inputs()["features"] == ("tensor(double)", [None, 120])
-    assert graph.outputs()["object_label"] == ("tensor(int64)", [None])
+    assert graph.inputs["features"] == ("tensor(double)", [None, 120])
+    assert graph.outputs["object_label"] == ("tensor(int64)", [None])
     assert graph.constants.keys() == {t.name for t in proto.graph.initializer}
     for tensor in proto.graph.initializer:
         np.testing.assert_array_equal(
@@ -330,12 +331,8 @@ class Underived:
     def __init__(self, engine, output):
         self.run = engine.run
         self.inputs = engine.inputs
-        self._outputs = engine.outputs()
-        kind, sizes = self._outputs[output]
-        self._outputs[output] = kind, [sizes[0], "unknown"]
-
-    def outputs(self):
-        return self._outputs
+        kind, sizes = engine.outputs[output]
+        self.outputs = engine.outputs | {output: (kind, [sizes[0], "unknown"])}
 
 
 def test_sizes_that_an_older_runtime_does_not_derive_are_left_to_the_run(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.model.calibration import StoppingRule
+from edge.model.info import StoppingRule
 from edge.model.model import Model
 from edge.recording import load
 from edge.saving import save

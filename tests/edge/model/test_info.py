@@ -4,11 +4,12 @@ unknown."""
 import math
 from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from edge.config import ConfigTable
 from edge.errors import InputError
-from edge.model.calibration import (
+from edge.model.info import (
     TEST_SHARE,
     Novelty,
     Stopping,
@@ -16,6 +17,7 @@ from edge.model.calibration import (
     check_rate,
     margin,
 )
+from edge.model.metadata_reader import read_novelty, read_stopping
 from edge.model.refusal import refusal
 from edge.model.unusual import unusual
 
@@ -127,11 +129,11 @@ def table(stored):
 
 
 def test_what_is_stored_is_read_again():
-    assert Stopping.from_table(table(stopping()), 3) == stopping()
+    assert read_stopping(table(stopping()), 3) == stopping()
     at_once = stopping(rules=(StoppingRule(0.2, 0.4, 0.0, 0),), wrong=0)
-    assert Stopping.from_table(table(at_once), 3) == at_once
+    assert read_stopping(table(at_once), 3) == at_once
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
-    assert Novelty.from_table(table(novelty), 2) == novelty
+    assert read_novelty(table(novelty), 2) == novelty
 
 
 @pytest.mark.parametrize(
@@ -159,17 +161,17 @@ def test_what_is_stored_is_read_again():
 )
 def test_what_contradicts_itself_is_no_stopping(changes, says):
     with pytest.raises(InputError, match=f"model.onnx: stopping.t.{says}"):
-        Stopping.from_table(table(stopping(**changes)), 3)
+        read_stopping(table(stopping(**changes)), 3)
 
 
 def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0,)))
     with pytest.raises(InputError, match="limits must be a list of 2 numbers, not"):
-        Novelty.from_table(table(novelty), 2)
+        read_novelty(table(novelty), 2)
     with pytest.raises(
         InputError, match="limits must be 3 rows of a number for each of the rates"
     ):
-        Novelty.from_table(table(novelty), 3)
+        read_novelty(table(novelty), 3)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +186,7 @@ def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
 )
 def test_limits_of_novelty_in_another_order_are_refused(rates, limits, says):
     with pytest.raises(InputError, match=says):
-        Novelty.from_table(table(Novelty("t", rates, (limits,))), 1)
+        read_novelty(table(Novelty("t", rates, (limits,))), 1)
 
 
 def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
@@ -215,7 +217,7 @@ def test_a_rate_lies_inside_0_to_1(value):
 )
 def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
     usual = {"log_max_force@5": (0.0, 10.0), "sqrt_skin_area@20": (0.5, 1.5)}
-    assert unusual(means, usual) == phrase
+    assert unusual(np.array(means), (1, 1), usual) == phrase
 
 
 @pytest.mark.parametrize(

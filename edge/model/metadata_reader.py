@@ -1,0 +1,262 @@
+"""Reads the metadata of a model file, and refuses those that contradict themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from edge.config import ConfigTable, parse_json, shown
+from edge.errors import InputError
+from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, Task
+from edge.touch.contact import feature_types
+from edge.touch.feature import KERNELS
+from edge.touch.layout import SkinLayout
+
+if TYPE_CHECKING:
+    from edge.touch.arm import Chain
+    from edge.touch.kernels import KernelTable
+
+
+def from_json(text: str, name: str) -> ModelInfo:
+    """Read the text that `edge.model.metadata.to_json` wrote.
+
+    Raises:
+        InputError: something is missing, of the wrong kind or a contradiction; the
+            sentence names `name`.
+    """
+    where = f"{name}: its metadata"
+    try:
+        meta = ConfigTable(parse_json(text, where), where)
+        if meta.whole("format") != FORMAT:
+            raise InputError(
+                f"{where} is of format {shown(meta.raw['format'])}, but this "
+                f"edge-classify reads {FORMAT}"
+            )
+        info = _read(meta)
+    except InputError as error:
+        raise InputError(f"{error}; export it again") from None
+    try:
+        feature_types(info.features)
+    except InputError as error:
+        raise InputError(
+            f"{name}: was made for the features {', '.join(info.features)}; {error}; "
+            "export it with this version of edge-classify"
+        ) from None
+    for contradiction in _contradictions(info):
+        raise InputError(f"{name}: {contradiction}; export it again")
+    return info
+
+
+def _read(meta: ConfigTable) -> ModelInfo:
+    """Read the table of a model's metadata."""
+    tasks = meta.table("tasks")
+    task_of = {str(task): _task(tasks.table(task)) for task in tasks.raw}
+    tracking = meta.table("tracking")
+    points = meta.numbers("decision_points_s", default=())
+    names = meta.texts("features")
+    units = meta.table("units")
+    layout = SkinLayout.from_dict(meta.get("skin"), where=meta.where)
+    versions = meta.table("versions", {}).raw
+    info = ModelInfo(
+        tasks=task_of,
+        layout=layout,
+        debounce=tracking.whole("debounce", allowed=range(1, 1001)),
+        window_s=meta.number("window_s", low=0.0, high=3600.0, open_low=True),
+        samples=meta.whole("samples", allowed=range(2, 10_001)),
+        features=names,
+        units={name: units.text(name) for name in names},
+        motion_frame=meta.choice("motion_frame", ("world", "skin")),
+        chain=_chain(meta),
+        rows=meta.whole("rows"),
+        data_digest=meta.text("data_digest", empty=True),
+        versions={str(key): str(version) for key, version in versions.items()},
+        decision_points_s=points,
+        stopping=_stopping(meta, len(points)),
+        novelty=read_novelty(meta.table("novelty"), len(points)) if points else None,
+        joints=meta.whole("joints", 0, allowed=range(0, 1001)),
+        kernels=_kernels(meta, names, layout),
+        name=meta.text("name", "", empty=True),
+        trials=meta.texts("trials", ()),
+        usual=_usual(meta, names),
+        several=meta.number("several", 1.0, low=0.0, high=1.0),
+        taught=meta.whole("taught", 0, allowed=range(1 << 31)),
+    )
+    tracking.done()
+    return info
+
+
+def _task(table: ConfigTable) -> Task:
+    labels = table.texts("labels")
+    bare = {label.strip() for label in labels} - {""}
+    if not bare or len(bare) < len(labels) or not "".join(labels).isprintable():
+        raise table.fail("labels", "a list of different, printable texts")
+    factors = table.table("factors")
+    task = Task(
+        labels,
+        k=table.whole("k", allowed=range(1, 1 << 31)),
+        components=table.whole("components", allowed=range(1 << 31)),
+        scaling=table.text("scaling"),
+        accuracy=table.number("accuracy", low=0.0, high=1.0),
+        projection=table.text("projection"),
+        features=table.texts("features"),
+        left_out=table.text("left_out"),
+        no_contact=table.text("no_contact") if table.has("no_contact") else None,
+        factors={factor: factors.wholes(factor) for factor in factors.raw},
+    )
+    table.done()
+    return task
+
+
+def _chain(meta: ConfigTable) -> Chain | None:
+    """The arm, where the model has one."""
+    arm = meta.get("arm", None)
+    if arm is None:
+        return None
+    from edge.touch.arm import Chain
+
+    return Chain.from_dict(arm, where=f"{meta.where}: arm")
+
+
+def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
+    """The stopping rules of each task, where the model has decision points."""
+    if not points:
+        return {}
+    rules = meta.table("stopping")
+    return {task: read_stopping(rules.table(task), points) for task in rules.raw}
+
+
+def read_stopping(table: ConfigTable, points: int) -> Stopping:
+    """The calibration of a task, of a model with this number of decision points.
+
+    Raises:
+        InputError: the table is damaged.
+    """
+    trials = table.whole("trials", allowed=range(1, 1 << 31))
+    return Stopping(
+        slopes=table.numbers("slopes", points, low=0.0, open_low=True),
+        intercepts=table.numbers("intercepts", points),
+        doubts=table.numbers("doubts", points, low=0.0),
+        slope=table.number("slope", low=0.0, open_low=True),
+        intercept=table.number("intercept"),
+        doubt=table.number("doubt", low=0.0),
+        rules=tuple(
+            StoppingRule(
+                error=rule.number("error", low=0.0, high=1.0, open_low=True),
+                mean_s=rule.number("mean_s"),
+                confidence=rule.number("confidence"),
+                last=rule.whole("last", allowed=range(points)),
+            )
+            for rule in table.tables("rules", f"{table.prefix}rules")
+        ),
+        trials=trials,
+        wrong=table.whole("wrong", allowed=range(trials + 1)),
+        risk=table.number("risk", low=0.0, high=1.0, open_low=True),
+    )
+
+
+def read_novelty(table: ConfigTable, points: int) -> Novelty:
+    """The limits of novelty, of a model with this number of decision points.
+
+    Raises:
+        InputError: the table is damaged.
+    """
+    rates = table.numbers("rates")
+    rows = table.get("limits")
+    if not rates or not isinstance(rows, list | tuple) or len(rows) != points:
+        raise table.fail("limits", f"{points} rows of a number for each of the rates")
+    if sorted({0.0, *rates, 1.0}) != [0.0, *rates[::-1], 1.0]:
+        raise table.fail("rates", "numbers between 0 and 1 that fall")
+    limits = []
+    for row in rows:
+        line = ConfigTable({"limits": row}, table.where, table.prefix)
+        numbers = line.numbers("limits", len(rates))
+        if sorted([0.0, *numbers]) != [0.0, *numbers]:
+            raise table.fail("limits", "rows of numbers from 0 on that rise")
+        limits.append(numbers)
+    return Novelty(table.text("task"), rates, tuple(limits))
+
+
+def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]]:
+    """The usual range of each feature, where the model has them."""
+    if not meta.has("usual"):
+        return {}
+    table = meta.table("usual")
+    usual: dict[str, Sequence[float]] = {}
+    for name in names:
+        lowest, highest = table.numbers(name, 2)
+        if lowest > highest:
+            raise table.fail(name, "two numbers that rise")
+        usual[name] = lowest, highest
+    return usual
+
+
+def _kernels(
+    meta: ConfigTable,
+    names: Sequence[str],
+    layout: SkinLayout,
+) -> dict[str, KernelTable]:
+    """{feature: its table} of convolution features."""
+    tables = {}
+    for name in names:
+        if name in KERNELS:
+            from edge.touch.kernels import KernelTable
+
+            table = meta.table("kernels").table(name)
+            tables[name] = KernelTable.from_table(table, name, layout)
+    return tables
+
+
+def _contradictions(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the metadata, as sentences."""
+    yield from _contradictions_of_joints(info)
+    if not info.tasks:
+        yield "its metadata names no task"
+    if info.decision_points_s and not _points_fit(info):
+        yield "its decision points are impossible"
+    if info.trials and len(info.trials) != info.rows:
+        yield f"names {len(info.trials)} of {info.rows} trials"
+    if (info.motion_frame == "world") != (info.chain is not None):
+        yield "its motion frame contradicts its arm"
+    yield from _unprintable(info)
+    yield from _contradictions_of_tasks(info)
+
+
+def _contradictions_of_joints(info: ModelInfo) -> Iterator[str]:
+    of_joints = any(feature.of_joints for feature in feature_types(info.features))
+    if info.joints != ((info.dof or None) if of_joints else 0):
+        features = "joint features" if of_joints else "no joint features"
+        yield f"names {features} but gives {info.joints} joints"
+
+
+def _unprintable(info: ModelInfo) -> Iterator[str]:
+    without_contact = [task.no_contact or "" for task in info.tasks.values()]
+    if not "".join([info.name, *info.tasks, *without_contact]).isprintable():
+        yield "its name, its tasks' names and its answers must be printable"
+    if not "".join(info.trials).isprintable():
+        yield "its trials' names must be printable"
+
+
+def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:
+    """Contradictions in the tasks, as sentences."""
+    for name, task in info.tasks.items():
+        if task.components > info.width:
+            yield (
+                f"task {name!r} has {task.components} components of {info.width} "
+                "features"
+            )
+    labels = {name: task.labels for name, task in info.tasks.items()}
+    for name, factors in info.products.items():
+        from edge.model.agreement import factors_fit  # few models have products
+
+        if not factors_fit(factors, labels, name):
+            yield f"task {name!r} is not the product of its factors"
+
+
+def _points_fit(info: ModelInfo) -> bool:
+    """Whether decision points rise to the window, and each task has its rules."""
+    points = info.decision_points_s
+    rising = sorted({0.0, *points}) == [0.0, *points]
+    if not rising or points[-1] != info.window_s:
+        return False
+    named = info.novelty is not None and info.novelty.task in info.tasks
+    return named and info.stopping.keys() == info.tasks.keys()
