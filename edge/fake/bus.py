@@ -103,12 +103,14 @@ class FakeBus:
             raise bus_error(errno.ENODEV, self.name, address)
         chips = self.chips_at(address)
         self.transactions += 1
-        self.spend(self._count(messages) if chips else NACK_BITS)
-        for message in messages if chips else ():
+        if not chips:
+            self.spend(NACK_BITS)
+            self.stop()
+            raise bus_error(errno.EREMOTEIO, self.name, address)
+        self.spend(self._count(messages))
+        for message in messages:
             self._carry(message, chips)
         self.stop()
-        if not chips:
-            raise bus_error(errno.EREMOTEIO, self.name, address)
 
     def muxes(self) -> list[FakeTCA9548A]:
         """The muxes on the bus."""

@@ -323,11 +323,10 @@ def frame_bits(file: SkinFile, frames: int = 1, overhead_s: float = 0.0) -> list
             bus.bits = bus.transactions = 0
         for _ in range(frames):
             skin.read()
-        bits = []
-        for bus in buses:
-            spent = bus.transactions * overhead_s * bus.clock_hz
-            bits.append((bus.bits + spent) / frames)
-        return bits
+        return [
+            (bus.bits + bus.transactions * overhead_s * bus.clock_hz) / frames
+            for bus in buses
+        ]
 
 
 def frame_rate(bits: Sequence[float], clocks: Sequence[int]) -> float:
@@ -363,8 +362,8 @@ def skin_file(layout: SkinLayout) -> SkinFile:
         kind = ThreeAxisBlock
     most = MOST_TAXELS // (layout.axes or 1)
     taxels = range(layout.rows * layout.cols)
-    shares = [taxels[first : first + most] for first in taxels[::most]]
     chips = tuple(
-        ChipSpec(kind, 0x08 + i, tuple(share)) for i, share in enumerate(shares)
+        ChipSpec(kind, 0x08 + i, tuple(taxels[first : first + most]))
+        for i, first in enumerate(taxels[::most])
     )
     return SkinFile("fake", layout, (BusSpec("fake", chips, clock_hz=1_000_000),))

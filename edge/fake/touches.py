@@ -185,12 +185,12 @@ def _spread(
     if axis == 1 and source.wraps:
         offset = (offset + sources / 2.0) % sources - sources / 2.0
     ratio = pitch(source)[axis] / pitch(onto)[axis]
-    left = (centre + offset * ratio - ratio / 2.0)[:, None]
+    starts = (centre + offset * ratio - ratio / 2.0)[:, None]
     edges = np.arange(taxels) - 0.5
     shares = np.zeros((sources, taxels))
     # A contact that is wider than the skin goes round it as often as it must.
     for turn in range(-2, 3) if axis == 1 and onto.wraps else range(1):
         low = edges + turn * taxels
-        overlap = np.minimum(left + ratio, low + 1.0) - np.maximum(left, low)
+        overlap = np.minimum(starts + ratio, low + 1.0) - np.maximum(starts, low)
         shares += np.maximum(0.0, overlap)
     return shares / ratio

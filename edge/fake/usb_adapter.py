@@ -30,47 +30,15 @@ from edge.bus.protocol import (
 )
 from edge.errors import EdgeError, InputError
 
-VENDOR = 0x0403
-PRODUCT = 0xC631
-"""The USB identity for which the kernel loads its driver."""
-DEVICE_DESCRIPTOR = struct.pack(
-    "<BBHBBBBHHHBBBB",
-    18,
-    1,
-    0x0110,
-    0xFF,
-    0,
-    0,
-    8,
-    VENDOR,
-    PRODUCT,
-    0x0100,
-    0,
-    0,
-    0,
-    1,
+DEVICE_DESCRIPTOR = bytes.fromhex(
+    "12 01 1001 ff 00 00 08"  # USB 1.1, a class of the vendor's own, packets of 8 bytes
+    "0304 31c6 0001"  # vendor and product, for which the kernel loads its driver
+    "00 00 00 01"  # no names, and one configuration
 )
-CONFIGURATION_DESCRIPTOR = struct.pack(
-    "<BBHBBBBB BBBBBBBBB",
-    9,
-    2,
-    18,
-    1,
-    1,
-    0,
-    0x80,
-    50,
-    9,
-    4,
-    0,
-    0,
-    0,
-    0xFF,
-    0,
-    0,
-    0,
+CONFIGURATION_DESCRIPTOR = bytes.fromhex(
+    "09 02 1200 01 01 00 80 32"  # one interface, from a bus that gives 100 mA
+    "09 04 00 00 00 ff 00 00 00"  # which has no endpoint but 0
 )
-"""A single configuration with a single interface; every request goes to endpoint 0."""
 
 STANDARD = 0x00
 """The kind of a request that every USB device answers (bits 5 and 6 of its first
@@ -153,11 +121,9 @@ class UsbAdapter:
             return b""
         except BusError:
             status = -errno.EPIPE
-        done = len(answer) if direction == TO_HOST else len(request) - HEADER
-        return (
-            struct.pack(">5Iiiiii8x", SUBMITTED, number, 0, 0, 0, status, done, 0, 0, 0)
-            + answer
-        )
+        length = len(answer) if direction == TO_HOST else len(request) - HEADER
+        head = struct.pack(">5Iii20x", SUBMITTED, number, 0, 0, 0, status, length)
+        return head + answer
 
     def control(self, setup: bytes, data: bytes = b"") -> bytes:
         """The data that a control request asks for, empty for one that brings data.

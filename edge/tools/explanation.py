@@ -192,21 +192,13 @@ def explain(
     joins = touch.nearest(other_rows & ~votes)
     direction = space.rows[leaves] - space.rows[joins]
     gap = min(touch.squares[leaves] - touch.squares[joins], 0.0)
-    changes = []
+    spreads = {}
     for name in touch.members:
-        change = touch.change(name, direction, gap, len(voters), label)
+        change, spread = touch.change(name, direction, gap, len(voters), label)
         if change is not None:
-            changes.append(change)
-    changes.sort(key=lambda change: change.spread)
-    ordered = tuple(change.least for change in changes)
-    return Explanation(nearest, touch.near(rival), pulls, ordered)
-
-
-class _Sized(NamedTuple):
-    """A change, and its mean square in deviations of the training trials."""
-
-    spread: float
-    least: Change
+            spreads[change] = spread
+    changes = tuple(sorted(spreads, key=spreads.__getitem__))
+    return Explanation(nearest, touch.near(rival), pulls, changes)
 
 
 class _Touch:
@@ -264,8 +256,9 @@ class _Touch:
         gap: float,
         k: int,
         label: int,
-    ) -> _Sized | None:
-        """The least change of a feature that gives k voters another label, if any.
+    ) -> tuple[Change | None, float]:
+        """The least change of a feature that gives k voters another label, if any, and
+        its mean square in deviations of the training trials.
 
         Args:
             feature: its name.
@@ -278,7 +271,7 @@ class _Touch:
         columns = self.members[feature]
         slope = 2.0 * self.space.weights[columns] @ direction
         if not slope.any():
-            return None
+            return None, 0.0
         step = slope * (gap / (slope @ slope))
         for times in STEPS:
             changed = self.differences.copy()
@@ -287,6 +280,6 @@ class _Touch:
             if answer != label:
                 x = times * step / self.space.gain[columns]
                 size = float(np.sqrt((x**2).mean()))
-                least = Change(feature, answer, size, float(x.mean()))
-                return _Sized(times**2 * (step**2).mean(), least)
-        return None
+                change = Change(feature, answer, size, float(x.mean()))
+                return change, times**2 * float((step**2).mean())
+        return None, 0.0

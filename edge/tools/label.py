@@ -370,7 +370,7 @@ def changed(
     meta: Mapping[str, Any],
     labels: Mapping[str, str],
     *,
-    names: Mapping[str, str] | None = None,
+    names: Mapping[str, str] = {},
     without: Sequence[str] = (),
 ) -> dict[str, str]:
     """A recording's labels after a change.
@@ -383,11 +383,10 @@ def changed(
         without: tasks whose label is taken away.
 
     Raises:
-        InputError: the recording has a task of the new name, or its contacts have their
-            own labels.
+        InputError: another task of the recording has or takes the new name, or its
+            contacts have their own labels.
     """
     current = meta.get("labels", {})
-    names = names or {}
     _check_names(name, current, names)
     if meta.get("contacts") and (names or labels or without):
         raise InputError(

@@ -96,7 +96,7 @@ class Page:
             "scale": self._scale,
             "units": {"force": layout.force_unit, "motion": layout.length_unit},
             "folder": None if folder is None else str(folder),
-            "choices": {task: list(names) for task, names in (choices or {}).items()},
+            "choices": choices or {},
             "decides": decides,
         }
         self.server = WebServer(address, self._act)
@@ -217,8 +217,10 @@ class Page:
             labels = {**self.labels, **_labels(action)}
             self.labels = _labels({"labels": labels})
         elif kind == "unlabel":
-            self.labels = _without(self.labels, action.get("task"))
-            self.recording &= bool(self.labels)
+            labels = dict(self.labels)
+            labels.pop(str(action.get("task")), None)
+            self.labels = labels
+            self.recording &= bool(labels)
         elif kind == "record":
             self._switch(bool(action.get("on")))
         elif kind == "undo":
@@ -243,7 +245,8 @@ class Page:
         """Label or delete a trial, so that it can be taken back.
 
         Raises:
-            InputError: the page shows no such trial, or it cannot be read or written.
+            InputError: the page shows no such trial, it has no decision to accept, or
+                it cannot be read or written.
         """
         name = action.get("file")
         if name not in list(self._trials):
@@ -254,10 +257,14 @@ class Page:
             del self._trials[path.name]
             self._version += 1
         else:
-            trial = load(path)
+            meta = load(path).meta
             accepts = action["do"] == "accept"
-            labels = _accepted(path.name, trial) if accepts else _labels(action)
-            label.change_all({path: label.changed(str(path), trial.meta, labels)})
+            labels = review.accepted(meta) if accepts else _labels(action)
+            if not labels:
+                raise InputError(
+                    f"{name}: no decision names a label that it does not have yet"
+                )
+            label.change_all({path: label.changed(str(path), meta, labels)})
             self._show_trial(path)
         self._undo = path.name
 
@@ -272,27 +279,10 @@ class Page:
 
 def _decision(event: Decided) -> Json:
     """A decision for the page, with the nearest training trials."""
-    neighbours: list[tuple[str, float]] = []
-    if event.decision is not None:
-        distances = event.decision.distances.round(3).tolist()
-        neighbours = list(zip(event.nearest, distances, strict=True))
+    decision = event.decision
+    distances = [] if decision is None else decision.distances.round(3).tolist()
+    neighbours = list(zip(event.nearest, distances, strict=True))
     return {**event.to_dict(), "neighbours": neighbours}
-
-
-def _accepted(name: str, trial: Recording) -> dict[str, str]:
-    """The labels that accept a kept touch's decisions.
-
-    Raises:
-        InputError: it has none.
-    """
-    labels = review.accepted(trial.meta)
-    if not labels:
-        raise InputError(f"{name}: no decision names a label that it does not have yet")
-    return labels
-
-
-def _without(labels: Mapping[str, str], task: object) -> dict[str, str]:
-    return {name: label for name, label in labels.items() if name != task}
 
 
 def _labels(action: Json) -> dict[str, str]:

@@ -13,7 +13,7 @@ import math
 import os
 import re
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from itertools import count
@@ -122,6 +122,7 @@ class Trials:
         )
         self._frames: list[Frame] | None = None
         self._saved: Contact | None = None
+        self._onset_s = -math.inf
 
     def push(self, frame: Frame) -> list[Frame] | None:
         """Take in a frame; returns the frames of a trial that this frame completes."""
@@ -133,10 +134,10 @@ class Trials:
             if contact is None or contact is self._saved:
                 return None
             self._saved = contact
+            self._onset_s = contact.onset_s
             self._frames = list(self._before)
         over = contact is None or contact.ended
-        age_s = math.inf if self._saved is None else frame.t - self._saved.onset_s
-        return self.rest() if over or age_s >= self._length else None
+        return self.rest() if over or frame.t - self._onset_s >= self._length else None
 
     @property
     def under_way(self) -> bool:
@@ -202,14 +203,12 @@ def trial_path(out: Path, labels: dict[str, str]) -> Path:
     stem = plain[:LONGEST_STEM] or "trial"
     with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
         if out.suffix != ".npz":
-            paths = (out / f"{stem}-{number:03}.npz" for number in count(1))
             # A deleted trial may come back under its name.
-            deleted = out / DELETED
-            return next(
-                path
-                for path in paths
-                if not (os.path.lexists(path) or os.path.lexists(deleted / path.name))
-            )
+            folders = (out, out / DELETED)
+            for number in count(1):
+                name = f"{stem}-{number:03}.npz"
+                if not any(os.path.lexists(folder / name) for folder in folders):
+                    return out / name
         with suppress(FileNotFoundError):
             out.lstat()
             raise InputError(f"{out}: exists already; choose another name or remove it")
@@ -250,14 +249,14 @@ def run(arguments: argparse.Namespace) -> int:
             live.page,
             arguments.label if by_key else [],
         )
-        _announce(recorder.choices, by_key)
+        _announce(recorder.choices)
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
         most = arguments.trials if folder else 1
         for frame, faults in live.frames():
             events = [] if classifier is None else classifier.push(frame)
             lines.write([*faults, *(event.to_dict() for event in events)])
-            recorder.press_all(typed())
+            recorder.press(typed())
             live.show(frame, faults, events)
             recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
@@ -267,12 +266,12 @@ def run(arguments: argparse.Namespace) -> int:
     return _status(arguments, recorder, live.skin)
 
 
-def _model(path: Path | None) -> Model | None:
+def _model(path: str | None) -> Model | None:
     return None if path is None else Model(path)
 
 
-def _announce(choices: Sequence[tuple[str, str]], by_key: bool) -> None:
-    LOG.info("waiting for a contact" + (KEYS if by_key else ""))
+def _announce(choices: Sequence[tuple[str, str]]) -> None:
+    LOG.info("waiting for a contact" + (KEYS if choices else ""))
     for digit, (task, label) in zip(DIGITS, choices, strict=False):
         LOG.info(f"  {digit}  {task}={label}")
 
@@ -427,23 +426,19 @@ class Recorder:
     def __post_init__(self) -> None:
         self.held = self.labels
 
-    def press_all(self, keys: Iterable[str]) -> None:
-        """Do what each of some keys asks for."""
+    def press(self, keys: str) -> None:
+        """Take keys: a number chooses its label, d deletes the last trial, where no page
+        does so."""
+        choices = dict(zip(DIGITS, self.choices, strict=False))
         for key in keys:
-            self.press(key)
-
-    def press(self, key: str) -> None:
-        """Take a key: a number chooses its label, d deletes the last trial."""
-        if self.page is not None:
-            return
-        if key in DIGITS[: len(self.choices)]:
-            task, label = self.choices[DIGITS.index(key)]
-            self.labels = {**self.labels, task: label}
-            LOG.info(f"next: {labels_text(self.labels)}")
-        elif key in ("d", "D") and self.paths:
-            path = self.paths.pop()
-            delete([path])
-            self.lines.write([{"event": "deleted", "file": str(path)}])
+            if key in choices:
+                task, label = choices[key]
+                self.labels = {**self.labels, task: label}
+                LOG.info(f"next: {labels_text(self.labels)}")
+            elif key in "dD" and self.paths and self.page is None:
+                path = self.paths.pop()
+                delete([path])
+                self.lines.write([{"event": "deleted", "file": str(path)}])
 
     @property
     def count(self) -> int:
@@ -477,16 +472,17 @@ class Recorder:
 
     def _save(self, frames: list[Frame], complete: bool) -> None:
         """Save the frames of a trial under the next free name."""
-        unposed = sum(frame.joints is None for frame in frames)
         meta = {**self.meta, "labels": self.held, "complete": complete}
         first = frames[0].t
         decided = [event for event in self.decided if event.onset_s >= first]
         if decided:
             meta["decided"] = decisions_of(decided)
         self.decided.clear()
-        if self.names is not None and unposed < len(frames):
-            meta["joint_names"] = list(self.names)
         trial = recording(frames, meta)
+        unposed = sum(frame.joints is None for frame in frames)
+        posed = unposed < len(frames)
+        if posed and self.names is not None:
+            meta["joint_names"] = list(self.names)
         while True:
             path = trial_path(self.out, self.held)
             meta["trial"] = path.stem
@@ -494,31 +490,22 @@ class Recorder:
                 save(path, trial, overwrite=False)
                 break
         self.paths.append(path)
-        self.any_joints |= trial.joints is not None
-        self.lines.write([self._saved_event(path, trial, unposed)])
-        if self.page is not None:
-            self.page.saved(path, trial)
-
-    def _saved_event(
-        self,
-        path: Path,
-        trial: Recording,
-        unposed: int,
-    ) -> dict[str, Any]:
-        """The event of a saved trial, some frames of which have no joint angles."""
+        self.any_joints |= posed
         event = {
             "event": "saved",
             "file": str(path),
             "labels": self.held,
-            "frames": len(trial.t),
-            "seconds": round(float(trial.t[-1] - trial.t[0]), 3),
-            "joints": trial.joints is not None,
+            "frames": len(frames),
+            "seconds": round(float(trial.t[-1]), 3),
+            "joints": posed,
             "missing_taxels": trial.valid is not None,
-            "complete": trial.meta["complete"],
+            "complete": complete,
         }
-        if trial.joints is not None and unposed:
+        if 0 < unposed < len(frames):
             LOG.warning(
-                f"{path}: {unposed} of {len(trial.t)} frames have no joint angles"
+                f"{path}: {unposed} of {len(frames)} frames have no joint angles"
             )
             event["frames_without_joints"] = unposed
-        return event
+        self.lines.write([event])
+        if self.page is not None:
+            self.page.saved(path, trial)

@@ -143,15 +143,15 @@ def _replay(
     return failed
 
 
-def compared(name: str, first: Summary, other_name: str, other: Summary) -> str:
+def compared(name: str, first: Summary, second_name: str, second: Summary) -> str:
     """The gains and losses of a second model on the same labelled recordings, by task."""
-    lines = [f"{other_name} compared with {name}:"]
-    for task in first.hits.keys() & other.hits.keys():
-        shared = first.hits[task].keys() & other.hits[task].keys()
+    lines = [f"{second_name} compared with {name}:"]
+    for task in first.hits.keys() & second.hits.keys():
+        shared = first.hits[task].keys() & second.hits[task].keys()
         if not shared:
             continue
         changes = Counter(
-            other.hits[task][path] - first.hits[task][path] for path in shared
+            second.hits[task][path] - first.hits[task][path] for path in shared
         )
         gained = changes[1]
         lost = changes[-1]
@@ -190,12 +190,12 @@ class Summary:
         self.recordings += 1
         # Of several decisions for a task, the first one stays.
         first: dict[str, str] = {}
-        as_trained = False
+        flags: set[str] = set()
         for event in events:
             if event["event"] == "decision":
-                as_trained = as_trained or AS_TRAINED in event["flags"]
+                flags |= set(event["flags"])
                 first.setdefault(event["task"], printable(event["label"] or UNDECIDED))
-        self.as_trained += as_trained
+        self.as_trained += AS_TRAINED in flags
         for task in self._pairs.keys() & labels:
             truth = printable(labels[task])
             decided = first.get(task, UNDECIDED)

@@ -42,9 +42,9 @@ def counts_text(labels: Labels) -> list[str]:
     for task in sorted(set().union(*labels)):
         counts = label_counts(task, labels)
         total = counts.total()
-        parts = ", ".join(f"{label} {count}" for label, count in counts.most_common(12))
+        names = ", ".join(f"{label} {count}" for label, count in counts.most_common(12))
         more = f" and {len(counts) - 12} more" if len(counts) > 12 else ""
-        lines.append(f"{task} ({total} of {len(labels)}): {parts}{more}")
+        lines.append(f"{task} ({total} of {len(labels)}): {names}{more}")
     return lines
 
 
@@ -79,13 +79,13 @@ def _rare_labels(task: str, labels: Labels) -> list[str]:
 def _meant(name: str, count: int, counts: Mapping[str, int]) -> str | None:
     """The more frequent name that one is probably a slip of."""
     plain = _plain(name)
-    for other, frequent in counts.items():
+    for candidate, frequent in counts.items():
         share = FEW_SHARE if len(plain) > SHORT else RARE_SHARE
         is_rare = count <= share * frequent
-        if is_rare and other != name and _alike(plain, _plain(other)):
-            return other
-        if _plain(other) == plain and (frequent, other) > (count, name):
-            return other
+        if is_rare and candidate != name and _alike(plain, _plain(candidate)):
+            return candidate
+        if _plain(candidate) == plain and (frequent, candidate) > (count, name):
+            return candidate
     return None
 
 
@@ -94,12 +94,12 @@ def _plain(name: str) -> str:
     return SPACES.sub("", name.casefold())
 
 
-def _alike(plain: str, other: str) -> bool:
+def _alike(first: str, second: str) -> bool:
     """Whether two names without case and spaces differ by few letters."""
-    longest = max(len(plain), len(other))
-    if any(part.isdigit() for part in plain + other) or longest < SHORT:
+    longest = max(len(first), len(second))
+    if any(letter.isdigit() for letter in first + second) or longest < SHORT:
         return False
-    matcher = SequenceMatcher(None, plain, other)
+    matcher = SequenceMatcher(None, first, second)
     equal = sum(block.size for block in matcher.get_matching_blocks())
     return longest - equal <= max(1, longest // LETTERS_PER_SLIP)
 

@@ -104,10 +104,10 @@ def unknown_labels(
     """
     unknown = {}
     for task, entry in info.tasks.items():
-        counts = label_counts(task, labels)
-        for label in entry.labels:
-            counts.pop(label, 0)
-        unknown[task] = dict(sorted(counts.items()))
+        counts = sorted(label_counts(task, labels).items())
+        unknown[task] = {
+            label: count for label, count in counts if label not in entry.labels
+        }
     return unknown
 
 
@@ -188,7 +188,8 @@ def taught(
     with parsing(model.path, "a model that can be taught", "; export it again"):
         graph = Graph(model.contents)
         for task, entry in info.tasks.items():
-            indices = label_indices(entry.labels, task, labels)
+            index = {label: i for i, label in enumerate(entry.labels)}
+            indices = np.array([index.get(trial.get(task, ""), -1) for trial in labels])
             z = _values(graph, coordinates_of(graph, task), vectors)
             outside = (indices >= 0) & ~within_reach(graph, task, z)
             if outside.any():
@@ -259,26 +260,14 @@ def _check_labels(info: ModelInfo, name: str, labels: Labels) -> None:
     )
 
 
-def label_indices(
-    classes: Sequence[str],
-    task: str,
-    labels: Sequence[Labels],
-) -> Integers:
-    """(m,) index of each trial's label for a task; -1 where it has none."""
-    index = {label: i for i, label in enumerate(classes)}
-    return np.array([index.get(trial.get(task, ""), -1) for trial in labels])
-
-
 def _novelty_rows(graph: Graph, vectors: Floats) -> dict[str, Array]:
     """The constants of the novelty's rows with further ones.
 
     A trial beyond the reach of the stored type is placed at its edge.
     """
-    (product,) = (
-        node
-        for node in graph.makers.values()
-        if node.operator == "Gemm" and NOVELTY_LENGTHS in _sources(graph, node)
-    )
+    product = _reader(graph, NOVELTY_LENGTHS)
+    if product.operator == "Gather":  # by decision point
+        product = _reader(graph, product.outputs[0])
     y = _values(graph, product.inputs[0], vectors)
     limits = np.iinfo(graph.constants[NOVELTY_COLUMNS].dtype)
     columns = np.clip(-2.0 * y.swapaxes(1, 2), limits.min + 1, limits.max - 1)
@@ -286,13 +275,9 @@ def _novelty_rows(graph: Graph, vectors: Floats) -> dict[str, Array]:
     return _extended(graph, {NOVELTY_COLUMNS: columns, NOVELTY_LENGTHS: lengths})
 
 
-def _sources(graph: Graph, node: Node) -> set[str]:
-    """The constants of a product, taken by decision point or not."""
-    sources = set(node.inputs)
-    for name in node.inputs:
-        if name in graph.makers:
-            sources.update(graph.makers[name].inputs)
-    return sources
+def _reader(graph: Graph, name: str) -> Node:
+    """The first node that takes a value."""
+    return next(node for node in graph.makers.values() if name in node.inputs)
 
 
 def _values(graph: Graph, name: str, vectors: Floats) -> Floats:

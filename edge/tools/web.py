@@ -10,6 +10,7 @@ see them or act; the token is looked at before all else.
 import asyncio
 import json
 import math
+import re
 import secrets
 import selectors
 import socket
@@ -205,7 +206,7 @@ class WebServer:
             request = await reader.readuntil(b"\r")
         except asyncio.LimitOverrunError:
             return _answer(HTTPStatus.REQUEST_URI_TOO_LONG)
-        method, path, query = _parts(request)
+        method, path, query = _request_line(request)
         if path not in OPEN and not self._has_token(query):
             return _answer(HTTPStatus.UNAUTHORIZED, WRONG_TOKEN)
         try:
@@ -222,21 +223,21 @@ class WebServer:
 
     def _has_token(self, query: str) -> bool:
         """Whether one of the query's values is the token."""
-        values = [part[6:] for part in query.split("&") if part.startswith("token=")]
-        if len(values) != 1 or len(values[0]) > 2 * len(self.token):
-            return False
-        return secrets.compare_digest(values[0].encode(), self.token.encode())
+        expected = f"token={self.token}".encode()
+        return any(
+            secrets.compare_digest(value.encode(), expected)
+            for value in query.split("&")
+        )
 
     def _is_for_us(self, fields: Mapping[str, str], address: str) -> bool:
         """Whether the request names this server, and comes from its own page."""
         host = fields.get("host")
         if host is None:
             return True  # HTTP 1.0 names none
-        name = host.rpartition(":")[0] if not host.endswith("]") else host
+        page = f"http://{host}"
+        name = re.sub(r":\d*$", "", host).removesuffix(".local")
         hosts = self._names | {address, f"[{address}]"}
-        origin = fields.get("origin")
-        from_here = origin is None or origin == f"http://{host}"
-        return from_here and (name or host).removesuffix(".local") in hosts
+        return fields.get("origin", page) == page and name in hosts
 
     def _contents(self, path: str) -> bytes:
         """The answer with a file, or the beginning of a stream of pictures."""
@@ -297,7 +298,7 @@ async def _send(writer: StreamWriter, data: bytes) -> None:
             await writer.drain()
 
 
-def _parts(request: bytes) -> tuple[str, str, str]:
+def _request_line(request: bytes) -> tuple[str, str, str]:
     """Method, path and query of a request's first line."""
     words = request.decode("latin-1").split(" ")
     if len(words) != 3:
