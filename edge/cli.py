@@ -128,12 +128,10 @@ def _status(program: str, arguments: argparse.Namespace) -> int:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
         return status
-    except InputError as error:
-        print(f"{program}: {error}", file=sys.stderr)
-        return 2
     except EdgeError as error:
         print(f"{program}: {error}", file=sys.stderr)
-        return 3  # a device may be there a moment later
+        # A device may be there a moment later.
+        return 2 if isinstance(error, InputError) else 3
     except BrokenPipeError:
         _discard_output()  # the reader of the output has closed the pipe
         return 0
@@ -192,8 +190,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     if first in workstation.COMMANDS:
         return workstation.run(words)
-    known = [*COMMANDS, *workstation.COMMANDS]
-    return workstation.refuse_command(top.prog, first, known)
+    commands = [*COMMANDS, *workstation.COMMANDS]
+    return workstation.refuse_command(top.prog, first, commands)
 
 
 # The interpreter's last garbage collection would visit every imported object, which

@@ -73,14 +73,13 @@ def parse_json(text: str | bytes, where: str) -> Any:
 
 
 def _number(value: object) -> float:
-    """A number as a float; NaN where it is none, or not finite."""
+    """A number as a float; NaN where it is none, infinite where it is too large."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:
-        number = float(value)
+        return float(value)
     except OverflowError:  # a whole number larger than any float
-        return math.nan
-    return number if math.isfinite(number) else math.nan
+        return math.inf
 
 
 def _range_text(low: float, high: float, open_low: bool) -> str:
@@ -184,7 +183,7 @@ class ConfigTable:
         value = self.get(key, default) if value is REQUIRED else value
         number = _number(value)
         in_range = low < number <= high or (number == low and not open_low)
-        if math.isnan(number) or not in_range:
+        if not (in_range and math.isfinite(number)):
             raise self.fail(key, _range_text(low, high, open_low), value)
         return number
 

@@ -5,7 +5,7 @@ import logging
 import os
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO, Self
 
@@ -153,9 +153,8 @@ def checked(path: str, recording: Recording, scale: float | None = None) -> Reco
             _typed("shear", recording.shear, np.int16, (*frames.shape, 2))
         elif layout.axes:
             raise InputError("meta.skin says axes = 3, but shear is missing")
-        labels = _labels(meta.get("labels", {}))
-        if labels:
-            meta["labels"] = labels
+        if "labels" in meta:
+            meta["labels"] = _labels(meta["labels"])
         if meta.get("joint_names") is not None:
             _check_joint_names(meta["joint_names"], joints)
     return Recording(t, frames, joints, recording.valid, meta, recording.shear)
@@ -290,13 +289,12 @@ def load_arrays(
             something other than plain arrays.
     """
     name = os.fspath(path)
-    with ExitStack() as stack:
-        if file is None:
-            file = stack.enter_context(open_regular(name, LARGEST_BYTES))
-        stack.enter_context(
-            parsing(name, "a readable .npz file", "; copy or record it again")
-        )
-        archive = stack.enter_context(zipfile.ZipFile(file))
+    opened = open_regular(name, LARGEST_BYTES) if file is None else nullcontext(file)
+    with (
+        opened as contents,
+        parsing(name, "a readable .npz file", "; copy or record it again"),
+        zipfile.ZipFile(contents) as archive,
+    ):
         members = {}
         for info in archive.infolist():
             key = info.filename.removesuffix(".npy")
@@ -311,7 +309,7 @@ def load_arrays(
             with archive.open(info) as stream:
                 array = np.lib.format.read_array(stream, allow_pickle=False)
                 arrays[key] = np.asarray(array)
-        return arrays
+    return arrays
 
 
 def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:

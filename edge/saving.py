@@ -64,10 +64,8 @@ def save(
         still = shear.doubt(recording.shear)
         if still is not None:
             LOG.warning(f"{name}: {still}")
-    arrays = {}
-    for key in KEYS[:-1]:
-        if getattr(recording, key) is not None:
-            arrays[key] = getattr(recording, key)
+    fields = {key: getattr(recording, key) for key in KEYS if key != "meta"}
+    arrays = {key: array for key, array in fields.items() if array is not None}
     save_arrays(name, arrays, recording.meta, overwrite=overwrite, lasting=lasting)
 
 
@@ -101,9 +99,8 @@ def find(paths: list[str]) -> list[Path]:
     """
     files: list[Path] = []
     for path in map(Path, paths):
-        inside = [path]
-        if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-            inside = recordings_in(path)
+        # Path.is_dir raises for a name that is too long.
+        inside = recordings_in(path) if os.path.isdir(path) else [path]
         if not inside:
             raise InputError(f"{path}: no .npz recording in this folder")
         files += inside
@@ -115,7 +112,7 @@ def recordings_in(folder: Path) -> list[Path]:
     deleted recordings; sorted."""
     files = []
     for path in folder.rglob("*.npz"):
-        parts = path.relative_to(folder).parts
-        if not any(part.startswith(".") for part in parts):
+        names = path.relative_to(folder).parts
+        if not any(name.startswith(".") for name in names):
             files.append(path)
     return sorted(files)

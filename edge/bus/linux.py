@@ -109,7 +109,7 @@ class LinuxBus:
         try:
             smbus.open(device)
             if not smbus.funcs & smbus2.I2cFunc.I2C:
-                raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+                raise OSError(errno.EOPNOTSUPP, "no plain I2C")
             flock(smbus.fd, LOCK_EX | LOCK_NB)
             ioctl(
                 smbus.fd,
@@ -163,13 +163,13 @@ class LinuxBus:
                 given.
         """
         try:
-            done = ioctl(self._fd, I2C_RDWR, prepared.handle)
+            completed = ioctl(self._fd, I2C_RDWR, prepared.handle)
         except (OSError, ValueError) as error:
             # A closed bus has the file descriptor -1, which ioctl answers with
             # ValueError.
-            code = error.errno if isinstance(error, OSError) else errno.ENODEV
+            code = getattr(error, "errno", errno.ENODEV)
             raise bus_error(code, self.name, prepared.messages[0].address) from None
-        if done != len(prepared.messages):
+        if completed != len(prepared.messages):
             # The kernel stopped half way without an error, and the buffer holds an
             # older reading.
             raise bus_error(errno.EIO, self.name, prepared.messages[0].address)

@@ -160,11 +160,7 @@ def write(address: int, data: bytes | Sequence[int]) -> Message:
 def read(address: int, into: NDArray[np.uint8] | int) -> Message:
     """A message of bytes from a chip, into the given array or a new one."""
     buffer = np.zeros(into, dtype=np.uint8) if isinstance(into, int) else into
-    if (
-        buffer.dtype != np.uint8
-        or not buffer.flags.c_contiguous
-        or not buffer.flags.writeable
-    ):
+    if buffer.dtype != np.uint8 or not buffer.flags.carray:
         raise ValueError("a read needs a writable, contiguous uint8 array")
     return Message(address, buffer, read=True)
 

@@ -81,6 +81,10 @@ class Block(Chip):
     """
 
     name = "block"
+    axes: ClassVar[int] = 1
+    """Numbers of a frame for each taxel."""
+    flags: ClassVar[int] = 0
+    """Bits of the identity beside the number of bits per taxel."""
     options: ClassVar[Mapping[str, Option]] = {"bits": Option(16, BITS)}
     unchanged_frames = UNCHANGED_FRAMES
     frame_pointer = FRAME
@@ -109,9 +113,9 @@ class Block(Chip):
             WrongChip: it serves something else.
             BusError: it does not answer.
         """
-        size = 4 + data_bytes(self.values(taxels), bits)
+        size = 4 + data_bytes(self.axes * taxels, bits)
         super().__init__(bus, address, into=size if into is None else into)
-        self._expected = self.register(taxels, bits)
+        self._expected = identity(taxels, bits | self.flags)
         self._identity = bus.prepare(write(address, IDENTITY), read(address, 10))
         served = fetch(bus, address, IDENTITY, 10)
         if served == self._expected:
@@ -121,16 +125,6 @@ class Block(Chip):
                 f"serves {described(served)}, not {described(self._expected)}"
             )
         raise self.wrong("not a microcontroller that serves frames")
-
-    @staticmethod
-    def register(taxels: int, bits: int) -> bytes:
-        """The identity register that it must serve."""
-        return identity(taxels, bits)
-
-    @staticmethod
-    def values(taxels: int) -> int:
-        """Numbers of a frame."""
-        return taxels
 
     @classmethod
     def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:

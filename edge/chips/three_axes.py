@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.chips.block import THREE_AXES, Block, data_bytes, identity, unpack
+from edge.chips.block import THREE_AXES, Block, data_bytes, unpack
 from edge.chips.chip import MOST_TAXELS, Chip, ChipSpec, Option, Parsed, Traits
 from edge.config import ConfigTable
 from edge.errors import InputError
@@ -28,16 +28,8 @@ class ThreeAxisBlock(Block):
 
     options: ClassVar[Mapping[str, Option]] = {"bits": Option(BITS, (BITS,))}
     rests_at_zero = False
-
-    @staticmethod
-    def register(taxels: int, bits: int) -> bytes:
-        """The identity register that it must serve."""
-        return identity(taxels, bits | THREE_AXES)
-
-    @staticmethod
-    def values(taxels: int) -> int:
-        """Numbers of a frame."""
-        return AXES * taxels
+    axes = AXES
+    flags = THREE_AXES
 
     @staticmethod
     def traits(taxels: int, options: Mapping[str, int]) -> Traits:

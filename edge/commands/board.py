@@ -7,10 +7,11 @@ import pwd
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from edge import __version__
 from edge.model.info import FORMAT
@@ -50,7 +51,8 @@ def look(root: Path = Path("/")) -> Iterator[Row]:
             yield _missing(package)
     yield from _devices(root)
     groups = sorted(map(_group, {os.getegid(), *os.getgroups()}))
-    yield Row("user", f"{_user(os.geteuid())}; groups {', '.join(groups)}")
+    user = _name(pwd.getpwuid, os.geteuid())
+    yield Row("user", f"{user}; groups {', '.join(groups)}")
     yield from _state()
 
 
@@ -104,16 +106,14 @@ def _device(root: Path, device: Path, group: str) -> Row:
     return Row(f"/dev/{device.name}", owner, remedy)
 
 
-def _user(number: int) -> str:
-    """The name of a user; the number where it has none, as in many containers."""
-    try:
-        return pwd.getpwuid(number).pw_name
-    except KeyError:
-        return str(number)
-
-
 def _group(number: int) -> str:
+    return _name(grp.getgrgid, number)
+
+
+def _name(entry: Callable[[int], Any], number: int) -> str:
+    """A name from a database of users or groups; the number where it has none, as in
+    many containers."""
     try:
-        return grp.getgrgid(number).gr_name
+        return str(entry(number)[0])
     except KeyError:
         return str(number)

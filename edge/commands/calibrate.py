@@ -197,15 +197,6 @@ def _apart(former: TaxelCalibration | None) -> str:
     return "beyond the others" if former is None else "off the former calibration"
 
 
-def _warn_of_rest(middle: int, onset: int) -> None:
-    """Warn of a skin that rests above 0, though it can rest at 0."""
-    if middle > onset:
-        LOG.warning(
-            f"the skin rests at about {middle} counts, not at 0; that is wrong if "
-            "something covers it"
-        )
-
-
 def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int64]:
     """Counts (rows, cols) by which working taxels rest beyond the usual differences to
     others of their kind, in the direction of a touch.
@@ -220,8 +211,11 @@ def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int
         signs = np.repeat([c.sign for c in chips], [len(c.served) for c in chips])
         rest = baseline.ravel()[taxels].astype(np.int64)
         middle = int(np.median(rest))
-        if kind.rests_at_zero and signs.min() > 0:
-            _warn_of_rest(middle, file.layout.onset)
+        if kind.rests_at_zero and signs.min() > 0 and middle > file.layout.onset:
+            LOG.warning(
+                f"the skin rests at about {middle} counts, not at 0; that is wrong if "
+                "something covers it"
+            )
         above = (rest - middle) * signs
         usual = int(SPREADS * np.median(np.abs(above)))
         change[taxels] = np.maximum(above - usual, 0)

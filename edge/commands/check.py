@@ -9,9 +9,8 @@ versions, clock, load and disk, with a remedy for each shortcoming.
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.util import find_spec
-from typing import Self
 
 from edge.commands.options import within
 from edge.commands.output import Output, counted
@@ -65,16 +64,12 @@ def faults(file: SkinFile) -> Iterator[str]:
             f"reaches the threshold of {file.layout.threshold_counts} counts; calibrate "
             "again with nothing on the skin, or raise threshold_counts"
         )
-    if _noise_touches(file):
+    signal = file.signal
+    if onset == 0 and signal.dead_band_sigma == 0.0 and signal.dead_band_counts == 0:
         yield (
             "noise of one count begins a contact: set threshold_counts and "
             "onset_counts, or dead_band_sigma"
         )
-
-
-def _noise_touches(file: SkinFile) -> bool:
-    no_dead_band = file.signal.dead_band_sigma == 0.0
-    return file.layout.onset == 0 and no_dead_band and not file.signal.dead_band_counts
 
 
 def remarks(file: SkinFile) -> Iterator[str]:
@@ -140,21 +135,21 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.skin is None:
         return check_board(output)
     file = load(arguments.skin)
-    wires = Wires.of(file, arguments.overhead)
+    frame_bits, rate_hz = wires(file, arguments.overhead)
     wrong = list(faults(file))
     remarked = list(remarks(file))
     if arguments.model is not None:
         model = Model(arguments.model)
         remarked += differences(model.info.layout, file.layout)
     target_hz = file.reading.rate_hz
-    if wires.rate_hz < target_hz:
+    if rate_hz < target_hz:
         wrong.append(
-            f"the file asks for {target_hz:g} Hz, but the wires carry {wires.rate_hz:.1f} "
+            f"the file asks for {target_hz:g} Hz, but the wires carry {rate_hz:.1f} "
             "Hz: use more buses, a faster clock_hz or baud, or a lower [read] rate_hz"
         )
     buses = []
     lines = [heading(arguments.skin, file)]
-    for bus, bits in zip(file.buses, wires.bits, strict=True):
+    for bus, bits in zip(file.buses, frame_bits, strict=True):
         entry = {"device": bus.device, "chips": len(bus.chips)}
         buses.append({**entry, "clock_hz": bus.clock_hz, "bits": bits})
         lines.append(
@@ -163,7 +158,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{'kbit/s' if bus.serial else 'kHz'}"
         )
     lines.append(
-        f"The wires carry {wires.rate_hz:.1f} frames a second, with "
+        f"The wires carry {rate_hz:.1f} frames a second, with "
         f"{arguments.overhead:g} us of software for each transaction; the file asks "
         f"for {target_hz:g}."
     )
@@ -175,7 +170,7 @@ def run(arguments: argparse.Namespace) -> int:
         "taxels": file.layout.rows * file.layout.cols,
         "chips": len(file.chips),
         "buses": buses,
-        "frame_rate_hz": round(wires.rate_hz, 1),
+        "frame_rate_hz": round(rate_hz, 1),
         "overhead_us": arguments.overhead,
         "asked_hz": target_hz,
         "remarks": wrong + remarked,
@@ -191,26 +186,18 @@ def heading(path: str, file: SkinFile) -> str:
     return f"{path}: {file.name}, {rows} x {cols} taxels on {chips}"
 
 
-@dataclass(frozen=True)
-class Wires:
-    """The load of a skin's buses.
+def wires(file: SkinFile, overhead_us: float) -> tuple[list[float], float]:
+    """Count the bits of a frame on each bus while the drivers read fake chips.
 
-    Attributes:
-        bits: of a frame on each bus.
-        rate_hz: frames a second that they carry with the software's time.
+    Returns:
+        The bits, and the frames a second that the wires carry with the software's time
+        for each transaction.
     """
+    from edge.fake.player import (  # a check of the board needs no chips
+        frame_bits,
+        frame_rate,
+    )
 
-    bits: list[float]
-    rate_hz: float
-
-    @classmethod
-    def of(cls, file: SkinFile, overhead_us: float) -> Self:
-        """Count the bits while the drivers read fake chips."""
-        from edge.fake.player import (  # a check of the board needs no chips
-            frame_bits,
-            frame_rate,
-        )
-
-        spent = frame_bits(file, FRAMES, overhead_us * 1e-6)
-        clocks = [bus.clock_hz for bus in file.buses]
-        return cls(frame_bits(file, FRAMES), frame_rate(spent, clocks))
+    spent = frame_bits(file, FRAMES, overhead_us * 1e-6)
+    clocks = [bus.clock_hz for bus in file.buses]
+    return frame_bits(file, FRAMES), frame_rate(spent, clocks)

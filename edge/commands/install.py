@@ -116,9 +116,9 @@ def prove(path: Path, golden: Path, skin: str | None) -> None:
             LOG.warning(f"{path}: {sentence}")
 
 
-def with_end(path: Path, end: str) -> Path:
-    """The path with a longer name."""
-    return path.with_name(path.name + end)
+def former_of(path: Path) -> Path:
+    """The path of the file that was replaced."""
+    return path.with_name(path.name + FORMER)
 
 
 def place(model: Path, golden: Path, target: Path) -> None:
@@ -137,13 +137,13 @@ def keep_former(goal: Path, data: bytes) -> bool:
     former = read_bytes(goal, LARGEST_BYTES)
     if former == data:  # installed twice, it would be its own way back
         return False
-    _write(with_end(goal, FORMER), former)
+    _write(former_of(goal), former)
     return True
 
 
 def _return_by_itself(target: Path) -> bool:
     """Bring the former model back; whether there is one."""
-    if not with_end(target, FORMER).is_file():
+    if not former_of(target).is_file():
         return False
     go_back(target)
     LOG.error(f"{target}: the former model is back")
@@ -156,10 +156,10 @@ def go_back(target: Path) -> None:
     Raises:
         InputError: there is no former model.
     """
-    if not with_end(target, FORMER).is_file():
+    if not former_of(target).is_file():
         raise InputError(f"{target}: has no former model to go back to")
     for goal in (target.with_name("golden.npz"), target):
-        former = with_end(goal, FORMER)
+        former = former_of(goal)
         if former.is_file():
             _write(goal, read_bytes(former, LARGEST_BYTES))
             os.unlink(former)
@@ -203,11 +203,10 @@ def is_active_of(service: str) -> Callable[[], bool]:
 
 def runs_on(
     is_active: Callable[[], bool],
-    prove_s: float = PROVE_S,
     sleep: Callable[[float], None] = time.sleep,
 ) -> bool:
     """Whether a service runs at every look for so long."""
-    for _ in range(round(prove_s / LOOK_S)):
+    for _ in range(round(PROVE_S / LOOK_S)):
         sleep(LOOK_S)
         if not is_active():
             return False

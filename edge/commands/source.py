@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +42,9 @@ def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     """The event of a chip's state, with `more` keys."""
     event = {"event": "chip", **more, "bus": status.bus, "place": status.spec.route}
     event["state"] = status.state
-    return {**event, "error": status.error} if status.error else event
+    if status.error:
+        event["error"] = status.error
+    return event
 
 
 @dataclass(frozen=True)
@@ -162,17 +164,15 @@ class Reading:
         skin = self.skin
         for frame in self.loop.frames():
             events: list[dict[str, Any]] = []
+            t = frame.t
             for name, lost in skin.bus_changes():
                 state = "lost" if lost else "back"
-                events.append(
-                    {"event": "bus", "t": frame.t, "bus": name, "state": state}
-                )
+                events.append({"event": "bus", "t": t, "bus": name, "state": state})
             silent = skin.silent_changes()
             if silent is not None:
-                taxels = {"event": "taxels", "t": frame.t, "invalid": silent}
+                taxels = {"event": "taxels", "t": t, "invalid": silent}
                 events.append({**taxels, "frames": SILENT_FRAMES})
-            for status in skin.changes():
-                events.append(chip_event(status, t=frame.t))
+            events += [chip_event(status, t=t) for status in skin.changes()]
             yield frame, events
 
     def show(
@@ -237,37 +237,19 @@ def reading(
         stop = stack.enter_context(stop_on(*ending_signals()))
         if model is not None and needs_joints and arguments.joints is None:
             model.require_joints(opened.dof, opened.source)
-        joints = stack.enter_context(_joints(arguments.joints, opened, arm, dof))
-        loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
+        skin = opened.skin
+        joints: JointSource | None = opened.playback if opened.dof else None
+        if arguments.joints is not None:
+            from edge.touch.joint_stream import open_joints  # few arms send angles
+
+            names = None if arm is None else arm.names
+            stream = open_joints(arguments.joints, dof, names, skin.clock.real)
+            joints = stack.enter_context(stream)
+        loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
         live = None
         if arguments.web is not None:
-            live = stack.enter_context(_page(arguments.web, opened, page))
+            from edge.tools.page import open_page  # few runs have a page
+
+            served = open_page(arguments.web, skin.layout, title=opened.source, **page)
+            live = stack.enter_context(served)
         yield Reading(opened, loop, stop, live, Output.of(arguments))
-
-
-def _page(
-    address: str,
-    opened: Opened,
-    options: Mapping[str, Any],
-) -> AbstractContextManager[Page]:
-    from edge.tools.page import open_page  # few runs have a page
-
-    return open_page(address, opened.skin.layout, title=opened.source, **options)
-
-
-@contextmanager
-def _joints(
-    option: str | None,
-    opened: Opened,
-    arm: Chain | None,
-    dof: int | None,
-) -> Iterator[JointSource | None]:
-    """The joint angles that another program sends, or those of a played recording."""
-    if option is None:
-        yield opened.playback if opened.dof else None
-        return
-    from edge.touch.joint_stream import open_joints  # few arms send angles
-
-    names = None if arm is None else arm.names
-    with open_joints(option, dof, names, opened.skin.clock.real) as joints:
-        yield joints

@@ -152,15 +152,15 @@ class Lines:
             InputError: the address is not of that form, or its host is unknown.
         """
         self._socket = None
+        self._writers = list(more)
         if udp is not None:
             from edge.address import sender_to  # few runs send datagrams
 
             self._socket = sender_to("--udp ", udp)
-        write = _line_by_line(sys.stdout if out is None else out)
-        self._out = LineWriter("stdout", write, form, patient)
-        self._writers = [self._out, *more]
-        if udp is not None and self._socket is not None:
             self._writers.append(LineWriter(udp, self._socket.send, patient=patient))
+        write = _line_by_line(out or sys.stdout)
+        self._out = LineWriter("stdout", write, form, patient)
+        self._writers.insert(0, self._out)
 
     @property
     def unheard(self) -> bool:

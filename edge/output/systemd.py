@@ -32,9 +32,10 @@ class Notifier:
         self._now = now
         address = environment.get("NOTIFY_SOCKET", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
-        watched = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
-        microseconds = environment.get("WATCHDOG_USEC", "") if watched else ""
-        allowed = int(microseconds) if microseconds.isdecimal() else 0
+        process = str(os.getpid())
+        watched = environment.get("WATCHDOG_PID", process) == process
+        microseconds = environment.get("WATCHDOG_USEC", "")
+        allowed = int(microseconds) if watched and microseconds.isdecimal() else 0
         self.period_s = 0.5e-6 * allowed if allowed else NEVER
         """Half of the time that the manager allows between two signs of life; infinity
         if it does not watch."""

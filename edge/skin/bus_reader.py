@@ -213,8 +213,10 @@ class BusReader:
             share = -(-len(slots) // OLDEST_FRAMES)
             first = self._frame % OLDEST_FRAMES * share
             slots = slots[first : first + share]
-        for _, channel in groupby(slots, key=_channel_of):
-            self._read_channel([*channel])
+        for _, channel in groupby(
+            slots, key=lambda slot: (slot.spec.mux, slot.spec.channel)
+        ):
+            self._read_channel(list(channel))
         self._recheck()
         # After the reading, so that a broken chip costs the intact ones no time.
         self._bring_back(deadline)
@@ -317,8 +319,7 @@ class BusReader:
         gone = isinstance(error, BusGone)
         if gone:
             self.bus.close()
-        failed = self.slots if gone or self._timeouts > 1 else [slot]
-        for failing in failed:
+        for failing in self.slots if gone or self._timeouts > 1 else [slot]:
             failing.fail(error, now)
 
     def _is_due(self, slot: Slot) -> bool:
@@ -401,7 +402,3 @@ class BusReader:
                 beside=self._muxes.values(),
             )
         return self._muxes[spec.mux].channel(spec.channel)
-
-
-def _channel_of(slot: Slot) -> tuple[int | None, int | None]:
-    return slot.spec.mux, slot.spec.channel

@@ -27,19 +27,11 @@ def calibration_text(calibration: TaxelCalibration) -> str:
     lines = ["[calibration]\n"]
     if calibration.taken is not None:
         lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
-    arrays = {
-        "baseline": calibration.baseline.tolist(),
-        "noise": calibration.noise.round(3).tolist(),
-    }
-    if calibration.shear_baseline is not None:
-        arrays["shear_baseline"] = calibration.shear_baseline.tolist()
-    if calibration.shear_noise is not None:
-        arrays["shear_noise"] = calibration.shear_noise.round(3).tolist()
-    for key, rows in arrays.items():
-        lines.append(f"{key} = [\n")
-        for row in rows:
-            lines.append(f"  {row},\n")
-        lines.append("]\n")
+    for key in ("baseline", "noise", "shear_baseline", "shear_noise"):
+        array = getattr(calibration, key)
+        if array is not None:
+            rows = [f"  {row},\n" for row in array.round(3).tolist()]
+            lines += [f"{key} = [\n", *rows, "]\n"]
     return "".join(lines)
 
 

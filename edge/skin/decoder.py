@@ -153,7 +153,9 @@ class Decoder:
         one of them, and the bytes (n, frame_bytes) of all."""
         groups = []
         start = 0
-        for _, group in groupby(chips, key=_form):
+        for _, group in groupby(
+            chips, key=lambda chip: (chip.kind, len(chip.taxels), chip.options)
+        ):
             neighbours = list(group)
             end = start + len(neighbours) * neighbours[0].traits.frame_bytes
             data = self._bytes[start:end].reshape(len(neighbours), -1)
@@ -201,12 +203,8 @@ class Decoder:
 
     def _parse(self) -> None:
         """Parse the bytes of all chips into the stages' values."""
-        values = []
-        intact = []
-        for spec, data in self._groups:
-            chip_values, chip_intact = spec.kind.parse(data, spec)
-            values.append(chip_values)
-            intact.append(chip_intact)
+        parsed = [spec.kind.parse(data, spec) for spec, data in self._groups]
+        values, intact = zip(*parsed, strict=True)
         self._raw[:-1] = np.concatenate(values, axis=None)
         self._intact[:-1] = np.concatenate(intact, axis=None)
 
@@ -221,10 +219,6 @@ class Decoder:
         self._unchanged[changed] = 0
         np.copyto(self._before, self._bytes)
         return self._unchanged >= self._limits
-
-
-def _form(chip: ChipSpec) -> tuple[object, ...]:
-    return chip.kind, len(chip.taxels), chip.options
 
 
 class Baseline:
@@ -309,5 +303,5 @@ def dead_band(signal: Signal, noise: ArrayLike) -> NDArray[np.int32]:
         noise: standard deviations of the values; 0 where they are unknown.
     """
     sigmas = np.multiply(signal.dead_band_sigma, noise)
-    band = np.ceil(np.minimum(sigmas, 65535.0)).astype(np.int32)
-    return np.asarray(np.maximum(band, max(1, signal.dead_band_counts)))
+    band = np.clip(sigmas, max(1, signal.dead_band_counts), 65535)
+    return np.asarray(np.ceil(band), dtype=np.int32)

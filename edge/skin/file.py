@@ -141,11 +141,13 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     skin.done()
     layout = SkinLayout.from_dict(skin.raw, where=where)
     signals = top.table("signal", {})
-    sign = signals.whole("sign", 1, (1, -1)) if signals.has("sign") else None
+    sign = signals.whole("sign", allowed=(1, -1)) if signals.has("sign") else None
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     chips = [chip for bus in buses for chip in bus.chips]
-    defaults = _defaults(chips)
+    # Chips that differ have the defaults of no kind.
+    kinds = {chip.traits.defaults for chip in chips}
+    defaults = kinds.pop() if len(kinds) == 1 else Defaults()
     signal = _signal(signals, layout, defaults)
     if not skin.has("threshold_counts") and defaults.threshold_counts:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
@@ -158,28 +160,17 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
 
 
-def _defaults(chips: Sequence[ChipSpec]) -> Defaults:
-    """The defaults of the chips; for chips that differ, those of no kind."""
-    first = chips[0].traits.defaults
-    if all(chip.traits.defaults == first for chip in chips):
-        return first
-    return Defaults()
-
-
 def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signal:
     dead = table.get("dead", [])
     if not isinstance(dead, list):
         raise table.fail("dead", "a list of [row, col]")
     rate = defaults.drift_counts_per_s
     limit = defaults.drift_limit_counts
+    band = defaults.dead_band_counts
     counts = range(65536)
     signal = Signal(
         dead_band_sigma=table.number("dead_band_sigma", 6.0, 0.0, 100.0),
-        dead_band_counts=table.whole(
-            "dead_band_counts",
-            defaults.dead_band_counts,
-            counts,
-        ),
+        dead_band_counts=table.whole("dead_band_counts", band, counts),
         drift_counts_per_s=table.number("drift_counts_per_s", rate, 0.0, 65535.0),
         drift_limit_counts=table.whole("drift_limit_counts", limit, counts),
         settle_s=table.number("settle_s", 0.5, 0.0, 60.0),
@@ -207,9 +198,7 @@ def _calibration(
     layout: SkinLayout,
     chips: list[ChipSpec],
 ) -> TaxelCalibration:
-    rest = _array(table, "baseline", layout, "whole numbers")
-    if (rest != np.floor(rest)).any():
-        raise _no_array(table, "baseline", layout, "whole numbers")
+    baseline = _array(table, "baseline", layout, "whole numbers").astype(np.uint16)
     noise = _array(table, "noise", layout, "numbers")
     taken = table.get("taken", None)
     if taken is not None and not isinstance(taken, datetime):
@@ -219,7 +208,6 @@ def _calibration(
         shear_rest = _array(table, "shear_baseline", layout, "pairs").astype(np.uint16)
         shear_noise = _array(table, "shear_noise", layout, "pairs")
     table.done()
-    baseline = rest.astype(np.uint16)
     for chip in chips:
         highest = max(baseline.flat[chip.served], default=0)
         if highest > chip.traits.highest:
@@ -242,21 +230,14 @@ def _array(
     try:
         array = np.array(table.get(key), dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        # No numbers, or rows of different lengths.
-        raise _no_array(table, key, layout, numbers) from None
-    shape = (*layout.shape, 2) if key.startswith("shear") else layout.shape
-    if array.shape != shape or not ((array >= 0) & (array <= 65535)).all():
-        raise _no_array(table, key, layout, numbers)
+        array = np.empty(0)  # no numbers, or rows of different lengths
+    shape = (*layout.shape, 2) if numbers == "pairs" else layout.shape
+    allowed = (array >= 0) & (array <= 65535)
+    if numbers == "whole numbers":
+        allowed &= array == np.floor(array)
+    if array.shape != shape or not allowed.all():
+        raise InputError(
+            f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
+            "from 0 to 65535; delete [calibration], and calibrate again"
+        )
     return array
-
-
-def _no_array(
-    table: ConfigTable,
-    key: str,
-    layout: SkinLayout,
-    numbers: str,
-) -> InputError:
-    return InputError(
-        f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
-        "from 0 to 65535; delete [calibration], and calibrate again"
-    )

@@ -96,9 +96,10 @@ class Skin:
             from edge.skin.shear import ShearReader  # few skins have three axes
 
             self._shear = ShearReader(file, self._decoder.rows)
-        self._valid = np.zeros(taxels, dtype=np.bool_)
-        self._invalid_for = np.zeros(taxels, dtype=np.int64)
-        """Frames in a row without a valid value of each taxel."""
+        self._valid = np.zeros(file.layout.shape, dtype=np.bool_)
+        self.invalid_for = np.zeros(file.layout.shape, dtype=np.int64)
+        """(rows, cols) number of frames in a row for which a taxel has had no valid
+        value; 0 for a taxel that is dead or has no chip."""
         self._silent = 0
         self._since_silent = 0
         self._touched_at = -math.inf
@@ -158,14 +159,11 @@ class Skin:
 
     def status(self) -> list[ChipStatus]:
         """The state of each chip, in the file's order."""
-        statuses = []
-        for reader in self.readers:
-            for slot in reader.slots:
-                error = str(slot.error or "")
-                statuses.append(
-                    ChipStatus(reader.bus.name, slot.spec, slot.state, error)
-                )
-        return statuses
+        return [
+            ChipStatus(reader.bus.name, slot.spec, slot.state, str(slot.error or ""))
+            for reader in self.readers
+            for slot in reader.slots
+        ]
 
     def bus_changes(self) -> list[tuple[str, bool]]:
         """The buses that were lost or came back since the last call: (name, lost).
@@ -192,15 +190,6 @@ class Skin:
         pairs = zip(self.status(), former, strict=True)
         return [status for status, state in pairs if status.state != state]
 
-    @property
-    def invalid_for(self) -> NDArray[np.int64]:
-        """Number of frames in a row (rows, cols) for which a taxel has had no valid
-        value.
-
-        It is 0 for a taxel that is dead or has no chip.
-        """
-        return self._invalid_for.reshape(self.layout.shape)
-
     def silent_changes(self) -> int | None:
         """Number of taxels silent for `SILENT_FRAMES` frames, if it has changed.
 
@@ -208,7 +197,7 @@ class Skin:
         most.
         """
         self._since_silent += 1
-        silent = int((self._invalid_for >= SILENT_FRAMES).sum())
+        silent = int((self.invalid_for >= SILENT_FRAMES).sum())
         if silent == self._silent or self._since_silent < SILENT_FRAMES:
             return None
         self._silent = silent
@@ -234,8 +223,7 @@ class Skin:
 
     def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
         """The last frame's raw values (rows, cols), and which of them are valid."""
-        shape = self.layout.shape
-        return self._decoder.values.reshape(shape), self._valid.reshape(shape)
+        return self._decoder.values.reshape(self.layout.shape), self._valid
 
     def raw_shear(self) -> NDArray[np.uint16] | None:
         """The last frame's raw shear (rows, cols, 2) of a skin of three axes."""
@@ -245,12 +233,13 @@ class Skin:
 
     def _assemble(self, t: float) -> Frame:
         decoder = self._decoder
+        shape = self.layout.shape
         valid = decoder.decode(self._slots, t, t - self.oldest_s)
-        self._valid = valid
+        self._valid = valid.reshape(shape)
         counts = self.baseline.above(decoder.values)
         counts *= valid
-        self._invalid_for += 1
-        self._invalid_for *= decoder.taxels.served & ~valid
+        self.invalid_for += 1
+        self.invalid_for *= (decoder.taxels.served & ~valid).reshape(shape)
         # The baseline follows drift, except during a contact and shortly after it.
         if int(counts.max()) > self.touch_counts:
             self._touched_at = t
@@ -261,10 +250,8 @@ class Skin:
         shear = None
         if self._shear is not None:
             shear = self._shear.read(valid, settled=settled)
-        shape = self.layout.shape
         times = decoder.times.reshape(shape)
-        counts = counts.reshape(shape)
-        return Frame(t, counts, valid.reshape(shape), times, shear=shear)
+        return Frame(t, counts.reshape(shape), self._valid, times, shear=shear)
 
     def close(self) -> None:
         """Stop the threads and close the buses; twice is fine."""

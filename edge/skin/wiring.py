@@ -241,7 +241,14 @@ def _check_buses(buses: Sequence[BusSpec], layout: SkinLayout, where: str) -> No
             raise InputError(f"{place} has the same device as bus {former}")
         _check_addresses(bus, place)
         for index, chip in enumerate(bus.chips):
-            _claim_taxels(chip, f"bus {number} chip {index}", owners, layout, where)
+            for taxel in chip.served:
+                if taxel in owners:
+                    row, col = divmod(taxel, layout.cols)
+                    raise InputError(
+                        f"{place} chip {index}: taxel [{row}, {col}] belongs to "
+                        f"{owners[taxel]} already"
+                    )
+                owners[taxel] = f"bus {number} chip {index}"
 
 
 def _check_addresses(bus: BusSpec, place: str) -> None:
@@ -254,8 +261,9 @@ def _check_addresses(bus: BusSpec, place: str) -> None:
     # While its channel is connected, a chip behind a mux also hears messages to the
     # chips on the bus itself, so these claim their addresses first.
     order = sorted(enumerate(bus.chips), key=lambda item: item[1].mux is not None)
-    claimed: dict[tuple[int | None, ...], str] = {}
-    claimed.update({(None, None, mux): "a mux" for mux in muxes})
+    claimed: dict[tuple[int | None, ...], str] = {
+        (None, None, mux): "a mux" for mux in muxes
+    }
     for index, chip in order:
         route = (chip.mux, chip.channel, chip.address)
         owner = claimed.get(route) or claimed.get((None, None, chip.address))
@@ -264,20 +272,3 @@ def _check_addresses(bus: BusSpec, place: str) -> None:
                 f"{place} chip {index} has the same address as {owner}, {chip.route}"
             )
         claimed[route] = f"chip {index}"
-
-
-def _claim_taxels(
-    chip: ChipSpec,
-    place: str,
-    owners: dict[int, str],
-    layout: SkinLayout,
-    where: str,
-) -> None:
-    for taxel in chip.served:
-        if taxel in owners:
-            row, col = divmod(taxel, layout.cols)
-            raise InputError(
-                f"{where}: {place}: taxel [{row}, {col}] belongs to {owners[taxel]} "
-                "already"
-            )
-        owners[taxel] = place

@@ -36,35 +36,35 @@ def raising(error):
 
 def test_every_command_has_help_of_its_own(capsys):
     for name in cli.COMMANDS:
-        with pytest.raises(SystemExit) as left:
+        with pytest.raises(SystemExit) as ended:
             cli.main([name, "--help"])
-        assert left.value.code == 0
+        assert ended.value.code == 0
         assert f"edge-classify {name} " in capsys.readouterr().out
 
 
 def test_without_a_command_the_commands_are_listed(capsys):
     assert cli.main([]) == 2
-    said = capsys.readouterr().out
-    assert all(re.search(rf"^    {name}\s", said, re.M) for name in cli.COMMANDS)
+    text = capsys.readouterr().out
+    assert all(re.search(rf"^    {name}\s", text, re.M) for name in cli.COMMANDS)
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"),
+    ("typed", "sentence"),
     [
         ("reply", "there is no command 'reply'; did you mean 'replay'?"),
         ("calibrat", "did you mean 'calibrate'?"),
         ("dance!", "the commands are check, scan,"),
     ],
 )
-def test_a_typing_error_is_answered_by_the_nearest_command(typed, said, capsys):
+def test_a_typing_error_is_answered_by_the_nearest_command(typed, sentence, capsys):
     assert cli.main([typed]) == 2
     err = capsys.readouterr().err
-    assert said in err
+    assert sentence in err
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize(("flag", "said"), [("-q", ["e"]), ("--json", ["i", "w", "e"])])
-def test_quiet_leaves_errors(flag, said, capsys, monkeypatch):
+@pytest.mark.parametrize(("flag", "letters"), [("-q", ["e"]), ("--json", ["i", "w", "e"])])
+def test_quiet_leaves_errors(flag, letters, capsys, monkeypatch):
     def run(arguments):
         log = logging.getLogger("edge.somewhere")
         for level in (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR):
@@ -75,7 +75,7 @@ def test_quiet_leaves_errors(flag, said, capsys, monkeypatch):
     top = cli.parser(["check"])
     assert cli.dispatch(top, ["check", flag, "skin.toml"]) == 0
     assert capsys.readouterr().err == "".join(
-        f"edge-classify: {word}\n" for word in said
+        f"edge-classify: {letter}\n" for letter in letters
     )
     assert logging.getLogger("edge").handlers == []
 
@@ -84,7 +84,7 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
     """As bash with argcomplete asks for them."""
     pytest.importorskip("argcomplete")
     line = "edge-classify rec"
-    asked = {
+    environment = {
         **os.environ,
         "_ARGCOMPLETE": "1",
         "_ARGCOMPLETE_STDOUT_FILENAME": "/dev/stdout",
@@ -92,7 +92,7 @@ def test_a_shell_is_told_the_commands_that_a_word_begins():
         "COMP_POINT": str(len(line)),
         "COMP_TYPE": "9",
     }
-    assert python("-m", "edge", env=asked).stdout.split() == ["record"]
+    assert python("-m", "edge", env=environment).stdout.split() == ["record"]
 
 
 @pytest.mark.parametrize(("error", "status"), [(InputError, 2), (BusMissing, 3)])

@@ -8,9 +8,9 @@ from edge.clock import SystemClock
 
 def test_it_returns_no_sooner_than_it_was_asked_to():
     clock = SystemClock()
-    wanted = clock.now() + 0.002
-    clock.sleep_until(wanted)
-    assert clock.now() >= wanted
+    moment = clock.now() + 0.002
+    clock.sleep_until(moment)
+    assert clock.now() >= moment
 
 
 def test_a_moment_that_has_passed_is_not_waited_for(monkeypatch):

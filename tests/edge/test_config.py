@@ -16,7 +16,7 @@ HUGE = 10**5000
 BEYOND_FLOATS = 10**400
 
 
-def said(check):
+def mistake(check):
     with pytest.raises(InputError) as caught:
         check(
             ConfigTable(
@@ -74,7 +74,7 @@ def said(check):
     ],
 )
 def test_each_mistake_is_one_sentence(check, sentence):
-    assert sentence in said(check)
+    assert sentence in mistake(check)
 
 
 def test_what_is_right_is_taken_as_it_is():

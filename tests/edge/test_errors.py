@@ -6,12 +6,12 @@ from edge.errors import EdgeError
 
 
 @pytest.mark.parametrize(
-    ("given", "shown"),
+    ("text", "printed"),
     [
         ("a: unknown key b\nc", "a: unknown key b\\nc"),
         ("tab\there, \x1b[31mred", "tab\\there, \\x1b[31mred"),
         ("Käse: 3 x 4 taxels", "Käse: 3 x 4 taxels"),
     ],
 )
-def test_what_does_not_print_is_written_out(given, shown):
-    assert str(EdgeError(given)) == shown
+def test_what_does_not_print_is_written_out(text, printed):
+    assert str(EdgeError(text)) == printed

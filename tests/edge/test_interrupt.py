@@ -10,16 +10,16 @@ from tests.conftest import python
 
 
 def test_ctrl_c_comes_at_the_end_of_the_block(interruptible):
-    done = []
+    steps = []
 
     @delayed()
     def load():
         signal.raise_signal(signal.SIGINT)
-        done.append("all of it")
+        steps.append("all of it")
 
     with pytest.raises(KeyboardInterrupt):
         load()
-    assert done == ["all of it"]
+    assert steps == ["all of it"]
     assert signal.getsignal(signal.SIGINT) is interruptible
 
 
@@ -70,7 +70,7 @@ start("edge.cli", ["run", "--model", str(demo.MODEL), "--fake", str(demo.recordi
 
 
 def test_extension_modules_that_lose_ctrl_c_are_imported_within_it():
-    done = python("-c", HEARD)
-    assert done.returncode == 0
+    process = python("-c", HEARD)
+    assert process.returncode == 0
     losing = ("numpy.random", "onnxruntime")
-    assert [name for name in done.stderr.split() if name.startswith(losing)] == []
+    assert [name for name in process.stderr.split() if name.startswith(losing)] == []

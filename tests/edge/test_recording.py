@@ -188,8 +188,8 @@ def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(
 def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path):
     counts = np.arange(2 * 12).reshape(2, 12)
     meta = {"labels": {"object": np.int64(3)}, "skin": {"rows": 3, "cols": 4}}
-    given = Recording(np.array([0.0, 0.5], np.float32), counts.astype(kind), meta=meta)
-    save(tmp_path / "a.npz", given)
+    recording = Recording(np.array([0.0, 0.5], np.float32), counts.astype(kind), meta=meta)
+    save(tmp_path / "a.npz", recording)
     back = load(tmp_path / "a.npz")
     assert back.frames.dtype == np.dtype(np.uint16)
     assert back.t.dtype == np.dtype(np.float64)
@@ -207,7 +207,7 @@ def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("factor", "said"),
+    ("factor", "warning"),
     [
         (1.0, ""),
         (
@@ -225,14 +225,14 @@ def test_times_that_do_not_seem_to_be_in_seconds_are_named(
     tmp_path,
     caplog,
     factor,
-    said,
+    warning,
 ):
     recording = make_touch()
     save(tmp_path / "a.npz", replace(recording, t=recording.t * factor))
-    assert (said in caplog.text) if said else not caplog.text
+    assert (warning in caplog.text) if warning else not caplog.text
     caplog.clear()
     load(tmp_path / "a.npz")
-    assert (said in caplog.text) if said else not caplog.text
+    assert (warning in caplog.text) if warning else not caplog.text
 
 
 def test_a_folder_without_recordings_is_named(tmp_path):

@@ -25,10 +25,10 @@ def left_by_a_dead_run(folder):
 
 
 def test_what_a_dead_run_left_is_removed_before_a_run_writes(tmp_path):
-    left = left_by_a_dead_run(tmp_path)
+    leftover = left_by_a_dead_run(tmp_path)
     (tmp_path / ".edge-classify-undo.json").write_text("[]")
     check_writable(tmp_path)
-    assert not left.exists()
+    assert not leftover.exists()
     assert [path.name for path in tmp_path.iterdir()] == [".edge-classify-undo.json"]
 
 
@@ -43,10 +43,10 @@ def test_a_file_that_is_being_written_stays(tmp_path):
 
 
 def test_a_young_file_stays_as_it_may_not_be_locked_yet(tmp_path):
-    left = left_by_a_dead_run(tmp_path)
-    os.utime(left)
+    leftover = left_by_a_dead_run(tmp_path)
+    os.utime(leftover)
     remove_leftovers(tmp_path)
-    assert left.exists()
+    assert leftover.exists()
 
 
 def test_a_folder_that_is_missing_is_not_made(tmp_path):

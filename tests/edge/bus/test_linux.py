@@ -97,10 +97,10 @@ def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
 
 def test_the_process_that_holds_a_lock_is_named(tmp_path):
     path = tmp_path / "i2c"
-    with path.open("w") as held, path.open("w") as wanted:
-        assert linux.lock_holder(wanted.fileno()) == "another program"
-        fcntl.flock(held, fcntl.LOCK_EX)
-        assert linux.lock_holder(wanted.fileno()).endswith(f" ({os.getpid()})")
+    with path.open("w") as locked, path.open("w") as blocked:
+        assert linux.lock_holder(blocked.fileno()) == "another program"
+        fcntl.flock(locked, fcntl.LOCK_EX)
+        assert linux.lock_holder(blocked.fileno()).endswith(f" ({os.getpid()})")
 
 
 @pytest.fixture
@@ -120,12 +120,12 @@ def test_an_adapter_is_known_by_the_beginning_of_its_name_whatever_its_number(ad
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("i801", "no such bus"), ("bcm", "several adapters")]
+    ("name", "sentence"), [("i801", "no such bus"), ("bcm", "several adapters")]
 )
 def test_an_adapter_whose_name_is_unknown_or_not_unique_is_refused(
     name,
-    said,
+    sentence,
     adapters,
 ):
-    with pytest.raises(protocol.BusMissing, match=f"^{name}: {said}"):
+    with pytest.raises(protocol.BusMissing, match=f"^{name}: {sentence}"):
         linux.find_device(name, adapters)

@@ -44,9 +44,9 @@ WHOLE_SKIN = """
 
 def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
     log = tmp_path / "log"
-    done = run(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
-    assert done.stdout == "384 0\n"
-    assert done.stderr == ""
+    process = run(library, WHOLE_SKIN, I2CDEV_LOG=str(log))
+    assert process.stdout == "384 0\n"
+    assert process.stderr == ""
     # 20 ms are two of the adapter's units of 10 ms, on each of the three buses.
     assert log.read_text() == "timeout 2\n" * 3
 
@@ -54,7 +54,7 @@ def test_a_whole_skin_is_read_through_the_ioctl_path(library, tmp_path):
 def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
     """Its buffer still holds the former reading: old values must not pass for new
     ones."""
-    done = run(
+    process = run(
         library,
         """
         import os
@@ -68,15 +68,15 @@ def test_a_call_that_the_kernel_completes_in_part_is_no_reading(library):
         """,
         I2CDEV_SHORT="0x70",
     )
-    assert done.stdout.startswith("/dev/i2c-1, address 0x70: the transfer broke off"), (
-        done.stderr
-    )
+    assert process.stdout.startswith(
+        "/dev/i2c-1, address 0x70: the transfer broke off"
+    ), process.stderr
 
 
 def test_a_bus_that_another_program_uses_is_refused(library):
     opening = "from edge.bus.linux import LinuxBus; LinuxBus('/dev/i2c-1')"
-    done = run(library, opening, I2CDEV_LOCKED="1")
-    assert done.stderr.splitlines()[-1] == (
+    process = run(library, opening, I2CDEV_LOCKED="1")
+    assert process.stderr.splitlines()[-1] == (
         "edge.bus.protocol.BusBusy: /dev/i2c-1: another program is using the bus; end "
         "it first (EBUSY)"
     )
@@ -86,14 +86,14 @@ def test_an_address_that_a_driver_of_the_kernel_owns_costs_its_chips_and_is_name
     library,
 ):
     sentences = "    print(sorted({s.error.partition(': ')[2] for s in skin.status() if s.error}))"
-    done = run(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
-    valid, sentences = done.stdout.splitlines()
+    process = run(library, WHOLE_SKIN + sentences, I2CDEV_OWNED="0x2E")
+    valid, sentences = process.stdout.splitlines()
     assert valid == f"{384 - 8 * 12} 0"
     assert sentences == "['a driver of the kernel owns the address; unbind it (EBUSY)']"
 
 
 def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
-    done = run(
+    process = run(
         library,
         """
         from edge.bus.linux import LinuxBus
@@ -108,7 +108,7 @@ def test_a_bus_that_was_closed_is_gone_and_can_be_opened_again(library):
         print(fetch(bus, 0x70, b"", 1))
         """,
     )
-    assert done.stdout == (
+    assert process.stdout == (
         "/dev/i2c-1, address 0x70: the adapter has gone; plug it in again "
         "(ENODEV)\nb'\\x00'\n"
     )

@@ -82,9 +82,9 @@ def test_a_skin_of_three_axes_reads_its_blocks_so():
     (chip,) = parse(block).chips
     assert chip.kind is ThreeAxisBlock
     assert chip.traits.frame_bytes == 4 + 6 * 6
-    one = parse(block.replace("axes = 3", "axes = 1"))
-    assert one.chips[0].kind is Block
-    assert one.layout.axes is None
+    plain = parse(block.replace("axes = 3", "axes = 1"))
+    assert plain.chips[0].kind is Block
+    assert plain.layout.axes is None
 
 
 def test_a_chip_of_one_axis_is_refused():

@@ -66,10 +66,10 @@ def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
     deviation,
 ):
     fake = ("--skin", skin, "--fake", quiet, *options)
-    (first,), (again,) = (
+    (first,), (repetition,) = (
         edge("calibrate", *fake, "--frames", 180)[1] for _ in range(2)
     )
-    assert first == again
+    assert first == repetition
     file = skinfile.load(skin)
     assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
         deviation, rel=0.03
@@ -113,7 +113,7 @@ def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
 
 
 UNUSABLE = pytest.mark.parametrize(
-    ("value", "share", "said"),
+    ("value", "share", "sentence"),
     [
         (
             20946,
@@ -152,7 +152,7 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
     spoil,
     value,
     share,
-    said,
+    sentence,
 ):
     spoil(value, share)
     arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
@@ -160,7 +160,7 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
         status, _, err = edge(*arguments, *options)
         assert status == 2
         assert skinfile.load(skin).calibration is None
-        assert said in err
+        assert sentence in err
 
 
 @UNUSABLE
@@ -171,7 +171,7 @@ def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force
     spoil,
     value,
     share,
-    said,
+    sentence,
 ):
     arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
     assert edge(*arguments)[0] == 0

@@ -23,7 +23,7 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "status", "said"),
+    ("text", "status", "sentence"),
     [
         (mpr121(signal="sign = 1"), 1, "a touch lowers an MPR121's values"),
         (
@@ -40,11 +40,11 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
         ),
     ],
 )
-def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, said):
+def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, sentence):
     (tmp_path / "skin.toml").write_text(text)
-    got, (event,), _ = edge("check", tmp_path / "skin.toml")
-    assert said in " ".join(event["remarks"])
-    assert got == status
+    exit_status, (event,), _ = edge("check", tmp_path / "skin.toml")
+    assert sentence in " ".join(event["remarks"])
+    assert exit_status == status
 
 
 def test_several_muxes_on_a_bus_are_advised_against(edge, tmp_path):
@@ -97,24 +97,24 @@ def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin)
 
 
 @pytest.mark.parametrize(
-    ("more", "rate", "said"),
+    ("more", "rate", "sentence"),
     [
         ("", 46.8, "asks for 100 Hz, but the wires carry 46.8 Hz"),
         ("verify_mux = false\n", 47.7, "but the wires carry 47.7 Hz"),
     ],
 )
-def test_check_says_where_the_wires_are_too_slow(edge, skin, more, rate, said):
+def test_check_says_where_the_wires_are_too_slow(edge, skin, more, rate, sentence):
     text = (
         skin.read_text()
         .replace("verify_mux = true", "")
         .replace("[read]\n", f"[read]\n{more}")
     )
     skin.write_text(text.replace("clock_hz = 400_000", "clock_hz = 150_000"))
-    got, (event,), err = edge("check", skin)
-    assert got == 1
+    exit_status, (event,), err = edge("check", skin)
+    assert exit_status == 1
     assert event["frame_rate_hz"] == rate
     assert err == ""
-    assert said in " ".join(event["remarks"])
+    assert sentence in " ".join(event["remarks"])
 
 
 @pytest.mark.parametrize("name", ["cody", "mpr121", "matrix"])

@@ -62,8 +62,8 @@ def answered(event):
     from that of training.
     """
     keys = ("event", "task", "label", "confidence", "window_s")
-    said = {key: event.get(key) for key in keys}
-    return {**said, "flags": set(event.get("flags", ())) - {"as_trained"}}
+    answer = {key: event.get(key) for key in keys}
+    return {**answer, "flags": set(event.get("flags", ())) - {"as_trained"}}
 
 
 @pytest.mark.parametrize("name", ["hard_0", "soft_3"])
@@ -139,17 +139,17 @@ def test_run_takes_joints_from_stdin(exported, recordings):
         json.dumps({"t": t, "q": q}) + "\n"
         for t, q in zip(trial.t.tolist()[:63], trial.joints.tolist(), strict=False)
     )
-    given = ("--model", exported / "model.onnx", "--fake", recordings / "hard_2.npz")
-    command = ("-m", "edge", "run", *given, "--joints", "stdin")
-    done = python(*command, input=sent + "nonsense\n", timeout=60)
-    assert done.returncode == 0
-    flags = [e["flags"] for e in lines(done.stdout) if e["event"] == "decision"]
+    options = ("--model", exported / "model.onnx", "--fake", recordings / "hard_2.npz")
+    command = ("-m", "edge", "run", *options, "--joints", "stdin")
+    process = python(*command, input=sent + "nonsense\n", timeout=60)
+    assert process.returncode == 0
+    flags = [e["flags"] for e in lines(process.stdout) if e["event"] == "decision"]
     assert all("missing_pose" in f for f in flags)
-    assert "unusable lines: 1; the last one: a line is not" in done.stderr
+    assert "unusable lines: 1; the last one: a line is not" in process.stderr
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "sentence"),
     [
         (["--loop"], "--loop and --real-time work only with --fake"),
         (
@@ -182,7 +182,7 @@ def test_a_bad_option_is_one_sentence(
     bare,
     tmp_path,
     arguments,
-    said,
+    sentence,
 ):
     files = {
         "REC": recordings / "hard_0.npz",
@@ -191,12 +191,12 @@ def test_a_bad_option_is_one_sentence(
         "FLAT": tmp_path / "flat.npz",
     }
     saving.save(files["FLAT"], still(skinfile.load(files["PAD"]), 0.5))
-    given = [files.get(a, a) for a in arguments]
-    status, events, err = edge("run", "--model", exported / "model.onnx", *given)
+    options = [files.get(a, a) for a in arguments]
+    status, events, err = edge("run", "--model", exported / "model.onnx", *options)
     assert status == 2
     assert events == []
     assert err.startswith("edge-classify: ")
-    assert said in err
+    assert sentence in err
     assert err.count("\n") == 1
 
 
@@ -228,7 +228,7 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
 
 
 @pytest.mark.parametrize(
-    ("virtual", "asked", "waits"),
+    ("virtual", "stopped", "waits"),
     [
         (False, False, False),
         (False, True, False),
@@ -236,8 +236,8 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
         (True, True, False),
     ],
 )
-def test_a_slow_reader_never_delays_a_decision_in_real_time(virtual, asked, waits):
+def test_a_slow_reader_never_delays_a_decision_in_real_time(virtual, stopped, waits):
     """In virtual time the loop may wait, until it has been asked to stop."""
     opened = SimpleNamespace(virtual=virtual)
-    live = source.Reading(opened, None, Stop(asked), None, None)
+    live = source.Reading(opened, None, Stop(stopped), None, None)
     assert live.may_wait() is waits

@@ -6,7 +6,7 @@ from edge.cli import main
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "sentence"),
     [
         (
             ["fake", "--trials", "0"],
@@ -27,7 +27,7 @@ from edge.cli import main
         ),
     ],
 )
-def test_a_value_that_an_option_does_not_take_is_refused(options, said, capsys):
+def test_a_value_that_an_option_does_not_take_is_refused(options, sentence, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(options)
-    assert said in capsys.readouterr().err
+    assert sentence in capsys.readouterr().err

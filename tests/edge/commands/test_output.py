@@ -56,8 +56,10 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
     out = capsys.readouterr().out
     assert out.count(" mobility ") == 4
     assert out.count("▀") == 4 * 8 * 24 * 2
-    asked = 4 * len(Model(demo.MODEL).info.tasks)
-    assert out.splitlines()[-1].startswith(f"{asked} of {asked} decisions are right")
+    answers = 4 * len(Model(demo.MODEL).info.tasks)
+    assert out.splitlines()[-1].startswith(
+        f"{answers} of {answers} decisions are right"
+    )
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,9 @@ def test_each_event_is_a_line_and_the_same_line_a_datagram(listener):
 
 
 def test_where_nobody_listens_lines_are_counted_and_the_file_is_whole():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as closed:
+        closed.bind(("127.0.0.1", 0))
+        port = closed.getsockname()[1]
     out = io.StringIO()
     with closing(Lines(out, udp=f"127.0.0.1:{port}")) as lines:
         for n in range(20):
@@ -99,11 +99,11 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
     monkeypatch.setattr(event_writer, "MOST_LINES", 100)
     monkeypatch.setattr(event_writer, "PATIENCE_S", 1e-4)
     reading, writing = os.pipe()
-    got = []
+    pieces = []
 
     def read():
         while data := os.read(reading, 4096):
-            got.append(data)
+            pieces.append(data)
 
     with os.fdopen(writing, "w") as out:
         reader = threading.Thread(target=read)
@@ -113,7 +113,7 @@ def test_a_patient_writer_waits_for_a_slow_reader(monkeypatch):
                 lines.write([{"n": n}])
     reader.join()
     os.close(reading)
-    assert len(b"".join(got).splitlines()) == 20_000
+    assert len(b"".join(pieces).splitlines()) == 20_000
     assert lines.lost == {}
 
 

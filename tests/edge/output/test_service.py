@@ -22,16 +22,16 @@ TOUCH = demo.FOLDER / "cardboard-box-fixed.npz"
 
 def start(manager, *arguments):
     watched = {"NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "200000"}
-    given = ("--model", demo.MODEL, "--fake", TOUCH, "--loop", *arguments)
+    options = ("--model", demo.MODEL, "--fake", TOUCH, "--loop", *arguments)
     environment = {**os.environ, **watched}
-    return started("run", *given, env=environment, stdout=subprocess.PIPE)
+    return started("run", *options, env=environment, stdout=subprocess.PIPE)
 
 
 def said_until_stopping(manager):
-    said = {manager.recv(4096)}
-    while b"STOPPING=1" not in said:
-        said.add(manager.recv(4096))
-    return said
+    messages = {manager.recv(4096)}
+    while b"STOPPING=1" not in messages:
+        messages.add(manager.recv(4096))
+    return messages
 
 
 def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
@@ -44,8 +44,8 @@ def test_it_says_that_it_is_ready_alive_and_stopping_and_ends_cleanly(
             assert manager.recv(4096) == b"WATCHDOG=1"
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=60)
-        said = said_until_stopping(manager)
-    assert said <= {b"WATCHDOG=1", b"STOPPING=1"}
+        messages = said_until_stopping(manager)
+    assert messages <= {b"WATCHDOG=1", b"STOPPING=1"}
     assert process.returncode == 0
     assert err == ""
     assert out.endswith("\n")
@@ -104,7 +104,7 @@ def test_the_unit_restarts_for_ever_but_not_after_a_mistake(unit):
     shutil.which("systemd-analyze") is None, reason="no systemd-analyze here"
 )
 def test_systemd_finds_the_unit_little_exposed():
-    given = ["security", "--offline=true", "--threshold=25", str(UNIT)]
-    command = ["systemd-analyze", *given]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-500:]
+    options = ["security", "--offline=true", "--threshold=25", str(UNIT)]
+    command = ["systemd-analyze", *options]
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert process.returncode == 0, process.stdout[-500:]

@@ -25,7 +25,7 @@ def notifier(manager, clock):
     return make
 
 
-def said(listener):
+def messages(listener):
     listener.setblocking(False)
     lines = []
     while True:
@@ -39,7 +39,7 @@ def test_ready_and_stopping_are_one_datagram_each(manager, notifier):
     service = notifier()
     service.ready("reading skin.toml")
     service.stopping()
-    assert said(manager) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
+    assert messages(manager) == ["READY=1\nSTATUS=reading skin.toml", "STOPPING=1"]
 
 
 def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_given(
@@ -51,7 +51,7 @@ def test_a_sign_of_life_goes_out_twice_in_the_time_allowed_however_often_it_is_g
     for tick in range(2001):  # 20 s at 100 Hz
         clock.sleep_until(100.0 + tick / 100)
         service.alive()
-    assert said(manager) == ["WATCHDOG=1"] * 5
+    assert messages(manager) == ["WATCHDOG=1"] * 5
 
 
 def test_a_name_in_the_abstract_namespace(clock):
@@ -76,7 +76,7 @@ def test_nobody_watches(manager, clock, notifier, environment):
     service.alive()
     clock.sleep_until(1100.0)
     service.alive()
-    assert said(manager) == []
+    assert messages(manager) == []
 
 
 @pytest.mark.parametrize("address", ["", "relative"])
@@ -103,11 +103,11 @@ def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
         listener.bind(address)
         clock.sleep_until(101.0)
         service.alive()
-        assert said(listener) == ["WATCHDOG=1"]
+        assert messages(listener) == ["WATCHDOG=1"]
 
 
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, notifier):
     service = notifier()
     for _ in range(10_000):  # far more than a socket's queue takes
         service.stopping()
-    assert 1 <= len(said(manager)) < 10_000
+    assert 1 <= len(messages(manager)) < 10_000

@@ -80,22 +80,22 @@ def test_a_single_contact_is_followed_as_by_the_largest_region():
     place."""
     for path in demo.recordings():
         recording = load(path)
-        expected, seen = (
+        expected, events = (
             [event.to_dict() for event in classifier.classify(recording)]
             for classifier in (Classifier(MODEL), Classifier(MODEL, max_contacts=8))
         )
-        number = decided(seen, "contact")[0]
-        mine = [e for e in seen if e["contact"] == number]
+        number = decided(events, "contact")[0]
+        mine = [e for e in events if e["contact"] == number]
         assert [strip(e) for e in mine] == [strip(e) for e in expected]
 
 
 def strip(event):
-    others = ("contact", "place", "latency_ms")
-    return {key: value for key, value in event.items() if key not in others}
+    unequal = ("contact", "place", "latency_ms")
+    return {key: value for key, value in event.items() if key not in unequal}
 
 
 @pytest.fixture(scope="module")
-def both():
+def two_touches():
     """Two of the demo's touches on one skin, half a turn and 0.32 s apart."""
     a, b = (
         load(demo.FOLDER / f"cardboard-box-{how}.npz") for how in ("fixed", "movable")
@@ -114,16 +114,16 @@ def both():
     return replace(a, t=t, frames=frames, joints=joints, meta={**a.meta, "labels": {}})
 
 
-def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
-    save(tmp_path / "both.npz", both)
+def test_each_contact_is_decided_and_placed_on_its_own(two_touches, tmp_path, edge):
+    save(tmp_path / "both.npz", two_touches)
     place = tmp_path / "touches.jsonl"
-    given = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz", "--map", place)
-    status, lines, _ = edge("run", *given)
+    options = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz", "--map", place)
+    status, lines, _ = edge("run", *options)
     assert status == 0
     assert len(set(decided(lines, "contact"))) == 2
-    found = TouchMap(place)
-    assert found.head[:2] == (MODEL.info.chain.base, "metre")
-    first, second = touches = list(found)
+    touch_map = TouchMap(place)
+    assert touch_map.head[:2] == (MODEL.info.chain.base, "metre")
+    first, second = touches = list(touch_map)
     assert first.labels == {
         "category": "rigid-fixed",
         "mobility": "fixed",
@@ -133,11 +133,11 @@ def test_each_contact_is_decided_and_placed_on_its_own(both, tmp_path, edge):
         0.36, abs=0.02
     )  # 0.04 their own
     for touch in touches:
-        assert on_the_skin(touch.position, both)
+        assert on_the_skin(touch.position, two_touches)
     # Opposite sides of the forearm.
     assert (
         np.linalg.norm(np.subtract(first.position, second.position))
-        > both.layout.radius_m
+        > two_touches.layout.radius_m
     )
 
 
@@ -187,15 +187,15 @@ def test_runs_add_to_a_map_and_a_line_cut_short_is_left_out(tmp_path):
         "confidence": 0.5,
         "flags": ["tie"],
     }
-    others = [{**event, "task": t, "label": t} for t in ("category", "object")]
+    further = [{**event, "task": t, "label": t} for t in ("category", "object")]
     onset = {"event": "onset", "contact": 1, "onset_s": 0.5}
     write(path, info, [onset, event])
     assert not list(TouchMap(path))  # two tasks are still open
     path.unlink()
-    write(path, info, [onset, event, *others, {**event, "contact": 2, "place": None}])
+    write(path, info, [onset, event, *further, {**event, "contact": 2, "place": None}])
     with path.open("a") as damaged:
         damaged.write('{"event": "decision", "pla')
-    write(path, info, [event, *others])
+    write(path, info, [event, *further])
     first, second = TouchMap(path)
     assert first == second
     assert first.position == (0.1, 0.2, 0.3)
@@ -226,13 +226,13 @@ def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sen
 
 
 @pytest.mark.parametrize(
-    "left", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n']
+    "beginning", ['{"ev', '{"event": "map", "fra', '{"event": "map", "fra\n']
 )
 def test_a_first_line_that_a_full_disk_cut_short_is_no_condition_for_a_start(
-    tmp_path, left
+    tmp_path, beginning
 ):
     path = tmp_path / "map.jsonl"
-    path.write_text(left)
+    path.write_text(beginning)
     write(path, MODEL.info, [])
     assert list(TouchMap(path)) == []
 

@@ -42,7 +42,7 @@ def test_a_fault_gives_no_wrong_value_and_costs_no_other_chip(name):
     outcome = run(name, file, faults, seconds=1.6)
     assert outcome.met > 0
     assert outcome.wrong == 0
-    assert outcome.others == 0
+    assert outcome.elsewhere == 0
     assert outcome.back_s < BACK_S
     assert outcome.missed_ticks <= (3 * outcome.met if hang(faults) else 0)
 

@@ -29,7 +29,7 @@ def test_cody_is_384_taxels_on_three_buses():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "sentence"),
     [
         ("rows = 4", "", "skin.rows is missing"),
         (
@@ -67,8 +67,8 @@ def test_cody_is_384_taxels_on_three_buses():
         ("[skin]", "[skin", "not TOML"),
     ],
 )
-def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
-    assert said in mistake(SMALL.replace(old, new, 1))
+def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, sentence):
+    assert sentence in mistake(SMALL.replace(old, new, 1))
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -136,13 +136,15 @@ def test_a_calibration_above_what_its_chips_tell_is_refused():
     """An MPR121 tells 10 bits, of which 1023 is saturated."""
     pad = skinfile.shipped("mpr121").read_text()
     highest = [[1022] * 12] * 8
-    for added, said in (
+    for added, sentence in (
         (0, ""),
         (1, "calibration.baseline is 1023 for a taxel of a mpr121"),
     ):
         highest = [[value + added for value in row] for row in highest]
         text = pad + f"[calibration]\nbaseline = {highest}\nnoise = {highest}\n"
-        assert said in mistake(text) if said else skinfile.parse(text).calibration
+        assert (
+            sentence in mistake(text) if sentence else skinfile.parse(text).calibration
+        )
 
 
 def test_saving_a_calibration_keeps_the_old_file_and_leaves_a_wrong_one_alone(tmp_path):

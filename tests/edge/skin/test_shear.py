@@ -87,21 +87,21 @@ def test_a_calibration_of_three_axes_is_written_and_read_back():
 
 
 def test_a_calibration_of_one_axis_does_not_do_for_three():
-    one = PAD + "[calibration]\nbaseline = BASE\nnoise = BASE\n"
-    text = one.replace("BASE", str([[0] * 4] * 3))
+    single = PAD + "[calibration]\nbaseline = BASE\nnoise = BASE\n"
+    text = single.replace("BASE", str([[0] * 4] * 3))
     with pytest.raises(InputError, match="shear_baseline must be 3 rows of 4 pairs"):
         parse(text)
 
 
 def test_a_model_that_needs_shear_is_refused_on_a_skin_without_it():
-    one = SkinLayout(3, 4, threshold_counts=40)
+    plain = SkinLayout(3, 4, threshold_counts=40)
     with pytest.raises(InputError, match="needs shear, which this skin does not give"):
-        for_device(LAYOUT, one)
+        for_device(LAYOUT, plain)
 
 
 def test_a_skin_with_shear_that_the_model_does_not_use_is_said():
-    one = SkinLayout(3, 4, threshold_counts=40, onset_counts=60)
-    assert differences(one, LAYOUT) == [
+    plain = SkinLayout(3, 4, threshold_counts=40, onset_counts=60)
+    assert differences(plain, LAYOUT) == [
         "the skin gives shear, which the model does not use"
     ]
     assert differences(LAYOUT, LAYOUT) == []

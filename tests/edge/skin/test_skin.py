@@ -88,12 +88,12 @@ def test_a_frame_is_a_rolling_shutter_and_says_so():
     file = on_buses(1)
     with fake_skin(file, lambda t: PICTURE, timed=True) as skin:
         frame = skin.read()
-        again = skin.read()
+        following = skin.read()
     times = np.array([frame.times.reshape(-1)[chip.taxels[0]] for chip in file.chips])
     assert (np.diff(times) > 0).all()
     assert times[0] - frame.t == pytest.approx((20 + 255) / 400e3)
     assert times[-1] - times[0] == pytest.approx((31 * 255 + 7 * 20) / 400e3)
-    assert again.t - frame.t == pytest.approx(8320 / 400e3)
+    assert following.t - frame.t == pytest.approx(8320 / 400e3)
     assert len(np.unique(frame.times)) == 32
 
 
@@ -157,9 +157,9 @@ def test_a_skin_without_calibration_is_opened_only_to_measure_it(monkeypatch):
         InputError, match="has no calibration; run `edge-classify calibrate"
     ):
         Skin.open(CODY)
-    for file, wanted in ((CODY, False), (calibrated(CODY), True)):
+    for file, calibration in ((CODY, False), (calibrated(CODY), True)):
         with pytest.raises(BusMissing):
-            Skin.open(file, calibrated=wanted)
+            Skin.open(file, calibrated=calibration)
 
 
 def test_taxels_that_fall_silent_are_heard_of_and_so_is_their_return():

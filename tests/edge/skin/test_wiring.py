@@ -30,7 +30,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "sentence"),
     [
         (
             "rows = 4",
@@ -95,8 +95,8 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         ),
     ],
 )
-def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, said):
-    assert said in mistake(SMALL.replace(old, new, 1))
+def test_a_mistake_is_one_sentence_that_names_file_and_key(old, new, sentence):
+    assert sentence in mistake(SMALL.replace(old, new, 1))
 
 
 SERIAL = one_chip(2, 3, bus='serial = "/dev/ttyACM0"', at="")
@@ -122,7 +122,7 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "sentence"),
     [
         (
             "serial =",
@@ -151,8 +151,8 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
         ),
     ],
 )
-def test_a_mistake_about_a_serial_port_is_one_sentence(old, new, said):
-    assert said in mistake(SERIAL.replace(old, new))
+def test_a_mistake_about_a_serial_port_is_one_sentence(old, new, sentence):
+    assert sentence in mistake(SERIAL.replace(old, new))
 
 
 def test_the_largest_value_of_a_microcontroller_is_that_of_its_bits():
