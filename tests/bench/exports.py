@@ -26,11 +26,19 @@ from edge.model.model import Model
 from export.__main__ import main
 from tests.bench import tables
 from tests.bench.program import start
-from tests.bench.risk import SCENE, trust
-from tests.bench.shifts import SHIFTS, answers, decisions, is_told, trusted
+from tests.bench.risk import trust
+from tests.bench.shifts import (
+    SCENE,
+    SHIFTS,
+    answers,
+    decisions,
+    fresh_touches,
+    is_told,
+    trusted,
+)
 from train.report.work import Workers
 from train.simulate import scene as scenes
-from train.simulate.run import simulate, write
+from train.simulate.run import write
 
 FRESH_SEED = 1 << 20
 """Beyond those of the data sets."""
@@ -80,11 +88,8 @@ def judged(seed, fresh, shifted):
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             main(["--data", str(data), "--out", out, "--jobs", "1"])
         model = Model(Path(out) / "model.onnx")
-    touches, few = (
-        [r for _, r in simulate(scenes.load(SCENE, seed=FRESH_SEED, count=count))]
-        for count in (fresh, shifted)
-    )
-    shares = shifts_told(model, few)
+    touches = fresh_touches(FRESH_SEED, fresh)
+    shares = shifts_told(model, fresh_touches(FRESH_SEED, shifted))
     judged_rows = []
     for task, rows in first_decisions(model, touches).items():
         row = {"task": task, **usual(rows), "above": is_above(model, task, touches)}

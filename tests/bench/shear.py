@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
+from scipy.stats import sem, t
 
 from tests.bench import tables
 from tests.bench.program import start
@@ -80,8 +80,8 @@ def gain(runs, task, window, kind):
             differences.append(100.0 * (after - before))
     if not differences:
         return ""
-    mean = float(np.mean(differences))
-    reach = stats.t.ppf(0.975, len(differences) - 1) * stats.sem(differences)
+    mean = np.mean(differences)
+    reach = t.ppf(0.975, len(differences) - 1) * sem(differences)
     return f"{mean:+.1f} ({mean - reach:+.1f} to {mean + reach:+.1f})"
 
 

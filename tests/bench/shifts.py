@@ -145,6 +145,11 @@ def answers(model, recordings, shift):
     return {task: rows[rows["task"] == task] for task in model.info.tasks}
 
 
+def fresh_touches(seed, count):
+    """Recordings of so many touches of each object in each condition."""
+    return [r for _, r in simulate(scenes.load(SCENE, seed=seed, count=count))]
+
+
 def share(facts):
     """The share of facts (n,) that hold; 0 of none."""
     return facts.sum() / max(len(facts), 1)
@@ -179,8 +184,7 @@ def row(name, task, judged, usual):
 def measure(model, trials):
     """Measure, and write the table."""
     loaded = Model(model)
-    scene = scenes.load(SCENE, seed=FRESH_SEED, count=trials)
-    fresh = [recording for _, recording in simulate(scene)]
+    fresh = fresh_touches(FRESH_SEED, trials)
     rows = []
     usual = {}
     for name, shift in bar(SHIFTS.items(), desc="shifts", total=len(SHIFTS)):

@@ -14,7 +14,7 @@ from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, cpu_count, delayed
+from joblib import cpu_count
 
 from edge.model.info import UNKNOWN
 from edge.model.model import Model
@@ -30,7 +30,7 @@ from tests.bench.mujoco_touch import (
     simulate,
 )
 from tests.bench.program import start
-from train.progress import bar
+from train.report.work import Workers
 from train.simulate import streams
 
 TASKS = ("category", "mobility", "softness")
@@ -154,12 +154,10 @@ def touch_object(index, seed, habit):
 def touches(seed, trials):
     """The number, the habit and a recording of each touch, two of each object; of half
     as many objects as trials, but at least one."""
-    habits = list(islice(cycle(HABITS), max(trials // 2, 1)))
-    pairs = Parallel(n_jobs=cpu_count(), return_as="generator")(
-        delayed(touch_object)(i, seed, habit) for i, habit in enumerate(habits)
-    )
-    pairs = bar(pairs, total=len(habits), unit=" objects", desc="MuJoCo")
-    for number, (habit, pair) in enumerate(zip(habits, pairs, strict=True)):
+    habits = islice(cycle(HABITS), max(trials // 2, 1))
+    cases = [(number, seed, habit) for number, habit in enumerate(habits)]
+    pairs = Workers(cpu_count()).map("objects in MuJoCo", touch_object, cases)
+    for (number, _, habit), pair in zip(cases, pairs, strict=True):
         for recording in pair:
             yield number, habit, recording
 

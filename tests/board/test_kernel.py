@@ -137,11 +137,10 @@ def skins(tmp_path_factory):
 def test_the_skin_is_read_through_a_real_kernel(skins):
     command = (
         "PYTHONDONTWRITEBYTECODE=1 PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 "
-        "OPENBLAS_NUM_THREADS=1 "
-        f"PYTHONPATH={CHECKOUT} SKINS={skins} {sys.executable} -m pytest "
-        f"{CHECKOUT}/tests/board/kernel_guest.py -vv --color=no --noconftest "
-        "-p no:cacheprovider "
-        f"--basetemp=/run/pytest --rootdir {CHECKOUT} --durations=10"
+        f"OPENBLAS_NUM_THREADS=1 PYTHONPATH={CHECKOUT} SKINS={skins} {sys.executable} "
+        f"-m pytest {CHECKOUT}/tests/board/kernel_guest.py -vv --color=no --noconftest "
+        f"-p no:cacheprovider --basetemp=/run/pytest --rootdir {CHECKOUT} "
+        "--durations=10"
     )
     with skipping():
         status, printed = run_in_guest(command.split())

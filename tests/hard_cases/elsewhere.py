@@ -83,10 +83,8 @@ def main(argv=None):
     farthest = max(shares, key=lambda key: shares[key])
     print(
         f"ONNX Runtime {machine['onnxruntime']} on {machine['machine']}: {len(shares)} "
-        "quantities "
-        f"of {len(sets(arguments.golden))} hard sets, the farthest at "
-        f"{shares[farthest]:.2g} of "
-        f"its bound ({': '.join(farthest)})"
+        f"quantities of {len(sets(arguments.golden))} hard sets, the farthest at "
+        f"{shares[farthest]:.2g} of its bound ({': '.join(farthest)})"
     )
     return int(shares[farthest] > 1.0)
 

@@ -10,12 +10,7 @@ from edge.model.graph import Graph
 from tests.hard_cases.cases import SEEDS, Case, Ladder
 from tests.hard_cases.models import converted, session, usual_pipeline
 from tests.hard_cases.neighbours import near_duplicates
-from tests.hard_cases.outputs import (
-    KINDS,
-    POINTS_S,
-    differing,
-    whole,
-)
+from tests.hard_cases.outputs import KINDS, POINTS_S, differing, whole
 
 OPTIMISED = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_ALL
 

@@ -151,12 +151,7 @@ CASES = [
         times_error,
         [{"seed": 0, "shortest": 1e-12}],
         {"seed": SEEDS, "shortest": powers_of_ten(-12, -2)},
-        Ladder(
-            "shortest step, s",
-            decades(-3, -16),
-            "shortest",
-            "0.018, 0.010 s",
-        ),
+        Ladder("shortest step, s", decades(-3, -16), "shortest", "0.018, 0.010 s"),
         bound=1e-15,
     ),
 ]

@@ -137,8 +137,7 @@ def gap_usual():
         sure += [event.confidence for event in blind]
     return (
         f"interpolation alone, after a pause of 5 s: {sum(changed)} of {len(changed)} "
-        "labels are "
-        f"others, with a mean confidence of {np.mean(sure):.2g}"
+        f"labels are others, with a mean confidence of {np.mean(sure):.2g}"
     )
 
 

@@ -320,12 +320,7 @@ CASES = [
         wrong(scaled_data, USUAL),
         [{"scale": scale, "seed": 0} for scale in (1e-24, 1e20)],
         {"scale": powers_of_ten(-24, 20)},
-        Ladder(
-            "scale",
-            decades(20, 170, 0.1),
-            "scale",
-            "0.01 to 920 and 0.02 to 25",
-        ),
+        Ladder("scale", decades(20, 170, 0.1), "scale", "0.01 to 920 and 0.02 to 25"),
         lambda: usual_neighbours(*scaled_data(1e20, 0)),
     ),
     answers("exact duplicates", wrong(duplicates, Choice("IV", 20, 4)), **BY_ROWS),

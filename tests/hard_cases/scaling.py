@@ -85,11 +85,7 @@ CASES = [
         decades_error,
         [{"top": 48, "count": 12, "seed": 0}],
         {"top": st.integers(1, 48), "count": st.integers(2, 16), "seed": SEEDS},
-        Ladder(
-            "columns of the Hadamard matrix",
-            [2, 4, 8, 12, 16],
-            "count",
-        ),
+        Ladder("columns of the Hadamard matrix", [2, 4, 8, 12, 16], "count"),
         examples=6,
         bound=4e-15,
     ),

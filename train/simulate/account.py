@@ -189,7 +189,6 @@ def _step_line(step_s: float, measured: Convergence, scene: Scene) -> str:
         verdict = f"no step is within {goal}, and {best} errs by {100.0 * measured.error:.2g} %"
     return (
         f"  step {1e3 * step_s:g} ms errs by {100.0 * measured.error_as_given:.2g} % "
-        f"beside the reference run; by extrapolation, {verdict} "
-        f"(error {errors}; order {measured.order:.2g}; "
-        f"reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
+        f"beside the reference run; by extrapolation, {verdict} (error {errors}; order "
+        f"{measured.order:.2g}; reference run at {1e3 * measured.steps_s[-1]:.2g} ms)"
     )

@@ -137,11 +137,9 @@ def begin(
         yaw = abs(t.values["yaw_deg"][i])
         raise InputError(
             f"{scene.name}: object {trial.object.name!r} touches the arm before it "
-            "moves, in "
-            f"trial {trial.number} of {trial.key}, where the face is turned by "
-            f"{yaw:.0f} degrees; "
-            "give spread.yaw_deg or the object's width_m less, or trials.lead_s more "
-            "time"
+            f"moves, in trial {trial.number} of {trial.key}, where the face is turned "
+            f"by {yaw:.0f} degrees; give spread.yaw_deg or the object's width_m less, "
+            "or trials.lead_s more time"
         )
     return batch
 
@@ -318,12 +316,10 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
         i = int(np.argmax(gains.any(axis=1)))
         frame = int(np.argmax(gains[i]))
         raise EdgeError(
-            f"{scene.name}: trial {batch.specs[i].number} of {batch.specs[i].key} makes "
-            "energy: "
-            f"at {times[frame]:g} s the arm has stored or lost {held[i, frame]:.3g} J "
-            "of the "
-            f"{brought[i, frame]:.3g} J put in; give [step_s] a smaller step, or the "
-            "object less extreme values"
+            f"{scene.name}: trial {batch.specs[i].number} of {batch.specs[i].key} "
+            f"makes energy: at {times[frame]:g} s the arm has stored or lost "
+            f"{held[i, frame]:.3g} J of the {brought[i, frame]:.3g} J put in; give "
+            "[step_s] a smaller step, or the object less extreme values"
         )
 
 

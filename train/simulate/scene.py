@@ -76,8 +76,7 @@ def _as_another(path: str | os.PathLike[str]) -> dict[str, Any]:
     if "like" in out:
         raise InputError(
             f"{os.fspath(path)}: like names {name}, which is itself like another "
-            "scene; name that "
-            "scene instead, and give the differences here"
+            "scene; name that scene instead, and give the differences here"
         )
     for key, value in table.items():
         merges = isinstance(out.get(key), Mapping) and isinstance(value, Mapping)
@@ -182,8 +181,7 @@ def _arm(table: SceneTable) -> dict[str, Any]:
         if joint.kind == "prismatic":
             raise InputError(
                 f"{table.called('chain')}: joint {joint.name!r} slides; the "
-                "simulator's arms only "
-                "turn: make it fixed"
+                "simulator's arms only turn: make it fixed"
             )
     out: dict[str, Any] = {"arm": chain}
     for field, key, cody, absent in (
@@ -256,9 +254,8 @@ def _motion(
     if lead.high >= stroke_s:
         raise InputError(
             f"{table.where}: the arm's stroke ends after {stroke_s:g} s "
-            "(motion.travel_s, or a "
-            f"joint's limit), before it meets an object at {lead.high:g} s "
-            "(trials.lead_s)"
+            "(motion.travel_s, or a joint's limit), before it meets an object at "
+            f"{lead.high:g} s (trials.lead_s)"
         )
     return {"start": start, "rate": rate, "travel_s": travel_s, "place_m": place_m}
 

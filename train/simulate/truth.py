@@ -140,10 +140,9 @@ def _next_draws(
     if first >= REDRAWS:
         raise InputError(
             f"{scene.name}: object {last.object.name!r} is labelled {wrong.label}, but "
-            "each of "
-            f"{REDRAWS} draws contradicted that within {scene.labels['window_s']:g} s "
-            "of the touch "
-            f"(the last {wrong.course}); {wrong.remedy}"
+            f"each of {REDRAWS} draws contradicted that within "
+            f"{scene.labels['window_s']:g} s of the touch (the last {wrong.course}); "
+            f"{wrong.remedy}"
         )
     for attempt in range(first, min(first + AHEAD, REDRAWS)):
         yield replace(last, attempt=attempt)

@@ -74,14 +74,12 @@ def batch_of(trial_scene, index=0):
 
 def test_1_an_effect_not_called_for_is_not_loaded():
     program = (
-        "import json, sys\n"
-        "from train.simulate.scene import from_dict\n"
-        "from train.simulate.run import simulate\n"
-        "table = {'trials': {'count': 1, 'after_s': 0.2}, 'step_s': {'base': 0.01},"
-        "'object': [{'name': 'box', 'family': 'rigid', 'conditions': ['fixed']}]}\n"
-        "assert len(list(simulate(from_dict(table)))) == 1\n"
-        "print(json.dumps([m for m in sys.modules if "
-        "m.startswith('train.simulate.effects.')]))\n"
+        "import json, sys\nfrom train.simulate.scene import from_dict\nfrom "
+        "train.simulate.run import simulate\ntable = {'trials': {'count': 1, "
+        "'after_s': 0.2}, 'step_s': {'base': 0.01},'object': [{'name': 'box', "
+        "'family': 'rigid', 'conditions': ['fixed']}]}\nassert "
+        "len(list(simulate(from_dict(table)))) == 1\nprint(json.dumps([m for m in "
+        "sys.modules if m.startswith('train.simulate.effects.')]))\n"
     )
     assert json.loads(python("-c", program).stdout) == ["train.simulate.effects.base"]
 

@@ -71,8 +71,7 @@ def place(t: Trials) -> None:
     if not (size > STILL_M_S).all():
         raise InputError(
             f"{t.scene.name}: motion.rate_deg_s does not move the forearm where it is "
-            "to meet "
-            "an object (motion.place_m); turn a joint that carries it there"
+            "to meet an object (motion.place_m); turn a joint that carries it there"
         )
     normal = speed / size
     yaw = np.radians(values["yaw_deg"])
