@@ -161,13 +161,10 @@ def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
         if is_used and array.dtype.kind in "iufb" and array.size:
             numbers[name] = array.ravel() if _is_vector(array) else array
     if not numbers:
-        raise _without_numbers(arrays)
+        if any(array.dtype.hasobject for array in arrays.values()):
+            raise InputError("holds cells or structures; give --trials")
+        raise InputError(EMPTY)
     return numbers
-
-
-def _without_numbers(arrays: Arrays) -> InputError:
-    has_parts = any(array.dtype.hasobject for array in arrays.values())
-    return InputError("holds cells or structures; give --trials" * has_parts or EMPTY)
 
 
 def _is_vector(array: NDArray[Any]) -> bool:
@@ -236,23 +233,25 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
     Raises:
         InputError: the arrays do not share an axis of trials.
     """
-    trials = list(map(_parts, _groups(arrays).values()))
-    if len(trials) < 2 or len({frozenset(dict(parts)) for parts in trials}) > 1:
+    trials = list(map(_fields, _groups(arrays).values()))
+    if len(trials) < 2 or len({frozenset(dict(fields)) for fields in trials}) > 1:
         entries = _entries(arrays)
         columns = zip(*entries.values(), strict=True)
-        trials = [_parts(dict(zip(entries, column, strict=True))) for column in columns]
-    for parts in trials:
-        require_unique(name for name, _ in parts)
-        yield _labels_and_arrays(parts, task)
+        trials = [
+            _fields(dict(zip(entries, column, strict=True))) for column in columns
+        ]
+    for fields in trials:
+        require_unique(name for name, _ in fields)
+        yield _labels_and_arrays(fields, task)
 
 
 def _labels_and_arrays(
-    parts: Sequence[tuple[str, NDArray[Any]]], task: str
+    fields: Sequence[tuple[str, NDArray[Any]]], task: str
 ) -> tuple[dict[str, str], Arrays]:
     """A trial's texts and single numbers, and its arrays."""
     labels: dict[str, str] = {}
     of_trial: Arrays = {}
-    for path, value in parts:
+    for path, value in fields:
         if value.dtype.names:  # a structure within it is no value
             continue
         if value.size == 1:  # without the array that MATLAB puts around a value
@@ -276,17 +275,17 @@ def _groups(arrays: Arrays) -> dict[str, Arrays]:
     return groups
 
 
-def _parts(trial: Mapping[str, Any]) -> list[tuple[str, NDArray[Any]]]:
+def _fields(trial: Mapping[str, Any]) -> list[tuple[str, NDArray[Any]]]:
     """The names and values of a trial, with the fields of its structures."""
-    parts = []
+    fields = []
     for name, stored in trial.items():
         value = np.asarray(stored)
-        if value.dtype.names and value.size == 1:
-            fields = value.dtype.names
-            parts += [(field, np.asarray(value[field].item())) for field in fields]
+        names = value.dtype.names
+        if names and value.size == 1:
+            fields += [(field, np.asarray(value[field].item())) for field in names]
         else:
-            parts.append((name, value))
-    return parts
+            fields.append((name, value))
+    return fields
 
 
 def _entries(arrays: Arrays) -> Arrays:

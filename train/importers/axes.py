@@ -161,9 +161,9 @@ def parted(table: Table, normal: str) -> Parted:
             "leave --axes out, or mend the names"
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
-    others = table.data.drop(columns=axes.to_numpy().ravel())
+    plain = table.data.drop(columns=axes.to_numpy().ravel())
     normals = table.data[[name for name in table.names if name in taxel_of]]
-    data = pd.concat([others, normals.rename(columns=taxel_of)], axis=1)
+    data = pd.concat([plain, normals.rename(columns=taxel_of)], axis=1)
     if not data.columns.is_unique:
         twice = data.columns[data.columns.duplicated()][0]
         raise InputError(
@@ -186,15 +186,14 @@ def _by_letters(table: Table) -> pd.DataFrame:
     letter."""
     columns: dict[str, dict[str, str]] = defaultdict(dict)
     for name in table.names:
-        if parts := lettered(name):
-            letter, taxel = parts
-            former = columns[taxel].get(letter)
-            if former is not None:
+        if match := lettered(name):
+            letter, taxel = match
+            former = columns[taxel].setdefault(letter, name)
+            if former != name:
                 raise InputError(
                     f"{table.where}: {former} and {name} are both {letter} of {taxel}; "
                     "rename one of them"
                 )
-            columns[taxel][letter] = name
     return pd.DataFrame(columns, index=LETTERS).T
 
 

@@ -70,14 +70,14 @@ class Meaning:
     def text(self, label: str, shape: Sequence[int]) -> str:
         """A line that says what was taken."""
         size = " x ".join(map(str, shape))
-        parts = []
+        text = f"taxels: {spanned(self.taxels)} ({len(self.taxels)}, as {size})"
         if self.time is not None:
-            parts.append(f"time: {quoted(self.time)} in {self.unit} ({self.unit_from})")
-        parts.append(f"taxels: {spanned(self.taxels)} ({len(self.taxels)}, as {size})")
+            text = (
+                f"time: {quoted(self.time)} in {self.unit} ({self.unit_from}), {text}"
+            )
         if self.joints:
-            parts.append(f"joint angles: {spanned(self.joints)}")
-        parts.append(f"label: {label}")
-        text = ", ".join(parts)
+            text += f", joint angles: {spanned(self.joints)}"
+        text += f", label: {label}"
         if self.left_out:
             text += f"; left out: {', '.join(map(quoted, self.left_out))}"
         return text
@@ -119,9 +119,9 @@ def _term(table: Table, term: str) -> list[str]:
     names = list(table.file_names) or table.names
     if term in names:
         return [term]
-    parts = [name for name in names if name.startswith(f"{term}.")]
-    if parts:
-        return parts
+    array = [name for name in names if name.startswith(f"{term}.")]
+    if array:
+        return array
     ends = term.split("-")
     for places in (names, numbered("", len(names))):
         if len(ends) <= 2 and set(ends) <= set(places):
@@ -170,11 +170,11 @@ def _time_column(
             raise InputError(f"{table.where}: --time names several columns; name one")
     else:
         times = named_times(table, joints)
-    if not times and options.rate is None:
-        raise InputError(
-            f"{table.where}: no column is a time; give --rate HZ or --time COL"
-        )
     if not times:
+        if options.rate is None:
+            raise InputError(
+                f"{table.where}: no column is a time; give --rate HZ or --time COL"
+            )
         return None
     if options.rate is not None:
         raise InputError(
@@ -244,12 +244,12 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
 def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
     """The names of each stem whose numbers run, in the order of these, and their shape
     where they have two numbers."""
-    parts = pd.Series(names, names, object).str.extract(RUNNING)
-    parts = parts.dropna(subset="first")
-    is_flat = parts["second"].isna()
-    places = parts[["first", "second"]].fillna(0).astype(int)
+    numbers = pd.Series(names, names, object).str.extract(RUNNING)
+    numbers = numbers.dropna(subset="first")
+    is_flat = numbers["second"].isna()
+    places = numbers[["first", "second"]].fillna(0).astype(int)
     grids = []
-    for (_, flat), group in places.groupby([parts["stem"], is_flat], sort=False):
+    for (_, flat), group in places.groupby([numbers["stem"], is_flat], sort=False):
         low = group.min()
         shape = group.max() - low + 1
         is_grid = len(group) == len(group.drop_duplicates()) == shape.prod()
@@ -282,8 +282,8 @@ def _likely_unit(table: Table, time: str) -> tuple[str, str]:
     values = numbers_of(table, time).dropna()
     if values.empty:
         raise InputError(f"{table.where}: column {time} holds no times")
-    for unit, least in EPOCHS.items():
-        if abs(values.iloc[0]) >= least:
+    for unit, earliest in EPOCHS.items():
+        if abs(values.iloc[0]) >= earliest:
             return unit, "since 1970"
     steps = values.diff()
     step = median = steps[steps > 0.0].median()

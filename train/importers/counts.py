@@ -165,8 +165,7 @@ def skin_shape(
         raise InputError(
             f"{trial.where}: {taxels} values a frame are not {size} taxels; give --shape"
         )
-    rows, cols = shape
-    return rows, cols
+    return shape[0], shape[1]
 
 
 @dataclass(frozen=True)
@@ -256,7 +255,12 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
     """
     if options.falls and options.signed:
         raise InputError("--falls and --signed exclude each other; give one")
-    _say_missing(trials)
+    missing = sum(int(trial.missing.sum()) for trial in trials)
+    if missing:
+        say(
+            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
+            "frame"
+        )
     if not (options.falls or options.signed):
         return Rest(scale=options.scale)
     values = _quietest(trials, options)
@@ -266,15 +270,6 @@ def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
         return Rest(values, falls=True, scale=options.scale)
     scale = _finest(deviations) if options.scale == 1.0 else options.scale
     return Rest(values, scale=scale)
-
-
-def _say_missing(trials: Sequence[Trial]) -> None:
-    missing = sum(int(trial.missing.sum()) for trial in trials)
-    if missing:
-        say(
-            f"missing: {counted(missing, 'value')}, where a taxel is not valid in its "
-            "frame"
-        )
 
 
 def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:

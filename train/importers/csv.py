@@ -239,13 +239,14 @@ def _labelled(
     unknown = [row for row in rows if row not in trials and row not in files]
     options.skipped += [f"{path}: {row} names no file" for row in unknown]
     for source in sources:
-        if source.name not in rows:
+        labels = {**source.labels}
+        labels.pop(options.task, None)
+        if source.name in rows:
+            labels |= rows[source.name]
+        else:
             options.skipped.append(
                 f"{path}: has no row for {source.name}, which has no label"
             )
-        labels = {**source.labels}
-        labels.pop(options.task, None)
-        labels |= rows.get(source.name, {})
         yield replace(source, labels=labels, label=LABELS)
 
 
@@ -294,14 +295,18 @@ def _visible(folder: Path) -> list[Path]:
 
 def _files(paths: Iterable[Path]) -> list[Path]:
     """The tables among paths; says how many files are none."""
-    files = [path for path in paths if path.name not in (LABELS, SKIN)]
-    tables = [path for path in files if suffix_of(path) in SUFFIXES]
-    others = [
-        path for path in files if path.is_file() and suffix_of(path) not in SUFFIXES
-    ]
-    if tables and others:
-        count = counted(len(others), "file")
-        say(f"left out {count} of another format, such as {others[0]}")
+    tables = []
+    foreign = []
+    for path in paths:
+        if path.name in (LABELS, SKIN):
+            continue
+        if suffix_of(path) in SUFFIXES:
+            tables.append(path)
+        elif path.is_file():
+            foreign.append(path)
+    if tables and foreign:
+        count = counted(len(foreign), "file")
+        say(f"left out {count} of another format, such as {foreign[0]}")
     return tables
 
 
@@ -325,13 +330,15 @@ def _label(
     options: argparse.Namespace,
 ) -> tuple[dict[str, str], str]:
     """The labels that the names of a file and its folders tell, and how."""
-    folders = [part for part in place.parts[:-1] if part not in counting]
-    stem = re.sub(r"[\s_.-]*\d+$", "", inner(place).stem)
-    names = [*filter(None, [stem]), *folders]
+    kind = "folder's"
+    names = [part for part in place.parts[:-1] if part not in counting]
     if not names:
+        kind = "file's"
+        names = [re.sub(r"[\s_.-]*\d+$", "", inner(place).stem)]
+    label = names[-1]
+    if not label:
         return {}, "none, as the files' names only count"
-    kind = "folder's" if folders else "file's"
-    return {options.task: names[-1]}, f'the {kind} name, such as "{names[-1]}"'
+    return {options.task: label}, f'the {kind} name, such as "{label}"'
 
 
 def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
@@ -428,10 +435,12 @@ def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
         with _skipping(options):
             labels = _labels_in(where, rows[tasks])
             data = rows.drop(columns=["trial", *tasks])
-            part = replace(table, where=where, data=data, file_names=tuple(table.names))
+            trial_table = replace(
+                table, where=where, data=data, file_names=tuple(table.names)
+            )
             if "taxel" in data:
-                part = _pivoted(part, options)
-            yield Source(str(trial), part, labels, label)
+                trial_table = _pivoted(trial_table, options)
+            yield Source(str(trial), trial_table, labels, label)
 
 
 def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
@@ -531,8 +540,8 @@ def _plain(name: Any) -> str:
 
 def _natural(name: Any) -> list[Any]:
     """A key that sorts s2 before s10."""
-    parts = re.split(r"(\d+)", _plain(name))
-    return [int(part) if part.isdigit() else part for part in parts]
+    words = re.split(r"(\d+)", _plain(name))
+    return [int(word) if word.isdigit() else word for word in words]
 
 
 def _measured(

@@ -14,6 +14,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
@@ -152,6 +153,24 @@ class _Text:
     comment: str
     form: list[str]
 
+    @cached_property
+    def decimal(self) -> str:
+        """The sign before a fraction.
+
+        Raises:
+            InputError: there are two.
+        """
+        if self.mark == ",":
+            return "."
+        comma = re.search(FRACTION % ",", self.body)
+        point = re.search(FRACTION % r"\.", self.body)
+        if comma and point:
+            raise InputError(
+                f"has numbers with a comma and with a point, such as {comma[0]} and "
+                f"{point[0]}; save it with one of them"
+            )
+        return "," if comma else "."
+
 
 @dataclass(frozen=True)
 class _Header:
@@ -182,18 +201,16 @@ def read_text(path: Path) -> Table:
     """The table in a text file."""
     with _opened(path) as text:
         form = text.form
-        decimal = _decimal(text)
-        if decimal == ",":
+        if text.decimal == ",":
             form.append("decimal commas")
         if text.mark not in ("", ","):
             form.append(f"separated by {MARKS[text.mark]}")
         header = _header(text)
-        data = _parsed(text, header, decimal=decimal)
         return Table(
             str(path),
-            data,
+            _parsed(text, header),
             header.named,
-            decimal=decimal,
+            decimal=text.decimal,
             form=(*form, *header.form),
         )
 
@@ -208,8 +225,7 @@ def read_labels(path: Path) -> pd.DataFrame:
 def read_frame(path: Path) -> NDArray[np.float64]:
     """(rows, columns) of the numbers in a text file without a header."""
     with _opened(path) as text:
-        data = _parsed(text, _without_names(text), decimal=_decimal(text))
-    table = Table(str(path), data)
+        table = Table(str(path), _parsed(text, _without_names(text)))
     return table.numbers(table.names)
 
 
@@ -239,26 +255,21 @@ def _text(data: bytes) -> _Text:
         raise InputError(EMPTY)
     mark = _mark(lines[len(above)])
     skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
-    below = enumerate(lines[len(above) :], len(above) + 1)
     # An array takes a quarter of a list's memory.
-    numbers: Sequence[int] = array(
-        "q", (n for n, line in below if not skipped.match(line))
-    )
+    numbers: Sequence[int] = array("q")
+    for number in range(len(above), len(lines)):
+        if not skipped.match(lines[number]):
+            numbers.append(number + 1)
     kept = [lines[number - 1] for number in numbers]
     del lines
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(kept)
-    if not _is_plain(kept, mark):
+    marks = {line.count(mark) for line in kept}
+    is_plain = mark and '"' not in body and len(marks) == 1
+    if not is_plain:
         numbers = _lines_of_rows(kept, numbers, mark)
     rows = [row for _, row in islice(_rows(kept, mark), 2)]
     return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
-
-
-def _is_plain(kept: Sequence[str], mark: str) -> bool:
-    """Whether each line is a row of as many cells, none of which is quoted."""
-    if not mark or any('"' in line for line in kept):
-        return False
-    return len({line.count(mark) for line in kept}) == 1
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
@@ -266,14 +277,19 @@ def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequen
     kept.
 
     Raises:
-        InputError: a row has another width than the first.
+        InputError: a row has another width than the first one, but for a separator at
+            the end.
     """
-    first: list[str] | None = None
+    width = 0
     of_rows = array("q")
     for place, row in _rows(kept, mark):
-        first = first or row
-        of_rows.append(numbers[place - 1])
-        _check_width(row, first, of_rows[-1])
+        line = numbers[place - 1]
+        width = width or len(row)
+        ends_in_mark = len(row) == width + 1 and not row[-1].strip()
+        if len(row) != width and not ends_in_mark:
+            values = counted(len(row), "value")
+            raise InputError(f"line {line} has {values}, and the first row {width}")
+        of_rows.append(line)
     return of_rows
 
 
@@ -294,34 +310,6 @@ def _rows(lines: list[str], mark: str) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(lines, delimiter=mark, skipinitialspace=True)
     for row in reader:
         yield reader.line_num, row
-
-
-def _check_width(row: list[str], first: list[str], line: int) -> None:
-    """Refuse a row of another width than the first one, but for a separator at the
-    end."""
-    width = len(first)
-    ends_in_mark = len(row) == width + 1 and not row[-1].strip()
-    if len(row) != width and not ends_in_mark:
-        values = counted(len(row), "value")
-        raise InputError(f"line {line} has {values}, and the first row {width}")
-
-
-def _decimal(text: _Text) -> str:
-    """The sign before a fraction.
-
-    Raises:
-        InputError: there are two.
-    """
-    if text.mark == ",":
-        return "."
-    comma = re.search(FRACTION % ",", text.body)
-    point = re.search(FRACTION % r"\.", text.body)
-    if comma and point:
-        raise InputError(
-            f"has numbers with a comma and with a point, such as {comma[0]} and "
-            f"{point[0]}; save it with one of them"
-        )
-    return "," if comma else "."
 
 
 def _names(cells: list[str]) -> list[str]:
@@ -356,7 +344,7 @@ def _stated(text: _Text) -> _Header:
     if not all(map(_is_number, cells)):
         return _Header(cells, True, 1)
     above = [text.comment.lstrip("#% ")]
-    _, heading = next(_rows(above, text.mark), (0, [""]))
+    _, heading = next(_rows(above, text.mark))
     heading = _names(heading)
     if len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
@@ -375,7 +363,7 @@ def _is_number(text: str) -> bool:
     return False
 
 
-def _parsed(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
+def _parsed(text: _Text, header: _Header) -> pd.DataFrame:
     """The columns of a text, without those that have neither a name nor a value.
 
     Texts and the names of trials stand as they are: a label may be `None` or `NA`, and
@@ -384,7 +372,7 @@ def _parsed(text: _Text, header: _Header, **options: Any) -> pd.DataFrame:
     with warnings.catch_warnings():
         # Columns that hold texts in a part of a long table are read anew below.
         warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-        table = _cells(text, header, **options)
+        table = _cells(text, header, decimal=text.decimal)
     altered = []
     for i, name in enumerate(header.names):
         is_number = pd.api.types.is_numeric_dtype(table[i])

@@ -39,9 +39,8 @@ def trials(
     ):
         connections = [c for c in reader.connections if log.takes(c.topic, c.msgtype)]
         # With an empty list, AnyReader would give every message of the bag.
-        for connection, logged_ns, raw in (
-            reader.messages(connections) if connections else ()
-        ):
+        messages = reader.messages(connections) if connections else ()
+        for connection, logged_ns, raw in messages:
             message = reader.deserialize(raw, connection.msgtype)
             log.ros(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
     yield path.stem, log.recording()

@@ -134,12 +134,12 @@ class Log:
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         # Some drivers leave the stamp empty, which is the time 0.
         t = (0.0 if stamp is None else stamp.sec + stamp.nanosec * 1e-9) or logged_s
+        times = (t, logged_s)
         if kind == JOINTS:
-            names = list(message.name)
             angles = np.asarray(message.position, dtype=np.float64)
-            self._pose(topic, (t, logged_s), names, angles)
-            return
-        self._frame(topic, (t, logged_s), kind, message)
+            self._pose(topic, times, list(message.name), angles)
+        else:
+            self._frame(topic, times, kind, message)
 
     def json(self, topic: str, data: bytes, logged_s: float) -> None:
         """Take in a JSON message."""
@@ -224,8 +224,8 @@ class Log:
             return field_values(message, name)
         for axes in (".x .y .z", "x y z", "X Y Z"):
             with suppress(Unusable):
-                parts = [field_values(message, name + axis) for axis in axes.split()]
-                return np.stack(parts, axis=-1)
+                values = [field_values(message, name + axis) for axis in axes.split()]
+                return np.stack(values, axis=-1)
         return field_values(message, name)
 
     def recording(self) -> Recording:
@@ -375,10 +375,10 @@ class Log:
             joint_columns(names, self.arm.names)
         except InputError as error:
             raise InputError(f"{self.path}: {topic} has {error}") from None
-        others = [name for name in names if name not in self.arm.names]
-        if others:
+        outside = [name for name in names if name not in self.arm.names]
+        if outside:
             LOG.warning(
-                f"{self.path}: {topic}: joints outside the arm: {', '.join(others)}"
+                f"{self.path}: {topic}: joints outside the arm: {', '.join(outside)}"
             )
         return list(self.arm.names)
 
