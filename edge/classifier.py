@@ -50,14 +50,14 @@ class Pending:
 
     Attributes:
         contact: that is followed.
-        number: of the contact, from 1.
+        number: of the contact, from 1, if several are followed at once; else None.
         decision_point: index of the next of the model's decision points.
         tasks: that wait; a product stands behind its factors.
         decided: the answers so far, by task.
     """
 
     contact: Contact
-    number: int
+    number: int | None
     decision_point: int
     tasks: list[str]
     decided: dict[str, Decided] = field(default_factory=dict)
@@ -162,12 +162,12 @@ class Classifier:
         self.tracker.motion_on_skin = motion_on_skin
         self.layout = self.tracker.layout
         self._pending: list[Pending] = []
-        self._numbers: dict[Contact, int] = {}
-        """The numbers of the contacts under way."""
+        self._numbers: dict[Contact, int | None] = {}
+        """The numbers of the contacts under way; None if one is followed."""
         self._begun = 0
         self._end_s: float | None = None
-        self._aside = b""
-        """The mask of the taxels that the last event named as set aside."""
+        self._aside = np.zeros(self.layout.shape, dtype=np.bool_)
+        """(rows, cols) the taxels that the last event named as set aside."""
         self._aside_s = -math.inf
         """When that mask was last the tracker's."""
         self._untouched: Untouched | None = None
@@ -183,16 +183,12 @@ class Classifier:
             InputError: the frame's shape is not the skin's, or its time goes back.
         """
         began = time.perf_counter()
-        events: list[Event] = []
         most = self._most_asked(frame.t)
         self._end_s = frame.t
         if self._untouched is not None and self._begun == 0:
             self._untouched.push(frame)
         contacts = self.tracker.push(frame)
-        aside = self._set_aside(frame)
-        if aside is not None:
-            events.append(aside)
-        events += self._follow(contacts, frame.t)
+        events = self._set_aside(frame.t) + self._follow(contacts, frame.t)
         return events + self._decide_due(frame.t, began, most)
 
     def _most_asked(self, t: float) -> float:
@@ -209,7 +205,7 @@ class Classifier:
                 events.append(self._begin(contact))
             if contact.ended:
                 number = self._numbers.pop(contact)
-                events.append(Release(contact.onset_s, t, self._named(number)))
+                events.append(Release(contact.onset_s, t, number))
         return events
 
     def _decide_due(self, t: float, began: float, most: float) -> list[Event]:
@@ -218,7 +214,10 @@ class Classifier:
         events: list[Event] = []
         questions = 0
         for pending in sorted(self._pending, key=self._due_s):
-            while pending.tasks and questions < most and self._is_due(pending, t):
+            while pending.tasks and questions < most:
+                point_s = self._points_s[pending.decision_point]
+                if t - pending.contact.onset_s < point_s:
+                    break
                 events += self._decide(pending, began)
                 questions += 1
         self._pending = [pending for pending in self._pending if pending.tasks]
@@ -228,33 +227,27 @@ class Classifier:
         """When the contact's next decision point comes."""
         return pending.contact.onset_s + self._points_s[pending.decision_point]
 
-    def _is_due(self, pending: Pending, t: float) -> bool:
-        age_s = t - pending.contact.onset_s
-        return age_s >= self._points_s[pending.decision_point]
-
-    def _set_aside(self, frame: Frame) -> Aside | None:
+    def _set_aside(self, t: float) -> list[Event]:
         """The event of taxels that have been set aside or taken back for a while."""
         aside = self.tracker.still.aside
-        bits = b"" if aside is None else aside.tobytes()
-        if bits == self._aside or self._aside_s == -math.inf:
-            self._aside_s = frame.t
-            return None
-        if frame.t - self._aside_s < ASIDE_S:
-            return None
-        self._aside = bits
-        self._aside_s = frame.t
-        taxels = np.argwhere(np.zeros((0, 2)) if aside is None else aside)
-        return Aside(frame.t, tuple((row, col) for row, col in taxels.tolist()))
+        if self._aside_s == -math.inf or (aside == self._aside).all():
+            self._aside_s = t
+        if t - self._aside_s < ASIDE_S:
+            return []
+        self._aside = aside
+        self._aside_s = t
+        return [Aside(t, tuple((row, col) for row, col in np.argwhere(aside).tolist()))]
 
     def _begin(self, contact: Contact) -> Onset:
         """Number a contact, and let its tasks wait."""
         self._begun += 1
-        self._numbers[contact] = self._begun
+        number = self._begun if self._max_contacts > 1 else None
+        self._numbers[contact] = number
         info = self.model.info
         first = self._last if self.error is None else 0
         tasks = sorted(info.tasks, key=info.products.__contains__)
-        self._pending.append(Pending(contact, self._begun, first, tasks))
-        return Onset(contact.onset_s, self._named(self._begun))
+        self._pending.append(Pending(contact, number, first, tasks))
+        return Onset(contact.onset_s, number)
 
     def finish(self) -> list[Event]:
         """End the stream, and decide what waits.
@@ -334,10 +327,6 @@ class Classifier:
             yield from fresh.push(frame)
         yield from fresh.finish()
 
-    def _named(self, number: int) -> int | None:
-        """The contact's number if several are followed at once, else None."""
-        return number if self._max_contacts > 1 else None
-
     def _decide(
         self,
         pending: Pending,
@@ -346,29 +335,32 @@ class Classifier:
         short: bool = False,
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
+        info = self.model.info
         point = pending.decision_point
         window_s = self._points_s[point]
         series = pending.contact.series()
         blank = self._blank(pending, series, window_s, short)
         try:
-            vector = self.model.info.vector(series, window_s)
+            vector = info.vector(series, window_s)
             decisions = self.model.decide(vector, point)
         except OutOfRange:
             blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
             answers = [replace(blank, task=task) for task in pending.tasks]
         else:
-            unknown = self._is_unknown(point, decisions)
+            unknown = False
+            if info.novelty is not None:
+                score = decisions[info.novelty.task].novelty
+                unknown = info.novelty.rate(point, score) <= self.novelty_rate
             if unknown and point == self._last:
                 from edge.model.unusual import unusual  # few contacts are unknown
 
-                info = self.model.info
                 phrase = unusual(vector, info.widths, info.usual)
                 blank = replace(blank, unusual=phrase)
             answers = self._answers(pending, blank, decisions, unknown)
         pending.decision_point += 1
         for answer in answers:
             pending.tasks.remove(answer.task)
-        latency_ms = _milliseconds_since(began)
+        latency_ms = round((time.perf_counter() - began) * 1e3, 3)
         return [replace(answer, latency_ms=latency_ms) for answer in answers]
 
     def _blank(
@@ -391,8 +383,13 @@ class Classifier:
             "late": contact.late,
             "skin_motion": contact.chain is None and info.chain is not None,
         }
+        position = None
         if self._max_contacts > 1:
             del doubts["several"]
+            position = contact.position()
+        if position is not None:
+            x, y, z = (round(metres, 6) for metres in position)
+            position = x, y, z
         return Decided(
             task="",
             label=None,
@@ -401,18 +398,10 @@ class Classifier:
             onset_s=contact.onset_s,
             latency_ms=0.0,
             flags=flags_of(doubts),
-            contact=self._named(pending.number),
-            position=self._position(contact),
+            contact=pending.number,
+            position=position,
             model=self.model.named,
         )
-
-    def _position(self, contact: Contact) -> tuple[float, float, float] | None:
-        """Where a contact is, if several are followed and it is known."""
-        position = contact.position() if self._max_contacts > 1 else None
-        if position is None:
-            return None
-        x, y, z = (round(value, 6) for value in position)
-        return x, y, z
 
     def _answers(
         self,
@@ -424,11 +413,11 @@ class Classifier:
         """The answers of the tasks that need not wait any longer."""
         answers = []
         for task in pending.tasks:
-            candidate = replace(blank, task=task)
-            answer: Decided | None = self._answer(candidate, decisions[task], unknown)
-            if answer is not None and self._policies:
+            candidate = self._answer(blank, task, decisions[task], unknown)
+            answer: Decided | None = candidate
+            if self._policies:
                 answer = self._policies[task].answer(
-                    answer,
+                    candidate,
                     pending.decision_point,
                     pending.decided,
                 )
@@ -437,7 +426,13 @@ class Classifier:
                 answers.append(answer)
         return answers
 
-    def _answer(self, blank: Decided, decision: Decision, unknown: bool) -> Decided:
+    def _answer(
+        self,
+        blank: Decided,
+        task: str,
+        decision: Decision,
+        unknown: bool,
+    ) -> Decided:
         """The model's answer, with its confidence rounded to millionths."""
         confidence = decision.confidence
         doubts = {
@@ -448,24 +443,13 @@ class Classifier:
         }
         return replace(
             blank,
+            task=task,
             label=decision.label,
             confidence=None if confidence is None else round(confidence, 6),
             flags=(*blank.flags, *flags_of(doubts)),
             nearest=tuple(map(self.model.info.trial, decision.neighbours.tolist())),
             decision=decision,
         )
-
-    def _is_unknown(self, point: int, decisions: Mapping[str, Decision]) -> bool:
-        """Whether the contact is unlike everything in training."""
-        novelty = self.model.info.novelty
-        if novelty is None:
-            return False
-        score = decisions[novelty.task].novelty
-        return novelty.rate(point, score) <= self.novelty_rate
-
-
-def _milliseconds_since(began: float) -> float:
-    return round((time.perf_counter() - began) * 1e3, 3)
 
 
 def suited(model: Model, recording: Recording, name: str) -> Recording:

@@ -47,11 +47,6 @@ class Grid:
         flat = np.unpackbits(packed, count=size, bitorder="little").view(np.bool_)
         return flat.reshape(self.rows, self.stride)[:, : self.cols]
 
-    def bit(self, index: int) -> int:
-        """The taxel of a flat index (row * cols + col)."""
-        row, col = divmod(index, self.cols)
-        return 1 << (row * self.stride + col)
-
     def neighbours(self, bits: int) -> int:
         """The taxels next to one of `bits`; bits outside the grid may be set too."""
         beside = bits << 1 | bits >> 1 | bits << self.stride | bits >> self.stride
@@ -71,22 +66,19 @@ class Grid:
             region = grown
         return 0
 
-    def row_sum(self, bits: int) -> int:
-        """Sum of the rows of all taxels of `bits`."""
-        return sum(i * (bits & row).bit_count() for i, row in enumerate(self._rows))
+    def sums(self, bits: int) -> tuple[int, int]:
+        """(sum of rows, sum of columns) over the taxels of `bits`.
 
-    def col_sum(self, bits: int) -> int:
-        """Sum of the columns of all taxels of `bits`; 0 <= sum < cols * area.
-
-        Where the skin wraps, columns are counted from `best_cut` of the taxels. A set
-        that spans less than half a turn has the mean of its unrolled columns, wherever
-        the seam lies.
+        0 <= sum of columns < cols * area. Where the skin wraps, columns are counted from
+        `best_cut` of the taxels. A set that spans less than half a turn has the mean of
+        its unrolled columns, wherever the seam lies.
         """
         areas = [(bits & column).bit_count() for column in self._columns]
         cut = best_cut(areas) if self.wraps else 0
-        total = sum(col * area for col, area in enumerate(areas))
-        total += self.cols * sum(areas[:cut])
-        return total % (self.cols * sum(areas))
+        cols = sum(col * area for col, area in enumerate(areas))
+        cols += self.cols * sum(areas[:cut])
+        rows = sum(i * (bits & row).bit_count() for i, row in enumerate(self._rows))
+        return rows, cols % (self.cols * bits.bit_count())
 
 
 def best_cut(weights: Sequence[int]) -> int:
@@ -139,7 +131,7 @@ class Region:
     @cached_property
     def sums(self) -> tuple[int, int]:
         """(sum of rows, sum of columns) over the taxels: `area` times the centroid."""
-        return self._grid.row_sum(self.bits), self._grid.col_sum(self.bits)
+        return self._grid.sums(self.bits)
 
     @property
     def centroid(self) -> tuple[float, float]:
@@ -152,10 +144,10 @@ class Region:
         """(rows, cols), True on the region's taxels."""
         return self._grid.unpack(self.bits)
 
-    def touches(self, other: Self) -> bool:
-        """Whether a taxel of this region is next to, or the same as, one of the
-        other's."""
-        return bool((self.bits | self._grid.neighbours(self.bits)) & other.bits)
+    def touches(self, region: Self) -> bool:
+        """Whether a taxel of this region is next to, or the same as, one of another
+        region."""
+        return bool((self.bits | self._grid.neighbours(self.bits)) & region.bits)
 
     def __repr__(self) -> str:
         row, col = self.centroid
@@ -207,21 +199,14 @@ class ActiveTaxels:
         # The region with the frame's peak is nearly always larger than all others
         # together.
         index = int(self.counts.argmax())
-        bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
+        row, col = divmod(index, self._grid.cols)
+        seed = 1 << row * self._grid.stride + col
+        bits = self._grid.flood(seed & self.bits, self.bits)
         if 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        return self._largest_of_many(0 if previous is None else previous.bits)
-
-    def _largest_of_many(self, previous: int) -> Region:
-        if not self.bits & self._grid.neighbours(self.bits):
-            # A flickering skin may have nothing but lone taxels, a hundred and more.
-            among = self.bits & previous or self.bits
-            lone = np.flatnonzero(self._grid.unpack(among))
-            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
-            return Region(self._grid, self._grid.bit(index), self.counts.item(index))
         from edge.touch.components import largest_of  # one flood does for a touch
 
-        before = self._grid.unpack(previous)
+        before = self._grid.unpack(0 if previous is None else previous.bits)
         taxels = largest_of(self._padded, self.counts, self._grid.wraps, before)
         peak = int(self.counts[taxels[:, :-1]].max())
         return Region(self._grid, self._grid.pack(taxels), peak)

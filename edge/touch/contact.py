@@ -43,6 +43,8 @@ class FeatureSeries:
             taxels if the skin's pitch is unknown; its last value is kept without
             contact; NaN where the arm's pose was not known; 0 where it was not asked
             for.
+        same: (n,) whether a frame repeats the one before it bit for bit.
+        beside: (n,) whether another region rises above the onset beside the contact.
         layout: the skin, with its thresholds.
         ended: the contact ended with the last frame.
         zones: {zone: (n, 8)} whole numbers of each zone, see `edge.touch.zones`; 12
@@ -54,8 +56,6 @@ class FeatureSeries:
             None.
         joints: (n, dof) joint angles in radians, NaN where they were not known, or
             None.
-        same: (n,) whether a frame repeats the one before it bit for bit.
-        beside: (n,) whether another region rises above the onset beside the contact.
     """
 
     t: NDArray[np.float64]
@@ -63,6 +63,8 @@ class FeatureSeries:
     area: NDArray[np.int64]
     sums: NDArray[np.int64]
     motion: NDArray[np.float64]
+    same: NDArray[np.bool_]
+    beside: NDArray[np.bool_]
     layout: SkinLayout
     ended: bool = False
     zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
@@ -70,8 +72,6 @@ class FeatureSeries:
     taxels: NDArray[np.int64] | None = None
     kernel_cells: NDArray[np.int64] | None = None
     joints: NDArray[np.float64] | None = None
-    same: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
-    beside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     def felt(self, window_s: float) -> Self:
         """The frames in which the contact is felt, up to the end of the window.
@@ -94,7 +94,7 @@ class FeatureSeries:
         changes: dict[str, Any] = {
             name: value[pick]
             for name, value in vars(self).items()
-            if isinstance(value, np.ndarray) and value.size
+            if isinstance(value, np.ndarray)
         }
         changes["zones"] = {zone: rows[pick] for zone, rows in self.zones.items()}
         return replace(self, **changes)
@@ -222,19 +222,23 @@ class Contact:
             self._forget_last()
         if frame.valid is not None and not self.missing_taxels:
             self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
-        zones: list[int] = []
-        if measurer.zones is not None:
-            zones = measurer.zones.measure(active, region, frame.shear)
-        row: dict[str, Any] = {"t": age_s, **self._motions(frame, region, zones)}
-        row["same"] = self._repeats(frame)
-        row["beside"] = region is not None and active.has_other(
-            region, self.layout.onset
-        )
+        counted = [0] * PLAIN
+        beside = False
         if region is not None:
             self.region = region
             self.joints = frame.joints
-        counted = [*self._plain(region), *zones]
-        row["counted"] = np.array(counted, dtype=np.int64)
+            sums = region.sums if measurer.motion else (0, 0)
+            counted = [region.peak, region.area, *sums]
+            beside = active.has_other(region, self.layout.onset)
+        if measurer.zones is not None:
+            counted += measurer.zones.measure(active, region, frame.shear)
+        row: dict[str, Any] = {
+            "t": age_s,
+            "same": self._repeats(frame),
+            "beside": beside,
+            "counted": np.array(counted, dtype=np.int64),
+            **self._motions(frame, region, counted),
+        }
         for name, cells in measurer.cells.items():
             row[name] = cells.read(frame)
         if measurer.joints:
@@ -248,17 +252,6 @@ class Contact:
         self._before = frame.counts
         return before is not None and bool((frame.counts == before).all())
 
-    def _plain(self, region: Region | None) -> list[int]:
-        """(`PLAIN`,) peak, area and sums of a region; zeros where they are not
-        measured."""
-        plain = [0] * PLAIN
-        if region is not None:
-            plain[0] = region.peak
-            plain[1] = region.area
-            if self._measurer.motion:
-                plain[2:] = region.sums
-        return plain
-
     def _forget_last(self) -> None:
         """Drop the last frame: of two readings of one instant the later one counts."""
         self._rows.pop()
@@ -270,7 +263,7 @@ class Contact:
         self,
         frame: Frame,
         region: Region | None,
-        zones: list[int],
+        counted: list[int],
     ) -> dict[str, float]:
         """The distances that the centroids have travelled, without contact the last."""
         measurer = self._measurer
@@ -285,13 +278,10 @@ class Contact:
             motions["motion"] = self._distance("motion", region.centroid, frame.joints)
         if measurer.force_motion:
             # The contact's zone comes first.
-            _, _, force, rows, cols, *_ = zones
+            _, _, force, rows, cols, *_ = counted[PLAIN:]
             centroid = rows / force, cols / force % self.layout.cols
-            motions["force_motion"] = self._distance(
-                "force_motion",
-                centroid,
-                frame.joints,
-            )
+            distance = self._distance("force_motion", centroid, frame.joints)
+            motions["force_motion"] = distance
         return motions
 
     def _joints_of(self, frame: Frame) -> NDArray[np.float64]:

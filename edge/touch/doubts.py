@@ -34,7 +34,7 @@ Limits = Sequence[tuple[float, float] | None]
 
 def is_several(series: FeatureSeries) -> bool:
     """Whether a second region was there in much of a window."""
-    return series.beside.size > 0 and float(series.beside.mean()) >= BESIDE_SHARE
+    return float(series.beside.mean()) >= BESIDE_SHARE
 
 
 def frame_doubts(

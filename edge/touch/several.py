@@ -1,22 +1,31 @@
 """Several contacts at once: which region continues which."""
 
 from collections.abc import Sequence
+from operator import itemgetter
 
 from edge.touch.active import Region
+from edge.touch.contact import Contact
 
 
-def shared(followed: Sequence[Region], regions: Sequence[Region]) -> dict[int, int]:
-    """{contact: the region that continues it}, as indices.
+def shared(
+    contacts: Sequence[Contact], regions: Sequence[Region]
+) -> dict[Contact, Region]:
+    """{contact: the region that continues it}.
 
     Most taxels in common come first, then the older contact, then the larger region.
+
+    Args:
+        contacts: the oldest first.
+        regions: the largest first.
     """
     pairs = []
-    for i, former in enumerate(followed):
-        for j, region in enumerate(regions):
-            if former.touches(region):
-                pairs.append((-(former.bits & region.bits).bit_count(), i, j))
-    shares: dict[int, int] = {}
-    for _, i, j in sorted(pairs):
-        if i not in shares and j not in shares.values():
-            shares[i] = j
+    for contact in contacts:
+        for region in regions:
+            if contact.region.touches(region):
+                common = (contact.region.bits & region.bits).bit_count()
+                pairs.append((common, contact, region))
+    shares: dict[Contact, Region] = {}
+    for _, contact, region in sorted(pairs, key=itemgetter(0), reverse=True):
+        if contact not in shares and region not in shares.values():
+            shares[contact] = region
     return shares

@@ -145,21 +145,18 @@ class ContactTracker:
 
     def _advance(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
         """Take in a frame by its active taxels; the contacts that it belongs to."""
-        regions = self._regions(active)
+        regions, shares = self._regions(active)
         self.region = regions[0] if regions else None
-        shares = self._shares(regions)
-        for number, contact in enumerate(self._contacts):
-            share = shares.get(number)
-            region = None if share is None else regions[share]
-            self._follow(contact, frame, active, region)
+        for contact in self._contacts:
+            self._follow(contact, frame, active, shares.get(contact))
         contacts = list(self._contacts)
-        shared = set(shares.values())
-        for number, region in enumerate(regions):
-            if number in shared or not self._may_begin(region, contacts):
-                continue
-            contact = self._begin(frame, region)
-            contacts.append(contact)
-            self._follow(contact, frame, active, region)
+        for region in regions:
+            room = len(contacts) < self._max_contacts
+            is_new = region not in shares.values()
+            if room and is_new and region.peak > self.layout.onset:
+                contact = self._begin(frame, region)
+                contacts.append(contact)
+                self._follow(contact, frame, active, region)
         self._contacts = [contact for contact in contacts if not contact.ended]
         return self._lasting(contacts)
 
@@ -167,26 +164,21 @@ class ContactTracker:
         """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
-    def _regions(self, active: ActiveTaxels) -> list[Region]:
-        """The regions to follow, the largest first."""
-        if self._max_contacts > 1:
-            return active.regions
-        former = self._contacts[0].region if self._contacts else None
-        largest = active.largest(former)
-        return [] if largest is None else [largest]
-
-    def _shares(self, regions: list[Region]) -> dict[int, int]:
-        """{contact: the region that continues it}, as indices."""
+    def _regions(
+        self, active: ActiveTaxels
+    ) -> tuple[list[Region], dict[Contact, Region]]:
+        """The regions to follow, the largest first, and {contact: the region that
+        continues it}."""
         if self._max_contacts > 1:
             from edge.touch.several import shared  # few follow more than one
 
-            return shared([contact.region for contact in self._contacts], regions)
+            return active.regions, shared(self._contacts, active.regions)
+        former = self._contacts[0].region if self._contacts else None
+        largest = active.largest(former)
+        if largest is None:
+            return [], {}
         # The one contact is the largest region, wherever it lies.
-        return dict.fromkeys(range(len(self._contacts)), 0) if regions else {}
-
-    def _may_begin(self, region: Region, contacts: Sequence[Contact]) -> bool:
-        room = len(contacts) < self._max_contacts
-        return room and region.peak > self.layout.onset
+        return [largest], dict.fromkeys(self._contacts, largest)
 
     def _begin(self, frame: Frame, region: Region) -> Contact:
         on_skin = self.motion_on_skin and frame.joints is None
@@ -242,14 +234,13 @@ class StillTaxels:
     touch; where it then returns to its former count, it is set aside at once.
 
     Attributes:
-        aside: (rows, cols), True on the taxels that are set aside; None where there are
-            none.
+        aside: (rows, cols), True on the taxels that are set aside.
         touched: the last frame showed that they are touched, as they changed.
     """
 
     def __init__(self, layout: SkinLayout, horizon_s: float) -> None:
         """Watch a skin on which contacts are followed for `horizon_s`."""
-        self.aside: NDArray[np.bool_] | None = None
+        self.aside = np.zeros(layout.shape, dtype=np.bool_)
         self.touched = False
         self._threshold = layout.threshold_counts
         longest_s = horizon_s if math.isfinite(horizon_s) else 0.0
@@ -260,47 +251,32 @@ class StillTaxels:
         self._levels = np.zeros(layout.shape, dtype=np.int64)
         """The counts of taxels that have been set aside; 0 of all others."""
         self._next_s = -math.inf
-        self._started = False
 
-    def push(self, frame: Frame, active: NDArray[np.bool_], any_active: bool) -> None:
-        """Take in a frame.
-
-        Args:
-            frame: of the skin.
-            active: (rows, cols) its taxels above the threshold.
-            any_active: whether there are any.
-        """
+    def push(self, frame: Frame, active: ActiveTaxels) -> None:
+        """Take in a frame of the skin, with its taxels above the threshold."""
         self.touched = False
-        if not self._started:
-            self._started = True
-            if any_active:
-                self._set_aside(frame, active)
-        elif self.aside is not None:
-            self._take_back(frame, active, self.aside)
+        if self._next_s == -math.inf:
+            self._set_aside(frame, active.mask)
+        elif self.aside.any():
+            self._take_back(frame, active.mask)
         if frame.t >= self._next_s:
             self._next_s = frame.t + CHECK_S
-            self._look(frame, active, any_active)
+            self._look(frame, active)
 
-    def _take_back(
-        self,
-        frame: Frame,
-        active: NDArray[np.bool_],
-        aside: NDArray[np.bool_],
-    ) -> None:
+    def _take_back(self, frame: Frame, active: NDArray[np.bool_]) -> None:
         change = np.abs(frame.counts - self._levels)
         most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
-        self.touched = bool((change > most)[aside].any())
-        rest = aside & active
-        self.aside = rest if rest.any() and not self.touched else None
+        self.touched = bool((self.aside & (change > most)).any())
+        self.aside = self.aside & active & (not self.touched)
 
-    def _look(self, frame: Frame, active: NDArray[np.bool_], any_active: bool) -> None:
-        if not any_active:
+    def _look(self, frame: Frame, active: ActiveTaxels) -> None:
+        if not active.bits:
             self._looks[:] = 0
             return
-        same = active & self._near(frame, self._reference)
+        same = active.mask & self._near(frame, self._reference)
         self._looks = np.where(same, self._looks + 1, 0)
         np.copyto(self._reference, frame.counts, where=~same)
-        unchanged = active & (self._levels > 0) & self._near(frame, self._levels)
+        unchanged = active.mask & (self._levels > 0) & self._near(frame, self._levels)
         still = unchanged | (self._looks * CHECK_S >= self._still_s)
         if still.any() and not self.touched:
             self._set_aside(frame, still)
@@ -310,9 +286,8 @@ class StillTaxels:
         return np.asarray(np.abs(frame.counts - counts) <= most)
 
     def _set_aside(self, frame: Frame, taxels: NDArray[np.bool_]) -> None:
-        new = taxels if self.aside is None else taxels & ~self.aside
-        np.copyto(self._levels, frame.counts, where=new)
-        self.aside = taxels.copy() if self.aside is None else self.aside | taxels
+        np.copyto(self._levels, frame.counts, where=taxels & ~self.aside)
+        self.aside = self.aside | taxels
 
 
 class WatchfulTracker(ContactTracker):
@@ -339,17 +314,18 @@ class WatchfulTracker(ContactTracker):
         """As `ContactTracker.push`, without the taxels that are set aside."""
         self._check(frame)
         active = self._active(frame, frame.valid)
-        self.still.push(frame, active.mask, active.bits != 0)
+        self.still.push(frame, active)
         if self._began_s is None:
             self._began_s = frame.t
         age_s = frame.t - self._began_s
         if self.still.touched:
             return self._touched(frame, active, age_s)
-        aside = self.still.aside
-        if aside is None:
+        if not self.still.aside.any():
             self._early = []
             return self._advance(frame, active)
-        valid = ~aside if frame.valid is None else frame.valid & ~aside
+        valid = ~self.still.aside
+        if frame.valid is not None:
+            valid &= frame.valid
         return self._beside(frame, active, self._active(frame, valid), age_s)
 
     def _beside(
@@ -373,11 +349,7 @@ class WatchfulTracker(ContactTracker):
         """The contacts of the first frame that never changed, where the stream has had
         no other contact."""
         self._follow_early()
-        return [
-            contact
-            for contact in self._contacts
-            if contact.late and contact.frames >= self._debounce
-        ]
+        return [contact for contact in self._lasting(self._contacts) if contact.late]
 
     def _touched(
         self,
@@ -393,13 +365,11 @@ class WatchfulTracker(ContactTracker):
         return self._advance(frame, active)
 
     def _follow_early(self) -> None:
-        frames = self._early
-        self._early = []
-        for frame in frames:
+        for frame in self._early:
             self._advance(frame, self._active(frame, frame.valid))
-        if frames:
             for contact in self._contacts:
                 contact.late = True
+        self._early = []
 
 
 def _grown(active: ActiveTaxels, beside: ActiveTaxels) -> bool:

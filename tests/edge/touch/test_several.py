@@ -1,27 +1,39 @@
 """Which region continues which contact, where several are followed."""
 
 import numpy as np
+import pytest
 
 from edge.touch.region import find_regions
 from edge.touch.several import shared
 
 
-def regions(*rows):
-    counts = np.array([[100 * int(taxel) for taxel in row] for row in rows])
+class Followed:
+    """A contact, of which only the region counts."""
+
+    def __init__(self, region):
+        self.region = region
+
+
+def regions(row):
+    counts = np.array([[100 * int(taxel) for taxel in row]])
     return find_regions(counts, 50, wraps=False)
 
 
-def test_a_contact_goes_on_in_the_region_of_most_taxels_in_common():
-    assert shared(regions("111111"), regions("110111")) == {0: 0}
-
-
-def test_of_two_contacts_that_grow_into_one_the_older_keeps_it():
-    assert shared(regions("110011"), regions("111111")) == {0: 0}
-
-
-def test_a_region_that_only_touches_a_contact_continues_it():
-    assert shared(regions("110000"), regions("001100")) == {0: 0}
-
-
-def test_regions_apart_continue_nothing():
-    assert shared(regions("110000"), regions("000110")) == {}
+@pytest.mark.parametrize(
+    ("before", "after", "shares"),
+    [
+        pytest.param("111111", "110111", {0: 0}, id="most taxels in common"),
+        pytest.param("110011", "111111", {0: 0}, id="the older of two keeps it"),
+        pytest.param("110000", "001100", {0: 0}, id="touching is enough"),
+        pytest.param("110000", "000110", {}, id="apart"),
+    ],
+)
+def test_a_contact_goes_on_in_the_region_that_it_shares_most_with(
+    before, after, shares
+):
+    contacts = [Followed(region) for region in regions(before)]
+    candidates = regions(after)
+    assert {
+        contacts.index(contact): candidates.index(region)
+        for contact, region in shared(contacts, candidates).items()
+    } == shares
