@@ -6,6 +6,7 @@ order of summation rounds, so that numpy and ONNX Runtime agree to the last bit.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -40,10 +41,6 @@ def _cast(x: Array, attributes: Attributes) -> Array:
     return x.astype(TYPES[attributes["to"]])
 
 
-def _clip(x: Array, low: Array, high: Array, attributes: Attributes) -> Array:
-    return np.minimum(np.maximum(x, low), high)
-
-
 def _gather(x: Array, indices: Array, attributes: Attributes) -> Array:
     return x.take(indices, axis=attributes.get("axis", 0))
 
@@ -60,33 +57,19 @@ def _gather_nd(x: Array, indices: Array, attributes: Attributes) -> Array:
     return np.asarray(x[(*grid[:batch], *coordinates)])
 
 
-def _gemm(a: Array, b: Array, c: Array, attributes: Attributes) -> Array:
-    return a @ b + c
-
-
-def _pad(x: Array, pads: Array, value: Array, attributes: Attributes) -> Array:
+def _pad(x: Array, pads: Array, value: Array) -> Array:
     sides = pads.reshape(2, -1).T.tolist()
     return np.pad(x, sides, constant_values=value.item())
 
 
-def _reduction(
-    combine: Callable[..., Array],
-) -> Callable[..., Array]:
+def _reduction(combine: Callable[..., Array]) -> Callable[..., Array]:
     """An operator that combines the values along some axes."""
 
-    def reduce(x: Array, axes: Array, attributes: Attributes) -> Array:
+    def operator(x: Array, axes: Array, attributes: Attributes) -> Array:
         keep = bool(attributes.get("keepdims", 1))
-        return combine(x, axis=tuple(axes.tolist()), keepdims=keep)
+        return np.asarray(combine(x, axis=tuple(axes.tolist()), keepdims=keep))
 
-    return reduce
-
-
-def _sum_of_magnitudes(x: Array, **axes: Any) -> Array:
-    return np.asarray(np.abs(x).sum(**axes))
-
-
-def _sum_of_squares(x: Array, **axes: Any) -> Array:
-    return np.asarray(np.square(x).sum(**axes))
+    return operator
 
 
 def _squeeze(x: Array, axes: Array | None = None, *, attributes: Attributes) -> Array:
@@ -103,7 +86,7 @@ def _top_k(x: Array, k: Array, attributes: Attributes) -> tuple[Array, Array]:
 
 
 def _plain(function: Callable[..., Any]) -> Callable[..., Array]:
-    """An operator of numpy that takes no attributes."""
+    """An operator without attributes."""
 
     def operator(*inputs: Array, attributes: Attributes) -> Array:
         return np.asarray(function(*inputs))
@@ -111,32 +94,25 @@ def _plain(function: Callable[..., Any]) -> Callable[..., Array]:
     return operator
 
 
-def _maximum(*inputs: Array, attributes: Attributes) -> Array:
-    largest = inputs[0]
-    for x in inputs[1:]:
-        largest = np.maximum(largest, x)
-    return largest
-
-
 OPERATORS: dict[str, Callable[..., Any]] = {
     "Add": _plain(np.add),
     "ArgMax": _arg_max,
     "Cast": _cast,
-    "Clip": _clip,
+    "Clip": _plain(np.clip),
     "Div": _plain(np.divide),
     "Gather": _gather,
     "GatherElements": _gather_elements,
     "GatherND": _gather_nd,
-    "Gemm": _gemm,
+    "Gemm": _plain(lambda a, b, c: a @ b + c),
     "LessOrEqual": _plain(np.less_equal),
     "MatMul": _plain(np.matmul),
-    "Max": _maximum,
+    "Max": _plain(lambda *inputs: reduce(np.maximum, inputs)),
     "Mul": _plain(np.multiply),
-    "Pad": _pad,
-    "ReduceL1": _reduction(_sum_of_magnitudes),
+    "Pad": _plain(_pad),
+    "ReduceL1": _reduction(lambda x, **axes: np.abs(x).sum(**axes)),
     "ReduceMean": _reduction(np.mean),
     "ReduceSum": _reduction(np.sum),
-    "ReduceSumSquare": _reduction(_sum_of_squares),
+    "ReduceSumSquare": _reduction(lambda x, **axes: np.square(x).sum(**axes)),
     "Round": _plain(np.rint),
     "Sqrt": _plain(np.sqrt),
     "Squeeze": _squeeze,

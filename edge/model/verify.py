@@ -38,8 +38,8 @@ from edge.model.model import Model
 from edge.recording import Recording, load_arrays, load_meta
 from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
+from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout
-from edge.touch.track import first_contact
 
 OUTPUTS = ("label", "neighbours", "scores", "distances")
 """Ends of the names of a task's outputs."""
@@ -133,21 +133,16 @@ def second_opinion(model: Model, arrays: Mapping[str, NDArray[Any]]) -> Check | 
     rows = len(arrays["vectors"])
     in_numpy = answers(Model(model.path, "numpy"), arrays)
     for key, answer in _comparable(model, arrays).items():
-        answered = golden_labels(arrays, key) >= 0
+        answered = arrays[_answered_key(key)] >= 0
         check = compared(key, answer[answered], in_numpy[key][answered], 0.0)
         if not check.passed:
             return replace(check, name=f"{name}: {key}", rows=rows)
     return Check(name, rows, 0.0, None)
 
 
-def golden_labels(arrays: Mapping[str, NDArray[Any]], key: str) -> NDArray[np.int64]:
-    """The golden labels that belong to an output; -1 for vectors that are refused."""
-    labels: NDArray[np.int64] = arrays[answered_key(key)]
-    return labels
-
-
-def answered_key(key: str) -> str:
-    """The output that says whether an output's vectors are answered at all.
+def _answered_key(key: str) -> str:
+    """The output that says whether an output's vectors are answered at all: a label,
+    which is -1 of those that are refused.
 
     ONNX leaves open where NaN stands in an order, so that what follows from a vector
     that is not finite may differ.
@@ -216,8 +211,9 @@ def _graph(
             )
     for key, answer in _comparable(model, arrays).items():
         bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
-        refused = golden_labels(arrays, key) < 0
-        if key != answered_key(key):
+        label = _answered_key(key)
+        if key != label:
+            refused = arrays[label] < 0
             answer = answer.copy()
             answer[refused] = arrays[key][refused]
         yield key, answer, arrays[key], bound
@@ -231,13 +227,11 @@ def _comparable(
     Models of that time gave the size of the excess, which not every engine rounds
     alike.
     """
-    comparable = answers(model, arrays)
-    older = [
-        key for key in comparable if key.endswith(OUT_OF_RANGE) and key not in arrays
-    ]
-    for key in older:
-        del comparable[key]
-    return comparable
+    return {
+        key: answer
+        for key, answer in answers(model, arrays).items()
+        if key in arrays or not key.endswith(OUT_OF_RANGE)
+    }
 
 
 def answers(
@@ -317,15 +311,10 @@ def compared(
 ) -> Check:
     """Compare a quantity, whose first axis is the rows; see the module for the
     bound."""
+    rows = len(expected)
     if values.shape != expected.shape:
-        return Check(
-            name,
-            len(expected),
-            np.inf,
-            0,
-            f"shape {values.shape}",
-            f"{expected.shape}",
-        )
+        shapes = f"shape {values.shape}", f"{expected.shape}"
+        return Check(name, rows, np.inf, 0, *shapes)
     if values.size == 0:
         return Check(name, 0, 0.0, None)
     same = (values == expected) | (np.isnan(values) & np.isnan(expected))
@@ -337,15 +326,14 @@ def compared(
             np.abs(values - expected) / allowance,
             np.inf,
         )
-    share = np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap)).reshape(
-        len(values), -1
-    )
+    gap[np.isnan(gap)] = np.inf
+    share = np.where(same, 0.0, gap).reshape(rows, -1)
     row, column = divmod(int(share.argmax()), share.shape[1])
     worst = float(share[row, column])
     if worst == 0.0:
-        return Check(name, len(values), 0.0, None)
+        return Check(name, rows, 0.0, None)
     texts = []
     for side in (values, expected):
         at_row = side.reshape(share.shape)[row]
         texts.append(str(at_row) if bound == 0.0 else repr(float(at_row[column])))
-    return Check(name, len(values), worst, row, *texts)
+    return Check(name, rows, worst, row, *texts)

@@ -30,9 +30,9 @@ from edge.commands.output import LOG, Output
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import Recording
+from edge.touch.first_contact import first_contact
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
-from edge.touch.track import first_contact
 from edge.writing import write_whole
 
 RATE_HZ = 100.0

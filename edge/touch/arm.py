@@ -80,9 +80,9 @@ class Chain:
         self.limits = tuple(joint.limits for joint in moving)
         """(lower, upper) of each moving joint in radians, or metres if it slides; or
         None."""
-        self._links: list[tuple[bool, Vector, tuple[float, ...]]] = []
+        self._links: list[tuple[bool, Vector, list[list[float]]]] = []
         """Of each moving joint: whether it slides, its axis of length 1, and the fixed
-        step before it, (12,) the first three rows of a transform."""
+        step before it, the first three rows of a transform as plain numbers."""
         fixed = np.eye(4)
         for joint in self.joints:
             _check_joint(joint)
@@ -90,10 +90,11 @@ class Chain:
             if joint.kind != "fixed":
                 length = math.hypot(*joint.axis)
                 x, y, z = (component / length for component in joint.axis)
-                self._links.append((joint.kind == "prismatic", (x, y, z), _rows(fixed)))
+                slides = joint.kind == "prismatic"
+                self._links.append((slides, (x, y, z), fixed[:3].tolist()))
                 fixed = np.eye(4)
             fixed = fixed @ _transform(joint.translate, ZERO)
-        self._tip = _rows(fixed)
+        self._tip: list[list[float]] = fixed[:3].tolist()
 
     def pose(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of the tip in the base's frame.
@@ -161,7 +162,7 @@ class Chain:
         Angles and coordinates are numbers, or arrays of equal shape.
         """
         x, y, z, w = position
-        x, y, z = _moved(self._tip, x, y, z, w)
+        x, y, z = (a * x + b * y + c * z + d * w for a, b, c, d in self._tip)
         links = zip(reversed(angles), reversed(self._links), strict=True)
         for angle, (slides, (kx, ky, kz), step) in links:
             if slides:
@@ -178,7 +179,7 @@ class Chain:
                 x = x + (f * ax + g * (ky * az - kz * ay))
                 y = y + (f * ay + g * (kz * ax - kx * az))
                 z = z + (f * az + g * (kx * ay - ky * ax))
-            x, y, z = _moved(step, x, y, z, w)
+            x, y, z = (a * x + b * y + c * z + d * w for a, b, c, d in step)
         return x, y, z
 
     def to_dict(self) -> dict[str, Any]:
@@ -251,27 +252,6 @@ def _check_joint(joint: Joint) -> None:
             f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its "
             f"upper limit {joint.limits[1]:g}"
         )
-
-
-def _rows(step: NDArray[np.float64]) -> tuple[float, ...]:
-    """The first three rows of a transform as plain numbers (12,)."""
-    return tuple(step[:3].ravel().tolist())
-
-
-def _moved(
-    step: tuple[float, ...],
-    x: Any,
-    y: Any,
-    z: Any,
-    w: Any,
-) -> tuple[Any, Any, Any]:
-    """Homogeneous coordinates after a fixed step."""
-    a, b, c, tx, d, e, f, ty, g, h, i, tz = step
-    return (
-        a * x + b * y + c * z + tx * w,
-        d * x + e * y + f * z + ty * w,
-        g * x + h * y + i * z + tz * w,
-    )
 
 
 def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:

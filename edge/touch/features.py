@@ -68,7 +68,8 @@ def feature_vector(
 
     >>> import edge
     >>> from edge import demo
-    >>> from edge.touch.track import ContactTracker, first_contact
+    >>> from edge.touch.first_contact import first_contact
+    >>> from edge.touch.track import ContactTracker
     >>> recording = edge.load(demo.FOLDER / "pillow-movable.npz")
     >>> onset_s, series = first_contact(recording, ContactTracker(recording.layout))
     >>> edge.feature_vector(series, window_s=1.2).shape

@@ -165,10 +165,10 @@ class SkinLayout:
             "wraps": table.flag("wraps", False),
             "row0_z_m": table.number("row0_z_m", 0.0, -LONGEST_M, LONGEST_M),
             "dead": table.wholes("dead", ()),
+            "threshold_counts": table.whole("threshold_counts", 0, range(65536)),
         }
-        for name in ("threshold_counts", "onset_counts"):
-            if table.has(name):
-                values[name] = table.whole(name, allowed=range(65536))
+        if table.has("onset_counts"):
+            values["onset_counts"] = table.whole("onset_counts", allowed=range(65536))
         highest = {
             "radius_m": LONGEST_M,
             "counts_per_newton": math.inf,
@@ -267,16 +267,13 @@ def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
             )
     if device.axes and not model.axes:
         sentences.append("the skin gives shear, which the model does not use")
-    if not _alike(device.pitch, model.pitch):
+    steps = zip(device.pitch, model.pitch, strict=True)
+    if not all(math.isclose(*pair, rel_tol=0.02) for pair in steps):
         sentences.append(
             f"taxels are {_millimetres(device.pitch)} apart, and "
             f"{_millimetres(model.pitch)} in training"
         )
     return sentences
-
-
-def _alike(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return all(math.isclose(x, y, rel_tol=0.02) for x, y in zip(a, b, strict=True))
 
 
 def _millimetres(pitch: tuple[float, float]) -> str:

@@ -4,7 +4,7 @@ that stay above the threshold without a touch, as they are stuck or leant on."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
     CLOCK_ROUNDING_S,
     Contact,
-    FeatureSeries,
     Measurer,
     region_time,
     released,
@@ -378,28 +377,3 @@ def _grown(active: ActiveTaxels, beside: ActiveTaxels) -> bool:
     return any(
         region.bits & aside and region.bits & beside.bits for region in active.regions
     )
-
-
-def first_contact(
-    frames: Iterable[Frame], tracker: ContactTracker
-) -> tuple[float, FeatureSeries] | None:
-    """Onset in seconds and series of the first contact, or None without contact.
-
-    Frames after its end, or beyond the tracker's horizon, are not read.
-
-    Args:
-        frames: in the order of time; a `Recording` is such a stream.
-        tracker: fresh.
-    """
-    first: Contact | None = None
-    for frame in frames:
-        contacts = tracker.push(frame)
-        if first is None and contacts:
-            first = contacts[0]
-        if first is not None and (
-            first.ended or frame.t - first.onset_s >= tracker.horizon_s
-        ):
-            break
-    if first is None:
-        first = next(iter(tracker.finish()), None)
-    return None if first is None else (first.onset_s, first.series())

@@ -8,8 +8,9 @@ from edge.demo import FOLDER
 from edge.recording import load
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S, feature_vector
+from edge.touch.first_contact import first_contact
 from edge.touch.kernels import BIASES, kernel_channels
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.track import ContactTracker
 from train.feature_sets import SETS
 from train.kernels import kernel_table
 

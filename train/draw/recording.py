@@ -16,10 +16,11 @@ from edge.tools.arrows import region_shear
 from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
+from edge.touch.first_contact import first_contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import with_thresholds

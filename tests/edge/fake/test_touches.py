@@ -8,7 +8,8 @@ from edge.fake import touches
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.skin.file import parse
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.first_contact import first_contact
+from edge.touch.track import ContactTracker
 from tests.edge.skin.small import one_chip
 
 

@@ -13,7 +13,8 @@ from edge.cli import main
 from edge.errors import InputError
 from edge.tools import bench
 from edge.tools.bench import summary, touch
-from edge.touch.track import ContactTracker, first_contact
+from edge.touch.first_contact import first_contact
+from edge.touch.track import ContactTracker
 
 
 @pytest.fixture(scope="module")
