@@ -22,33 +22,37 @@ def folder(make_touch, tmp_path):
     return tmp_path
 
 
-def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, edge):
-    before = (folder / "a.npz").read_bytes()
+@pytest.fixture
+def a(folder):
+    """The path of the first."""
+    return folder / "a.npz"
+
+
+def test_the_labels_of_a_folder_are_listed_and_its_files_left_alone(folder, a, edge):
+    before = a.read_bytes()
     status, lines, _ = edge("label", folder)
     assert status == 0
     assert lines[0] == {
         "event": "labels",
-        "file": str(folder / "a.npz"),
+        "file": str(a),
         "labels": {"category": "rigid-fixed", "object": "hard 0"},
         "kinds": [],
     }
-    assert (folder / "a.npz").read_bytes() == before
+    assert a.read_bytes() == before
 
 
-def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(folder, edge):
-    touch = load(folder / "a.npz")
-    meta = {**touch.meta, "labels": {"object": "\x1b[2J"}}
-    save(folder / "a.npz", replace(touch, meta=meta))
-    status, _, err = edge("label", folder / "a.npz")
+def test_a_label_that_would_act_on_a_terminal_is_counted_as_an_escape(a, edge):
+    label.change_all({a: {"object": "\x1b[2J"}})
+    status, _, err = edge("label", a)
     assert status == 0
     assert err == "object (1 of 1): \\x1b[2J 1\n"
 
 
-def test_a_file_is_relabelled_and_keeps_all_else(folder, edge):
-    before = load(folder / "a.npz")
+def test_a_file_is_relabelled_and_keeps_all_else(a, edge):
+    before = load(a)
     new = ("--set", "object=brick", "--set", "softness=rigid", "--yes")
-    _, lines, _ = edge("label", folder / "a.npz", *new)
-    after = load(folder / "a.npz")
+    _, lines, _ = edge("label", a, *new)
+    after = load(a)
     assert lines[0]["labels"] == after.labels
     assert after.labels == {
         "category": "rigid-fixed",
@@ -66,9 +70,9 @@ def test_a_file_is_relabelled_and_keeps_all_else(folder, edge):
         (("--unset", "object"), {"category": "rigid-fixed"}),
     ],
 )
-def test_a_task_is_renamed_or_its_label_taken_away(folder, edge, change, labels):
-    edge("label", folder / "a.npz", *change, "--yes")
-    assert load(folder / "a.npz").labels == labels
+def test_a_task_is_renamed_or_its_label_taken_away(a, edge, change, labels):
+    edge("label", a, *change, "--yes")
+    assert load(a).labels == labels
 
 
 @pytest.mark.parametrize(
@@ -86,20 +90,20 @@ def test_a_task_is_renamed_or_its_label_taken_away(folder, edge, change, labels)
 def test_what_cannot_be_changed_leaves_every_file_as_it_was(
     change,
     sentence,
-    folder,
+    a,
     refused,
 ):
-    before = (folder / "a.npz").read_bytes()
-    assert sentence in refused("label", folder, *change, "--yes")
-    assert (folder / "a.npz").read_bytes() == before
+    before = a.read_bytes()
+    assert sentence in refused("label", a.parent, *change, "--yes")
+    assert a.read_bytes() == before
 
 
-def test_nothing_changes_before_it_is_shown_and_agreed_to(folder, refused):
-    before = (folder / "a.npz").read_bytes()
-    err = refused("label", folder / "a.npz", "--set", "object=brick")
+def test_nothing_changes_before_it_is_shown_and_agreed_to(a, refused):
+    before = a.read_bytes()
+    err = refused("label", a, "--set", "object=brick")
     assert "object=hard 0 becomes category=rigid-fixed object=brick" in err
     assert "1 recording would change, as shown; add --yes to do it" in err
-    assert (folder / "a.npz").read_bytes() == before
+    assert a.read_bytes() == before
 
 
 def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
@@ -131,28 +135,23 @@ def test_a_change_that_was_interrupted_is_finished_by_the_next_start(
     assert list(tmp_path.glob(".*")) == []
 
 
-@pytest.fixture
-def two_days(make_touch, tmp_path):
-    """Two folders with a recording each, whose label was changed on its own, and then
-    with the other's."""
-    paths = [tmp_path / day / "a.npz" for day in ("monday", "tuesday")]
-    for path in paths:
+@pytest.mark.parametrize("days", [["tuesday"], ["monday", "tuesday"]])
+def test_a_change_of_several_folders_is_taken_back_in_one_or_all(
+    days,
+    make_touch,
+    tmp_path,
+    edge,
+):
+    """Each recording's label was changed on its own, and then with the other's."""
+    paths = {day: tmp_path / day / "a.npz" for day in ("monday", "tuesday")}
+    for path in paths.values():
         save(path, make_touch())
         label.change_all({path: {"object": "first"}})
-    label.change_all({path: {"object": "second"} for path in paths})
-    return paths
-
-
-def test_a_change_of_several_folders_is_taken_back_in_all(two_days, edge):
-    assert edge("label", *(path.parent for path in two_days), "--undo")[0] == 0
-    assert [load(path).labels for path in two_days] == [{"object": "first"}] * 2
-
-
-def test_a_change_of_several_folders_is_taken_back_in_one(two_days, edge):
-    monday, tuesday = two_days
-    assert edge("label", tuesday.parent, "--undo")[0] == 0
-    assert load(tuesday).labels == {"object": "first"}
-    assert load(monday).labels == {"object": "second"}
+    label.change_all({path: {"object": "second"} for path in paths.values()})
+    assert edge("label", *(tmp_path / day for day in days), "--undo")[0] == 0
+    for day, path in paths.items():
+        expected = "first" if day in days else "second"
+        assert load(path).labels == {"object": expected}
 
 
 @pytest.fixture
@@ -182,7 +181,7 @@ def kept(make_touch, tmp_path):
     ],
 )
 def test_touches_are_listed_by_what_asks_for_a_look(kept, edge, words, expected):
-    options = [part for word in words for part in ("--only", word)]
+    options = [f"--only={word}" for word in words]
     _, lines, _ = edge("label", kept, *options)
     assert [Path(line["file"]).stem for line in lines] == expected
 
@@ -228,16 +227,14 @@ def test_deleted_recordings_can_be_brought_back(kept, edge):
 
 
 def test_a_deleted_recording_never_replaces_a_newer_one(kept, edge, refused):
-    edge("label", kept, "--only", "wrong", "--delete", "--yes")
-    shutil.copy(kept / "sure.npz", kept / "wrong.npz")
-    newer = (kept / "wrong.npz").read_bytes()
-    assert "wrong.npz: exists again; rename it, and undo then" in refused(
-        "label",
-        kept,
-        "--undo",
-    )
-    assert (kept / "wrong.npz").read_bytes() == newer
-    (kept / "wrong.npz").rename(kept / "newer.npz")
+    wrong = kept / "wrong.npz"
+    edge("label", wrong, "--delete", "--yes")
+    shutil.copy(kept / "sure.npz", wrong)
+    newer = wrong.read_bytes()
+    err = refused("label", kept, "--undo")
+    assert "wrong.npz: exists again; rename it, and undo then" in err
+    assert wrong.read_bytes() == newer
+    wrong.rename(kept / "newer.npz")
     assert edge("label", kept, "--undo")[0] == 0
     assert len(find([str(kept)])) == 5
 
@@ -271,9 +268,6 @@ def test_undo_of_a_folder_that_is_not_there_changes_nothing_beside_it(
     refused,
 ):
     edge("label", kept, "--accept", "--yes")
-    assert "mistyped: --undo takes the folder of the recordings" in refused(
-        "label",
-        kept / "mistyped",
-        "--undo",
-    )
+    err = refused("label", kept / "mistyped", "--undo")
+    assert "mistyped: --undo takes the folder of the recordings" in err
     assert load(kept / "sure.npz").labels

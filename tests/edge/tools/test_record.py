@@ -36,9 +36,10 @@ def test_a_label_becomes_a_name_that_every_folder_takes_and_no_listing_hides(tmp
 
 
 @contextmanager
-def recorder(folder, out=None, *, names=None):
+def recorder(folder, out=None, *, page=None, **options):
     with closing(Lines(out or io.StringIO())) as lines:
-        yield Recorder(folder, {"object": "box"}, {}, names, lines)
+        options = {"names": None, "page": page, **options}
+        yield Recorder(folder, {"object": "box"}, {}, lines=lines, **options)
 
 
 def frames(*poses):
@@ -74,50 +75,54 @@ def test_a_trial_keeps_its_joints_names_where_some_frames_have_no_pose(
 
 
 @pytest.fixture
-def record(edge, recordings, tmp_path):
+def trials(tmp_path):
+    """The folder to record into."""
+    return tmp_path / "trials"
+
+
+@pytest.fixture
+def record(edge, recordings, trials):
     """Record a touch, labelled object=foam, into a folder."""
 
-    def run(*options, fake=recordings / "soft_1.npz", out=tmp_path / "trials"):
-        return edge(
-            "record",
-            "--fake",
-            fake,
-            "--label",
-            "object=foam",
-            "--out",
-            out,
-            *options,
-        )
+    def run(*options, fake=recordings / "soft_1.npz", out=trials):
+        words = ("--fake", fake, "--label", "object=foam", "--out", out)
+        return edge("record", *words, *options)
 
     return run
 
 
+@pytest.fixture
+def brief(make_touch, tmp_path):
+    """The path of a touch of 0.2 s."""
+    save(tmp_path / "brief.npz", make_touch(seconds=0.2))
+    return tmp_path / "brief.npz"
+
+
 def test_record_saves_a_trial_with_its_lead_in(record, recordings):
     source = load(recordings / "soft_1.npz")
-    given = ("--label", "category=soft-fixed", "--length", 1.3)
-    status, (event,), _ = record(*given)
+    options = ("--label", "category=soft-fixed", "--length", 0.3, "--trials", 1)
+    status, (event,), _ = record(*options)
     assert status == 0
     assert event["complete"]
     assert event["joints"]
     trial = load(event["file"])
     assert trial.labels == {"object": "foam", "category": "soft-fixed"}
     assert Path(event["file"]).name == "foam-soft-fixed-001.npz"
-    # Onset is at frame 20: 20 frames of lead-in, and 130 from onset on, the last
+    # Onset is at frame 20: 20 frames of lead-in, and 30 from onset on, the last
     # included.
-    np.testing.assert_array_equal(trial.frames, source.frames[:151])
-    np.testing.assert_array_equal(trial.joints, source.joints[:151])
-    np.testing.assert_allclose(trial.t, np.arange(151) * 0.01, atol=1e-9)
+    np.testing.assert_array_equal(trial.frames, source.frames[:51])
+    np.testing.assert_array_equal(trial.joints, source.joints[:51])
+    np.testing.assert_allclose(trial.t, np.arange(51) * 0.01, atol=1e-9)
     assert trial.layout == source.layout
     assert trial.valid is None
 
 
-def test_record_keeps_the_names_of_a_recordings_joints(record, recordings, tmp_path):
-    source = load(recordings / "soft_1.npz")
-    names = [f"joint {i}" for i in range(source.joints.shape[1])]
-    path = tmp_path / "named.npz"
-    save(path, replace(source, meta={**source.meta, "joint_names": names}))
-    _, (event,), _ = record(fake=path)
-    assert load(event["file"]).joint_names == tuple(names)
+def test_record_keeps_the_names_of_a_recordings_joints(record, brief):
+    source = load(brief)
+    names = list("abcde")
+    save(brief, replace(source, meta={**source.meta, "joint_names": names}))
+    _, (event,), _ = record(fake=brief)
+    assert load(event["file"]).joint_names == tuple("abcde")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -132,7 +137,7 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
 
     def interrupted(trials, frame):
         pushed.append(frame)
-        if len(pushed) == 61:
+        if len(pushed) == 31:
             signal.raise_signal(number)
         return push(trials, frame)
 
@@ -144,10 +149,10 @@ def test_record_saves_the_trial_that_has_begun_when_it_is_told_to_end(
         signal.signal(number, before)
     assert status == 0
     assert not event["complete"]
-    assert len(pushed) == 61
+    assert len(pushed) == 31
     # Onset is at frame 20.
     source = load(recordings / "soft_1.npz").frames
-    np.testing.assert_array_equal(load(event["file"]).frames, source[:61])
+    np.testing.assert_array_equal(load(event["file"]).frames, source[:31])
 
 
 def test_a_hangup_is_ignored_where_it_was_ignored_at_the_start():
@@ -161,20 +166,18 @@ def test_a_hangup_is_ignored_where_it_was_ignored_at_the_start():
 def test_record_without_any_of_the_joint_angles_that_it_was_to_have_fails(record):
     began = time.monotonic()
     status, (event,), err = record("--joints", "udp:0", "--dof", 5, "--seconds", 0.5)
+    seconds = time.monotonic() - began
     assert status == 1
     assert not event["joints"]
     assert "--joints gave no angles at the times of the frames" in err
-    assert (
-        time.monotonic() - began > 0.4
-    )  # it plays in real time, as angles come in real time
+    assert seconds > 0.4  # it plays in real time, as angles come in real time
 
 
-def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
-    out = tmp_path / "trials"
+def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(brief, trials):
     reading, writing = full_pipe()
-    given = ("--fake", parted, "--loop", "--label", "object=a", "--out", out)
-    process = started("record", *given, stdout=writing)
-    while len(list(out.glob("a-*.npz"))) < 3:
+    options = ("--fake", brief, "--loop", "--label", "object=a", "--out", trials)
+    process = started("record", *options, stdout=writing)
+    while len(list(trials.glob("a-*.npz"))) < 3:
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGTERM)
@@ -185,103 +188,91 @@ def test_record_is_not_held_up_by_a_stdout_that_nobody_reads(parted, tmp_path):
     assert "lines could not be sent to stdout: nobody reads them" in err
 
 
-def test_record_saves_one_trial_a_contact_and_never_overwrites(
-    record,
-    parted,
-    tmp_path,
-):
-    options = ("--loop", "--label", "kind=a b/c", "--length", 1.2, "--trials")
-    assert [len(record(*options, n, fake=parted)[1]) for n in (2, 1)] == [2, 1]
-    names = sorted(p.name for p in (tmp_path / "trials").iterdir())
+def test_record_saves_one_trial_a_contact_and_never_overwrites(record, brief, trials):
+    options = ("--loop", "--label", "kind=a b/c", "--trials")
+    assert [len(record(*options, n, fake=brief)[1]) for n in (2, 1)] == [2, 1]
+    names = sorted(path.name for path in trials.iterdir())
     assert names == [f"foam-a_b_c-00{n}.npz" for n in (1, 2, 3)]
 
 
-def test_record_refuses_a_file_that_exists_before_it_waits(record, tmp_path):
-    path = tmp_path / "one.npz"
-    assert record(out=path)[0] == 0
-    kept = path.read_bytes()
-    status, _, err = record(out=path)
-    assert status == 2
-    assert f"{path}: exists already" in err
-    assert path.read_bytes() == kept
+def test_record_refuses_a_file_that_exists_before_it_waits(record, brief, refused):
+    before = brief.read_bytes()
+    words = ("--label", "object=foam", "--out", brief)
+    err = refused("record", "--fake", brief, *words)
+    assert f"{brief}: exists already" in err
+    assert brief.read_bytes() == before
 
 
-def test_record_without_contact_saves_nothing(record, quiet, tmp_path):
-    status, events, err = record(fake=quiet)
+def test_record_without_contact_saves_nothing(record, quiet, trials):
+    status, events, err = record("--seconds", 0.3, fake=quiet)
     assert status == 1
     assert events == []
     assert "no contact was saved" in err
-    assert not list((tmp_path / "trials").iterdir())
+    assert not list(trials.iterdir())
+
+
+TOO_LONG = "cannot be written: File name too long"
+LABEL = ["--label", "a=b"]
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "sentence"),
     [
         ([], "give --label TASK=LABEL"),
         (["--web", "127.0.0.1:0", "--out", "one.npz"], "give --label TASK=LABEL"),
-        (["--label", "a=b", "--label", "a=c"], "--label names a task twice"),
-        (
-            ["--label", "a=b", "--out", "a" * 300 + ".npz"],
-            "cannot be written: File name too long",
-        ),
-        (
-            ["--label", "a=b", "--out", "a" * 300],
-            "cannot be written: File name too long",
-        ),
-        (["--label", "a=b", "--joints", "stdin"], "--joints needs --arm, or --dof"),
+        ([*LABEL, "--label", "a=c"], "--label names a task twice"),
+        ([*LABEL, "--out", "a" * 300 + ".npz"], TOO_LONG),
+        ([*LABEL, "--out", "a" * 300], TOO_LONG),
+        ([*LABEL, "--joints", "stdin"], "--joints needs --arm, or --dof"),
     ],
 )
-def test_record_says_what_it_needs(quiet, options, said, refused):
-    assert said in refused("record", "--fake", quiet, *options)
+def test_record_says_what_it_needs(options, sentence, refused):
+    assert sentence in refused("record", "--fake", demo.recordings()[0], *options)
 
 
 def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(record):
-    status, (event,), _ = record("--seconds", 1.0)
+    status, (event,), _ = record("--seconds", 0.5)
     assert status == 0
     assert not event["complete"]
-    assert event["seconds"] == 0.99
+    assert event["seconds"] == 0.49
 
 
-def test_a_page_may_give_the_labels(edge, parted, tmp_path, monkeypatch):
+@pytest.fixture
+def record_with_page(edge, brief, trials, monkeypatch):
+    """Record with a page, as fast as the machine can; returns status and events."""
+    monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
+    words = ("--fake", brief, "--web", "127.0.0.1:0", "--out", trials)
+    return lambda: edge("record", *words)[:2]
+
+
+def test_a_page_may_give_the_labels(record_with_page, monkeypatch):
     """Until the page has given a label and records, contacts are not saved."""
-    pushed = []
 
     def push(page, frame, *_):
-        pushed.append(frame)
-        if len(pushed) == 2:
-            page.labels = {"object": "from the page"}
-            page.recording = True
+        page.labels = {"object": "from the page"}
+        page.recording = True
 
     monkeypatch.setattr("edge.tools.page.Page.push", push)
-    monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
-
-    given = ("--web", "127.0.0.1:0", "--out", tmp_path)
-    status, events, _ = edge("record", "--fake", parted, *given)
+    status, (event,) = record_with_page()
     assert status == 0
-    saved = [event for event in events if event["event"] == "saved"]
-    assert {event["labels"]["object"] for event in saved} == {"from the page"}
+    assert event["event"] == "saved"
+    assert event["labels"] == {"object": "from the page"}
 
 
 def test_a_contact_that_the_end_cuts_off_is_not_saved_while_the_page_does_not_record(
-    edge,
-    parted,
-    tmp_path,
-    monkeypatch,
+    record_with_page, trials
 ):
-    monkeypatch.setattr("edge.fake.clock.PacedClock", VirtualClock)
-    given = ("--web", "127.0.0.1:0", "--out", tmp_path / "trials", "--seconds", 1.0)
-    assert edge("record", "--fake", parted, *given)[:2] == (1, [])
-    assert list((tmp_path / "trials").iterdir()) == []
+    assert record_with_page() == (1, [])
+    assert list(trials.iterdir()) == []
 
 
 def test_keys_choose_the_label_and_delete_the_last_trial(
     edge,
-    parted,
-    tmp_path,
+    brief,
+    trials,
     monkeypatch,
 ):
     """The first of a task's labels holds until the number of another is pressed."""
-    trials = tmp_path / "trials"
     script = [(1, "2"), (2, "d")]  # once there are so many files, this key
 
     @contextmanager
@@ -295,8 +286,8 @@ def test_keys_choose_the_label_and_delete_the_last_trial(
     monkeypatch.setattr(terminal, "is_interactive", lambda: True)
     monkeypatch.setattr(terminal, "keys", keys)
     labels = ("--label", "touch=soft", "--label", "touch=hard", "--label", "hand=left")
-    given = ("--fake", parted, "--loop", "--trials", 3, "--out", trials, *labels)
-    status, events, err = edge("record", *given)
+    options = ("--fake", brief, "--loop", "--trials", 3, "--out", trials, *labels)
+    status, events, err = edge("record", *options)
     assert status == 0
     assert [(e["event"], Path(e["file"]).name) for e in events] == [
         ("saved", "soft-left-001.npz"),
@@ -312,8 +303,8 @@ def test_keys_choose_the_label_and_delete_the_last_trial(
 
 def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
     begun = SimpleNamespace(under_way=False)
-    with recorder(tmp_path) as mine:
-        mine.choices = [("object", "box"), ("object", "pillow")]
+    choices = [("object", "box"), ("object", "pillow")]
+    with recorder(tmp_path, choices=choices) as mine:
         mine.follow(begun)
         begun.under_way = True
         mine.press("2")
@@ -322,17 +313,22 @@ def test_a_trial_has_the_labels_that_held_when_its_touch_began(tmp_path):
         begun.under_way = False
         mine.follow(begun)
         mine.save(frames(None), complete=True)
-    assert sorted(path.name for path in tmp_path.glob("*.npz")) == [
-        "box-001.npz",
-        "pillow-001.npz",
-    ]
+    names = sorted(path.name for path in tmp_path.glob("*.npz"))
+    assert names == ["box-001.npz", "pillow-001.npz"]
+
+
+def test_keys_delete_nothing_where_a_page_does_so(tmp_path):
+    page = SimpleNamespace(saved=lambda path, trial: None)
+    with recorder(tmp_path, page=page) as mine:
+        mine.save(frames(None), complete=True)
+        mine.press("d")
+    assert (tmp_path / "box-001.npz").exists()
 
 
 def test_the_page_says_of_a_touch_that_its_onset_was_not_recorded(tmp_path):
     notices = []
     page = SimpleNamespace(labels={}, recording=False, notice=notices.append)
-    with recorder(tmp_path) as mine:
-        mine.page = page
+    with recorder(tmp_path, page=page) as mine:
         mine.follow(SimpleNamespace(under_way=False))
         page.recording = True
         mine.follow(SimpleNamespace(under_way=True))
@@ -342,10 +338,13 @@ def test_the_page_says_of_a_touch_that_its_onset_was_not_recorded(tmp_path):
     assert "whose onset is missing: it is not saved" in notice
 
 
+PILLOW = demo.FOLDER / "pillow-movable.npz"
+WITH_MODEL = ("record", "--model", demo.MODEL, "--label", "object=cushion")
+
+
 def test_a_trial_keeps_what_a_model_said_of_its_touch(edge, tmp_path):
-    touch = demo.FOLDER / "pillow-movable.npz"
-    given = ("--fake", touch, "--label", "object=cushion", "--out", tmp_path / "a.npz")
-    status, events, _ = edge("record", "--model", demo.MODEL, *given)
+    options = ("--fake", PILLOW, "--out", tmp_path / "a.npz")
+    status, events, _ = edge(*WITH_MODEL, *options)
     assert status == 0
     kinds = [event["event"] for event in events]
     assert kinds.index("decision") < kinds.index("saved")
@@ -357,13 +356,10 @@ def test_a_trial_keeps_what_a_model_said_of_its_touch(edge, tmp_path):
 
 
 def test_a_model_brings_the_arm_that_it_needs(refused, tmp_path):
-    touch = demo.FOLDER / "pillow-movable.npz"
-    given = ("--fake", touch, "--label", "object=a", "--out", tmp_path / "a.npz")
-    arm = tmp_path / "arm.toml"
-    arm.write_text((ROOT / "edge/arms/cody.toml").read_text())
-    said = refused("record", "--model", demo.MODEL, *given, "--arm", arm)
-    assert "leave --arm out" in said
-    save(tmp_path / "unposed.npz", replace(load(touch), joints=None))
-    words = ("--fake", tmp_path / "unposed.npz", *given[2:])
-    said = refused("record", "--model", demo.MODEL, *words)
-    assert f"no joint angles, but {demo.MODEL} has 5 joints" in said
+    command = (*WITH_MODEL, "--out", tmp_path / "a.npz", "--fake")
+    arm = ROOT / "edge/arms/cody.toml"
+    assert "leave --arm out" in refused(*command, PILLOW, "--arm", arm)
+    unposed = tmp_path / "unposed.npz"
+    save(unposed, replace(load(PILLOW), joints=None))
+    message = refused(*command, unposed)
+    assert f"no joint angles, but {demo.MODEL} has 5 joints" in message

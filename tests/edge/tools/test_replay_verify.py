@@ -1,6 +1,5 @@
 """`edge-classify replay` and `verify`, as a user runs them."""
 
-import subprocess
 import sys
 
 import numpy as np
@@ -8,34 +7,25 @@ import pytest
 
 from edge.cli import main
 from edge.tools.replay import Summary, compared
-from tests.conftest import ROOT, decided, python
+from tests.conftest import decided, ended, python
 
 
 @pytest.fixture
 def replay(exported, edge):
-    return lambda *arguments: edge(
-        "replay",
-        "--model",
-        exported / "model.onnx",
-        *arguments,
-    )
+    command = ("replay", "--model", exported / "model.onnx")
+    return lambda *arguments: edge(*command, *arguments)
 
 
-def test_a_folder_is_replayed(replay, recordings):
-    status, events, _ = replay(recordings)
+def test_a_folder_is_replayed_and_summed_up(replay, recordings):
+    status, events, err = replay(recordings, "--summary")
     decisions = [e for e in events if e["event"] == "decision"]
     keys = {"event", "task", "label", "confidence", "window_s", "onset_s", "latency_ms"}
     assert status == 0
     assert len(decisions) == 32
     assert all(keys <= set(e) for e in decisions)
-
-
-def test_a_folder_is_summed_up(replay, recordings):
-    _, events, err = replay(recordings, "--summary")
     # Every trial is its own nearest neighbour here, so nothing can be wrong.
-    expected = [e["expected"] for e in events if e.get("task") == "category"]
-    labels = [e["label"] for e in events if e.get("task") == "category"]
-    assert labels == expected
+    of_category = [e for e in decisions if e["task"] == "category"]
+    assert all(e["label"] == e["expected"] for e in of_category)
     assert "category: 16 of 16 right, 100.00% (95 % interval 80.6% to 100.0%)" in err
     assert "rigid-fixed            8           ." in err
     assert "16 of 16 recordings match a training trial to the last bit" in err
@@ -50,11 +40,10 @@ def test_bad_files_are_named_and_the_others_still_run(replay, recordings, tmp_pa
     status, events, err = replay(*paths, good)
     assert status == 2
     assert decided(events, "task") == ["category", "object"]
-    said = err.splitlines()
-    assert len(said) == 3
-    assert "short.npz: not a readable .npz file" in said[0]
-    assert "missing.npz: cannot be read: No such file" in said[1]
-    assert "skin.npz: has no joint angles" in said[2]
+    short, missing, skin = err.splitlines()
+    assert "short.npz: not a readable .npz file" in short
+    assert "missing.npz: cannot be read: No such file" in missing
+    assert "skin.npz: has no joint angles" in skin
 
 
 def test_a_recording_without_contact_says_so(replay, quiet):
@@ -74,13 +63,8 @@ def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, 
 
 @pytest.fixture
 def verify(exported, edge):
-    return lambda golden: edge(
-        "verify",
-        "--model",
-        exported / "model.onnx",
-        "--golden",
-        golden,
-    )
+    command = ("verify", "--model", exported / "model.onnx", "--golden")
+    return lambda golden: edge(*command, golden)
 
 
 def test_the_golden_file_is_met(verify, exported):
@@ -88,43 +72,11 @@ def test_the_golden_file_is_met(verify, exported):
     assert status == 0
     names = ["series length", "series counts", "onset", "features"]
     for task in ("category", "object"):
-        parts = ("label", "neighbours", "scores", "distances")
-        names += [f"{task}_{part}" for part in parts]
+        for key in ("label", "neighbours", "scores", "distances"):
+            names.append(f"{task}_{key}")
     assert [c["name"] for c in checks] == [*names, "out_of_range", "the same in numpy"]
     assert all(c["passed"] and c["share_of_bound"] <= 1 for c in checks)
     assert "all 14 results agree with the golden file" in err
-
-
-@pytest.mark.parametrize(
-    ("key", "name", "row", "change"),
-    [
-        ("object_label", "object_label", 5, 1),
-        ("object_neighbours", "object_neighbours", 7, 1),
-        ("object_distances", "object_distances", 30, 1e-9),
-        ("category_scores", "category_scores", 2, 1e-12),
-        ("series_counts", "series counts", 11, 1),
-        ("onset_s", "onset", 1, 1e-6),
-    ],
-)
-def test_a_difference_names_the_worst_row(
-    verify,
-    exported,
-    tmp_path,
-    key,
-    name,
-    row,
-    change,
-):
-    arrays = dict(np.load(exported / "golden.npz"))
-    arrays[key][row] += np.array(change).astype(arrays[key].dtype)
-    np.savez(tmp_path / "golden.npz", **arrays)
-    status, checks, err = verify(tmp_path / "golden.npz")
-    (failed,) = (check for check in checks if not check["passed"])
-    assert status == 1
-    assert failed["name"] == name
-    assert failed["worst_row"] == row
-    assert f"results that differ from the golden file: {name}" in err
-    assert ("may run the model in float32" in err) == name.endswith("distances")
 
 
 @pytest.fixture
@@ -133,31 +85,62 @@ def arrays(exported):
     return dict(np.load(exported / "golden.npz"))
 
 
+@pytest.fixture
+def verify_changed(verify, arrays, tmp_path):
+    """Verify against the arrays as they are by then."""
+
+    def run():
+        np.savez(tmp_path / "golden.npz", **arrays)
+        return verify(tmp_path / "golden.npz")
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("key", "row", "change"),
+    [
+        ("object_label", 5, 1),
+        ("object_neighbours", 7, 1),
+        ("object_distances", 30, 1e-9),
+        ("category_scores", 2, 1e-12),
+        ("series_counts", 11, 1),
+        ("onset_s", 1, 1e-6),
+    ],
+)
+def test_a_difference_names_the_worst_row(verify_changed, arrays, key, row, change):
+    name = {"series_counts": "series counts", "onset_s": "onset"}.get(key, key)
+    arrays[key][row] += np.array(change).astype(arrays[key].dtype)
+    status, checks, err = verify_changed()
+    (failed,) = (check for check in checks if not check["passed"])
+    assert status == 1
+    assert failed["name"] == name
+    assert failed["worst_row"] == row
+    assert f"results that differ from the golden file: {name}" in err
+    assert ("may run the model in float32" in err) == name.endswith("distances")
+
+
 @pytest.mark.parametrize(
     "key", ["start", "vectors", "meta", "object_label", "series_counts"]
 )
-def test_a_golden_file_that_lacks_a_key_is_one_sentence(verify, arrays, key, tmp_path):
+def test_a_golden_file_that_lacks_a_key_is_one_sentence(verify_changed, arrays, key):
     del arrays[key]
-    np.savez(tmp_path / "golden.npz", **arrays)
-    status, _, err = verify(tmp_path / "golden.npz")
+    status, _, err = verify_changed()
     assert status == 2
     assert err.count("\n") == 1
-    assert str(tmp_path / "golden.npz") in err
+    assert "golden.npz" in err
 
 
-def test_counts_of_another_shape_differ(verify, arrays, tmp_path):
+def test_counts_of_another_shape_differ(verify_changed, arrays):
     for shape in ((1, 1_000_000), (len(arrays["series_counts"]), 3), (7,)):
         arrays["series_counts"] = np.zeros(shape, np.int64)
-        np.savez(tmp_path / "golden.npz", **arrays)
-        status, checks, _ = verify(tmp_path / "golden.npz")
+        status, checks, _ = verify_changed()
         assert status == 1
         assert checks[1]["expected"] == str(shape)
 
 
-def test_vectors_of_another_model_are_refused(verify, arrays, tmp_path):
+def test_vectors_of_another_model_are_refused(verify_changed, arrays):
     arrays["vectors"] = arrays["vectors"][:, :50]
-    np.savez(tmp_path / "golden.npz", **arrays)
-    assert "50), but" in verify(tmp_path / "golden.npz")[2]
+    assert "50), but" in verify_changed()[2]
 
 
 def test_a_model_is_no_golden_file(verify, exported):
@@ -165,24 +148,17 @@ def test_a_model_is_no_golden_file(verify, exported):
 
 
 def test_a_pipe_that_is_closed_is_quiet(exported, recordings):
-    model = ["replay", "--model", str(exported / "model.onnx"), str(recordings)]
-    line = f"{sys.executable} -m edge {' '.join(model)} | head -1"
-    piped = subprocess.run(
-        line,
-        shell=True,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    words = (sys.executable, "-m edge replay --model", exported / "model.onnx")
+    line = f"{' '.join(map(str, words))} {recordings} | head -1"
+    piped = ended("sh", "-c", line)
     assert piped.stdout.count("\n") == 1
     assert piped.stderr == ""
 
 
 def test_output_without_room_is_one_sentence(exported, recordings):
-    given = ("--model", exported / "model.onnx", recordings / "hard_0.npz")
+    options = ("--model", exported / "model.onnx", recordings / "hard_0.npz")
     with open("/dev/full", "w") as full:
-        run = python("-m", "edge", "replay", *given, stdout=full)
+        run = python("-m", "edge", "replay", *options, stdout=full)
     assert run.returncode == 2
     assert run.stderr.startswith(
         "edge-classify: standard output cannot be written: No space left"
@@ -215,24 +191,16 @@ def test_the_columns_of_a_wide_matrix_have_the_numbers_of_its_rows():
     assert [row.split()[8 + i] for i, row in enumerate(rows)] == ["1"] * 12
 
 
-def test_two_models_are_compared_on_the_same_recordings(exported, recordings, edge):
-    path = exported / "model.onnx"
-    status, events, err = edge(
-        "replay",
-        "--model",
-        path,
-        "--model",
-        path,
-        recordings,
-        "--summary",
-    )
+def test_two_models_are_compared_on_the_same_recordings(replay, exported, recordings):
+    touches = [recordings / f"{name}.npz" for name in ("hard_0", "soft_0")]
+    status, events, err = replay("--model", exported / "model.onnx", *touches)
     assert status == 0
-    assert len(decided(events, "task")) == 2 * 2 * 16
-    assert "object: 0 gained, 0 lost of 16: +0.0 points (95 % interval +0.0" in err
+    assert len(decided(events, "task")) == 2 * 2 * 2
+    assert "object: 0 gained, 0 lost of 2: +0.0 points (95 % interval +0.0" in err
 
 
 def test_a_comparison_counts_what_is_gained_and_lost():
     first = summed(*[("a", "a")] * 4, *[("b", "a")] * 6)
-    other = summed(*[("b", "a")] * 2, *[("a", "a")] * 8)
-    text = compared("A", first, "B", other)
+    second = summed(*[("b", "a")] * 2, *[("a", "a")] * 8)
+    text = compared("A", first, "B", second)
     assert "object: 6 gained, 2 lost of 10: +40.0 points" in text
