@@ -16,10 +16,10 @@ def products(y: Labels) -> dict[str, tuple[str, str]]:
     pairs: dict[str, tuple[str, str]] = {}
     for task, labels in y.items():
         factors = []
-        for other in y:
-            follows = _determines(labels, y[other])
-            if other != task and follows and not _determines(y[other], labels):
-                factors.append(other)
+        for factor in y:
+            follows = _determines(labels, y[factor])
+            if factor != task and follows and not _determines(y[factor], labels):
+                factors.append(factor)
         for a, b in combinations(factors, 2):
             joined = np.char.add(np.char.add(y[a], "\0"), y[b])
             if task not in pairs and _determines(joined, labels):

@@ -47,11 +47,11 @@ class EarlySettings:
 
     Attributes:
         settings: chosen as those of the full window are.
-        known: chosen for objects that were recorded.
+        settings_of_known: chosen for objects that were recorded.
     """
 
     settings: Early
-    known: Early
+    settings_of_known: Early
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Chosen:
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.
-        known: the settings that are best for objects that were recorded, where groups
+        choice_of_known: the settings that are best for objects that were recorded, where groups
             were left out to choose the others.
         known_by_fold: [fold] the same, chosen without the fold's trials.
     """
@@ -85,7 +85,7 @@ class Chosen:
     picks: tuple[Choice, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
-    known: Choice | None = None
+    choice_of_known: Choice | None = None
     known_by_fold: tuple[Choice, ...] = ()
 
 
@@ -150,10 +150,10 @@ class Choosing:
         Without groups, both are the answers to left-out trials.
         """
         folds = self._divisions.folds
-        other_folds = self._divisions.others if repeated else ()
+        further_folds = self._divisions.further if repeated else ()
         grids = [grid for candidate in candidates for grid in candidate.grids]
         total = fits(folds, nested)
-        total += sum(fits(other, False) for other in other_folds)
+        total += sum(fits(division, False) for division in further_folds)
         if self._groups is not None:
             total += fits(self._groups.folds, nested)
         # One bar for both tables, so that the time left is that of the whole choice.
@@ -165,10 +165,11 @@ class Choosing:
         ) as progress:
             answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
             trials = answers(vectors, folds, grids, nested=nested)
-            others = [
-                answers(vectors, other, grids, nested=False) for other in other_folds
+            further = [
+                answers(vectors, division, grids, nested=False)
+                for division in further_folds
             ]
-            trials = replace(trials, repeated=tuple(others))
+            trials = replace(trials, repeated=tuple(further))
             if self._groups is None:
                 return trials, trials
             vectors = replace(vectors, y=self._groups.labels(self._y, grids))
@@ -263,15 +264,15 @@ class Choosing:
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
         trials = averaged([by_trial for by_trial, _ in tables])
         groups = averaged([by_group for _, by_group in tables])
-        known = {}
+        of_known = {}
         usual = {}
         for task in self._y:
             k = chosen[task].choice.k
-            known[task] = self._settle_early(task, trials, k)
-            usual[task] = known[task]
+            of_known[task] = self._settle_early(task, trials, k)
+            usual[task] = of_known[task]
             if self._is_grouped(task):
                 usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
-        return EarlySettings(_early(window_s, usual), _early(window_s, known))
+        return EarlySettings(_early(window_s, usual), _early(window_s, of_known))
 
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
         """The answers of the candidates for early decision points at one of them."""
@@ -364,7 +365,7 @@ class Choosing:
         rule = self._rule(task, trials)
         return replace(
             chosen,
-            known=choices[trials.chosen(task, rule)],
+            choice_of_known=choices[trials.chosen(task, rule)],
             known_by_fold=tuple(choices[i] for i in trials.by_fold(task, rule)),
         )
 

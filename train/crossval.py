@@ -81,9 +81,9 @@ def neighbours(
             training = np.delete(np.arange(n), i)
             mean, gain, scaled = centred_and_scaled(X[training], scaling, features)
             axes = Spectrum(scaled).leading(max_components)
-            weights = on_grid(axes.T)
-            grid = Grid.of(scaled, len(axes))
             axes_count = len(axes)
+            weights = on_grid(axes.T)
+            grid = Grid.of(scaled, axes_count)
             differences = grid.project(scaled, weights) - grid.project(
                 (query - mean) * gain, weights
             )

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 from edge.files import read_bytes
@@ -34,6 +33,7 @@ from train.feature_sets import axes, moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
+from train.vectors import Booleans, Floats, Strings
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,8 @@ class Recordings:
     @property
     def of_owner(self) -> tuple[Recording, ...]:
         """Those that are not simulated; all where all are."""
-        return (
-            tuple(r for r in self.recordings if "simulation" not in r.meta)
-            or self.recordings
-        )
+        own = tuple(r for r in self.recordings if "simulation" not in r.meta)
+        return own or self.recordings
 
     @property
     def mixed(self) -> bool:
@@ -135,26 +133,21 @@ class DataSet:
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
 
     @property
-    def is_own(self) -> NDArray[np.bool_] | None:
+    def is_own(self) -> Booleans | None:
         """(n,) whether a trial is the owner's; None where all, or none, are
         simulated."""
-        is_own = np.array(
-            ["simulation" not in trial.recording.meta for trial in self.trials]
-        )
-        return is_own if is_own.any() and not is_own.all() else None
+        is_own = ["simulation" not in trial.recording.meta for trial in self.trials]
+        return np.array(is_own) if len(set(is_own)) > 1 else None
 
-    def part(self, trials: NDArray[np.bool_]) -> DataSet:
+    def part(self, trials: Booleans) -> DataSet:
         """Some of the trials (n,)."""
-        part = (
-            trial for trial, chosen in zip(self.trials, trials, strict=True) if chosen
-        )
-        return replace(self, trials=tuple(part))
+        return replace(self, trials=tuple(compress(self.trials, trials)))
 
     def untouched_labels(self, task: str) -> list[str]:
         """The labels for a task of the recordings in which no contact was found."""
         return [labels[task] for _, labels in self.untouched if task in labels]
 
-    def groups(self, key: str) -> NDArray[np.str_] | None:
+    def groups(self, key: str) -> Strings | None:
         """(n,) each trial's value of a key in its labels or metadata; None where most
         lack it.
 
@@ -172,7 +165,7 @@ class DataSet:
         """Columns of each feature in `features`."""
         return widths(self.names, samples, self.layout, self.joints)
 
-    def labels(self, task: str) -> NDArray[np.str_]:
+    def labels(self, task: str) -> Strings:
         """(n,) the trials' labels for a task; empty where a trial has none."""
         return np.array([trial.labels.get(task, "") for trial in self.trials])
 
@@ -181,7 +174,7 @@ class DataSet:
         window_s: float = WINDOW_S,
         samples: int = SAMPLES,
         names: Sequence[str] | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """(n, features * samples) feature vectors (see
         `edge.touch.features.feature_vector`).
 
@@ -356,15 +349,13 @@ def load_trials(
         "features": names,
         "joints": posed.joints,
     }
-    follow = delayed(_followed)
     work = Parallel(n_jobs=jobs, return_as="generator")(
-        follow(recording, path, layout, **tracked)
+        delayed(_followed)(recording, path, layout, **tracked)
         for recording, path in posed.recordings
     )
-    count = len(posed.recordings)
     trials = bar(
         work,
-        total=count,
+        total=len(posed.recordings),
         desc="following",
         unit=" trials",
         disable=not progress,
@@ -402,10 +393,10 @@ def with_shear(
     """
     if layout.axes is None:
         return data, ()
-    sheared, others = data.split("shear")
+    sheared, without = data.split("shear")
     if not sheared.paths:
         raise InputError("no recording has shear, which the features need")
-    return sheared, others
+    return sheared, without
 
 
 @dataclass(frozen=True)
@@ -459,8 +450,8 @@ def require_one_arm(
     Raises:
         InputError: one does; the sentence names it.
     """
-    for other, (_, path) in zip(arms, recordings, strict=True):
-        if other is not None and other.to_dict() != chain.to_dict():
+    for arm, (_, path) in zip(arms, recordings, strict=True):
+        if arm is not None and arm.to_dict() != chain.to_dict():
             raise InputError(
                 f"{path}: its arm is not that of {recordings[0][1]}; train on one arm"
             )

@@ -55,7 +55,7 @@ def usual_points(
             "asks for them"
         )
         return (settings.window_s,)
-    dataset = dataset.of(sorted(settings.taken()))
+    dataset = dataset.of(sorted(settings.features()))
     sizes = _Sizes.of(dataset, settings, samples)
     points: list[float] = []
     for every_s in STEPS_S:

@@ -135,21 +135,6 @@ class _Fit:
     train: Integers
     test: Integers
 
-    @classmethod
-    def of(
-        cls,
-        vectors: Vectors,
-        classes: Mapping[str, Integers],
-        left_out: Booleans,
-    ) -> _Fit:
-        """The fit without some trials, by a mask (n,), which answers these."""
-        return cls(
-            vectors,
-            classes,
-            np.flatnonzero(~left_out),
-            np.flatnonzero(left_out),
-        )
-
     def counted(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
         """A grid's tasks, by how often each of the `train` trials counts for them."""
         by_counts: dict[bytes, tuple[list[str], Integers]] = {}
@@ -195,9 +180,16 @@ class _Fit:
         return np.asarray(rows.reshape(-1, len(self.test)))
 
 
-def _answers(fit: _Fit, grids: Sequence[SearchGrid]) -> dict[str, Booleans]:
-    """{task: (candidates, test) whether each candidate is right}."""
-    answers: dict[str, list[Booleans]] = {task: [] for task in fit.classes}
+def _answers(
+    vectors: Vectors,
+    classes: Mapping[str, Integers],
+    left_out: Booleans,
+    grids: Sequence[SearchGrid],
+) -> dict[str, Booleans]:
+    """{task: (candidates, test) whether each candidate is right} of the fit without
+    some trials, by a mask (n,), which answers these."""
+    fit = _Fit(vectors, classes, np.flatnonzero(~left_out), np.flatnonzero(left_out))
+    answers: dict[str, list[Booleans]] = {task: [] for task in classes}
     decomposed = None
     with single_thread():
         for grid in grids:
@@ -304,11 +296,11 @@ class AnswerTable:
         folds = self.folds[np.isin(self.folds, pair)]
         for task, right in answers.items():
             # For the one fold these are answers to the other, and the other way round.
-            for without, other in {pair, pair[::-1]}:
-                in_fold = self.folds == other
-                tested = self.tested[task][in_fold]
+            for without, tested in {pair, pair[::-1]}:
+                in_fold = self.folds == tested
+                untested = ~self.tested[task][in_fold]
                 self.right[task][without][:, in_fold] = (
-                    right[:, folds == other] | ~tested
+                    right[:, folds == tested] | untested
                 )
 
     def held_out(self, task: str) -> Floats:
@@ -419,7 +411,7 @@ def evaluate(
     table = AnswerTable.empty(folds, choices, classes)
     pairs = _pairs(folds, nested)
     work = (
-        delayed(_answers)(_Fit.of(vectors, classes, np.isin(folds, pair)), grids)
+        delayed(_answers)(vectors, classes, np.isin(folds, pair), grids)
         for pair in pairs
     )
     results = Parallel(n_jobs=jobs, return_as="generator")(work)

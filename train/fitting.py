@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ from train.mix import Mixing, mix
 from train.pipeline import Choice, ContactClassifier
 from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
-from train.vectors import Booleans, Floats, Labels, Strings, Vectors
+from train.vectors import Booleans, Floats, Labels, Vectors
 
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
@@ -242,11 +242,11 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         y = {task: y[task] for task in settings.chosen}
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*settings.notes, *_leaks_of(measured, y)]
+    notes += [*settings.notes, *_leaks(measured, y)]
     points = _decision_points(measured, settings, fixed, notes)
     if len(points) < 2:
         settings = replace(settings, early=None)
-    dataset = measured.of(sorted(settings.taken()))
+    dataset = measured.of(sorted(settings.features()))
     X = dataset.features(settings.window_s, fixed.samples)
     sequential = None
     if points:
@@ -314,19 +314,8 @@ def trials_of(
     windows: tuple[float, ...],
     options: FitOptions,
 ) -> Loaded:
-    """The trials of recordings, up to the last of some windows."""
-    notes: list[str] = []
-    dataset = _with_thresholds(recordings, windows, options, notes)
-    return Loaded(dataset, windows, notes)
-
-
-def _with_thresholds(
-    recordings: Recordings,
-    windows: tuple[float, ...],
-    options: FitOptions,
-    notes: list[str],
-) -> DataSet:
-    """The trials, by thresholds that are given, saved, proposed or chosen."""
+    """The trials of recordings, up to the last of some windows, by thresholds that are
+    given, saved, proposed or chosen."""
     usual = candidates(
         {},
         options,
@@ -335,7 +324,6 @@ def _with_thresholds(
         drawn=recordings.mixed or kinds_of(recordings.recordings) is not None,
         quick=options.quick,
     )
-
     measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
 
     def by(threshold: int | None, onset: int | None) -> DataSet:
@@ -354,34 +342,32 @@ def _with_thresholds(
         return choosing.accuracy(windows[0])
 
     if options.threshold is not None or options.onset is not None:
-        return by(options.threshold, options.onset)
-    dataset = _by_noise(recordings, by, notes)
-    if any("simulation" in r.meta for r in recordings.recordings):
-        return dataset
-    dataset, lower = thresholds.chosen(dataset, by, accuracy)
-    notes += lower
-    return dataset
+        return Loaded(by(options.threshold, options.onset), windows, [])
+    dataset, notes = _by_noise(recordings, by)
+    if not any("simulation" in r.meta for r in recordings.recordings):
+        dataset, lower = thresholds.chosen(dataset, by, accuracy)
+        notes += lower
+    return Loaded(dataset, windows, notes)
 
 
 def _by_noise(
     recordings: Recordings,
     by: Callable[[int | None, int | None], DataSet],
-    notes: list[str],
-) -> DataSet:
+) -> tuple[DataSet, list[str]]:
     """The trials by the thresholds that the skin was saved with, or else by those that
-    its noise suggests."""
+    its noise suggests, and the warning of these."""
     reason = "the skin was saved without thresholds"
     if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
         try:
-            return by(None, None)
+            return by(None, None), []
         except Untouched:
             reason = "no recording has a contact at its own thresholds"
     proposal = thresholds.proposed(recordings.of_owner)
-    notes.append(
+    warning = (
         f"warning: {reason}; a threshold of {proposal.threshold} and an onset of "
         f"{proposal.onset} counts come from {proposal.source}"
     )
-    return by(proposal.threshold, proposal.onset)
+    return by(proposal.threshold, proposal.onset), [warning]
 
 
 def _are_drawn(dataset: DataSet) -> bool:
@@ -463,7 +449,7 @@ def calibrate(
     options: FitOptions,
 ) -> SequentialClassifier:
     """A classifier for all decision points, with its stopping rules."""
-    dataset = measured.of(sorted(settings.taken(folds=True)))
+    dataset = measured.of(sorted(settings.features(folds=True)))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
         settings.choices,
@@ -495,7 +481,9 @@ def _early_of_known(
     Where groups are left out, settings are chosen for objects never met, though
     certificates are for recorded ones.
     """
-    tasks = [task for task, c in settings.chosen.items() if c.known is not None]
+    tasks = [
+        task for task, c in settings.chosen.items() if c.choice_of_known is not None
+    ]
     if not tasks:
         return []
     calibrated = calibrate(measured, y, points, settings.of_known, options)
@@ -514,9 +502,8 @@ def _early_of_known(
 def _is_usual(dataset: DataSet, task: str) -> bool:
     """Whether most trials have a label for a task, of those that no other task gives."""
     labels = dataset.labels(task)
-    if dataset.is_own is not None:
-        return True
-    return 2 * int((labels != "").sum()) > len(labels)
+    labelled = int(np.count_nonzero(labels))
+    return dataset.is_own is not None or 2 * labelled > len(labels)
 
 
 def _lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
@@ -526,7 +513,7 @@ def _lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
     sentences = []
     for task in dataset.tasks:
         if not _is_usual(dataset, task):
-            count = int((dataset.labels(task) != "").sum())
+            count = np.count_nonzero(dataset.labels(task))
             sentences.append(
                 f"warning: task {task} is left out: {count} of {len(dataset.trials)} "
                 "trials have a label for it; --tasks names it where it is meant"
@@ -563,17 +550,12 @@ def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
     return tuple(windows)
 
 
-def _leaks_of(dataset: DataSet, y: Labels) -> list[str]:
-    """`_leaks` of the trials that the owner has felt."""
-    if dataset.is_own is None:
-        return _leaks(dataset, y)
-    felt = {task: labels[dataset.is_own] for task, labels in y.items()}
-    return _leaks(dataset.part(dataset.is_own), felt)
-
-
-def _leaks(dataset: DataSet, y: Mapping[str, Strings]) -> list[str]:
+def _leaks(dataset: DataSet, y: Labels) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in
-    contact."""
+    contact, of the trials that the owner has felt."""
+    if dataset.is_own is not None:
+        y = {task: labels[dataset.is_own] for task, labels in y.items()}
+        dataset = dataset.part(dataset.is_own)
     recordings = [t.recording for t in dataset.trials]
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):

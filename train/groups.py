@@ -144,18 +144,18 @@ class Divisions:
 
     Attributes:
         folds: (n,) of single trials.
-        others: further ones, where there are few trials.
+        further: other divisions, where there are few trials.
         groups: entire groups; None where no task has enough of them.
     """
 
     folds: Integers
-    others: tuple[Integers, ...]
+    further: tuple[Integers, ...]
     groups: Groups | None
 
     @property
     def fewest_left(self) -> int:
         """The smallest number of trials that remain where a fold is left out."""
-        divisions = [self.folds, *self.others]
+        divisions = [self.folds, *self.further]
         if self.groups is not None:
             divisions.append(self.groups.folds)
         largest = max(np.bincount(folds[folds >= 0]).max() for folds in divisions)
@@ -184,7 +184,7 @@ class Divisions:
         labels = y[finest(y)]
         count = fold_count(len(labels), quick)
         repeats = 1 if quick or len(labels) >= FEW_TO_REPEAT else REPEATS
-        folds, *others = (
+        folds, *further = (
             stratified_folds(labels, count, SEED + i) for i in range(repeats)
         )
-        return cls(folds, tuple(others), groups_of(dataset, y, leave_out, quick))
+        return cls(folds, tuple(further), groups_of(dataset, y, leave_out, quick))

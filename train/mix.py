@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.errors import InputError
 from train.choose import Chosen, decided_together, promised
@@ -31,7 +30,7 @@ from train.groups import FEWEST_GROUPS, TRIAL, fold_count
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid
-from train.vectors import Labels, Vectors
+from train.vectors import Booleans, Floats, Integers, Labels, Vectors
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""
@@ -41,7 +40,7 @@ ONCE = (1, 1)
 """Weights of the simulated trials and of the owner's."""
 
 
-Plan = tuple[NDArray[np.int64], list[dict[str, Choice]]]
+Plan = tuple[Integers, list[dict[str, Choice]]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without it}."""
 
 
@@ -57,7 +56,7 @@ class MixResult:
     """
 
     chosen: dict[str, Chosen]
-    folds: NDArray[np.int64]
+    folds: Integers
     without: list[dict[str, Choice]]
     notes: list[str]
 
@@ -80,8 +79,8 @@ class Mixing:
 
     dataset: DataSet
     y: Labels
-    is_own: NDArray[np.bool_]
-    features: NDArray[np.float64]
+    is_own: Booleans
+    features: Floats
     samples: int
     leave_out: str
     quick: bool = False
@@ -139,7 +138,7 @@ class Mixing:
     def answers(
         self,
         grids: Sequence[SearchGrid],
-        folds: NDArray[np.int64],
+        folds: Integers,
     ) -> AnswerTable:
         """The answers to the owner's trials, each without its fold (owner's trials,)."""
         everyone = np.full(len(self.is_own), -1)

@@ -29,12 +29,12 @@ def deviations(values: Floats) -> Floats:
     """(n,) the largest distance of each row of values (n, p) to the mean of the other
     rows, in the others' standard deviation over all columns; 0 where the others are all
     equal."""
-    others = len(values) - 1
+    rest = len(values) - 1
     middle = np.median(values, axis=0)
     centred = values - middle
     squares = np.square(centred)
-    means = _sum_of_others(centred) / others
-    variance = _sum_of_others(squares) / others - np.square(means)
+    means = _sum_of_others(centred) / rest
+    variance = _sum_of_others(squares) / rest - np.square(means)
     spread = variance.mean(axis=1)
     spread = np.where(spread > np.square(ROUNDING * middle).mean(), spread, np.inf)
     return np.asarray(np.abs(centred - means).max(axis=1) / np.sqrt(spread))
@@ -119,10 +119,10 @@ def _sums(joints: Sequence[Floats]) -> Floats:
     )
 
 
-def _outside(angles: Floats, others: Floats) -> Floats:
+def _outside(angles: Floats, sums: Floats) -> Floats:
     """(frames, dof) distances to the mean of other recordings in deviations, by their
     sums (3, dof); 0 where an angle is unknown."""
-    count, total, squares = others
+    count, total, squares = sums
     mean = total / np.maximum(count, 1)
     variance = squares / np.maximum(count, 1) - mean**2
     spread = np.sqrt(np.maximum(variance, STILL_RAD**2))

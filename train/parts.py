@@ -12,5 +12,5 @@ def part(recording: Recording, frames: slice, **changes: Any) -> Recording:
     if recording.valid is not None and recording.valid.ndim == 3:
         fields.append("valid")
     values = {name: getattr(recording, name) for name in fields}
-    parts = {name: v[frames] for name, v in values.items() if v is not None}
-    return replace(recording, **parts, **changes)
+    arrays = {name: v[frames] for name, v in values.items() if v is not None}
+    return replace(recording, **arrays, **changes)

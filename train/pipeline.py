@@ -7,7 +7,7 @@ graph down.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,8 +22,16 @@ from edge.tools.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.agreement import factors_of
 from train.projection import Projection
-from train.scaling import finite, widths_of
-from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
+from train.scaling import finite
+from train.vectors import (
+    Booleans,
+    Floats,
+    Integers,
+    Labels,
+    Strings,
+    Vectors,
+    widths_of,
+)
 
 
 def vote(labels: Integers) -> Integers:
@@ -343,9 +351,9 @@ class ContactClassifier:
         gaps: dict[str, list[float]] = {task: [] for task in self.choices}
         for fold in range(SLOPE_FOLDS):
             new = folds == fold
-            others = vectors.part(~new)
-            choices = fittable(self.choices, others.y, others.is_own)
-            model = ContactClassifier.of(choices, others, complete=False)
+            training = vectors.part(~new)
+            choices = fittable(self.choices, training.y, training.is_own)
+            model = ContactClassifier.of(choices, training, complete=False)
             for task, classes in model.classes_.items():
                 labels = vectors.y[task]
                 counting = self.choices[task].counts(labels, vectors.is_own) > 0
@@ -415,7 +423,7 @@ class ContactClassifier:
 
 
 def columns_of(
-    names: Sequence[str],
+    names: Collection[str],
     features: Sequence[str],
     widths: Sequence[int],
 ) -> Integers:
@@ -426,7 +434,7 @@ def columns_of(
 
 
 def types_of(
-    names: Sequence[str],
+    names: Collection[str],
     features: Sequence[str],
     widths: Sequence[int],
 ) -> tuple[list[str], list[int]]:

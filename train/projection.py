@@ -52,16 +52,13 @@ NO_DISTANCE = 1e-6
 rounding."""
 
 
-def _centred(
-    X: Floats,
-) -> tuple[Floats, Floats, Booleans]:
+def _centred(X: Floats) -> tuple[Floats, Floats, Booleans]:
     """Mean (p,), X minus the mean, and whether each column has no variance (p,)."""
     mean = column_means(X)
     centred = X - mean
     # In a constant column only the rounding of its mean is left.
-    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * np.abs(X).max(
-        axis=0
-    )
+    largest = np.abs(X).max(axis=0)
+    still = np.abs(centred).max(axis=0) <= 4 * np.finfo(float).eps * largest
     # The mean of a large offset is rounded, which would leave a constant in every row.
     centred -= centred.mean(axis=0)
     centred[:, still] = 0.0
@@ -78,9 +75,7 @@ def _signs(axes: Floats) -> Floats:
     return np.asarray(np.sign(axes[np.arange(len(axes)), top]))
 
 
-def principal_axes(
-    X: Floats,
-) -> tuple[Floats, Floats, Floats]:
+def principal_axes(X: Floats) -> tuple[Floats, Floats, Floats]:
     """Mean, components and singular values of X (n, p), as many as its numerical rank.
 
     They come from a full singular value decomposition in float64, which keeps small

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from edge.touch.measures import feature
+from train.vectors import Booleans, Floats, Integers, widths_of
 
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""
@@ -19,7 +20,7 @@ SUMMABLE = 1e290
 """Smaller entries of fewer than 10^18 rows add up to a finite number."""
 
 
-def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
+def finite(X: Floats) -> Floats:
     """X (n, p), rows in a row of memory.
 
     Raises:
@@ -33,7 +34,7 @@ def finite(X: NDArray[np.float64]) -> NDArray[np.float64]:
     return X
 
 
-def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
+def column_means(X: Floats) -> Floats:
     """(p,) mean of each column of X (n, p), also where its sum would overflow.
 
     A power of two brings each column's largest entry near 1. It rounds nothing, and
@@ -45,34 +46,12 @@ def column_means(X: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.ldexp(np.ldexp(X, -powers).mean(axis=0), powers))
 
 
-def widths_of(
-    columns: int,
-    features: Sequence[str],
-    widths: Sequence[int] | None = None,
-) -> tuple[int, ...]:
-    """How many of so many columns each feature type has: `widths`, or an equal share.
-
-    Raises:
-        InputError: the columns are no whole number of samples a feature.
-    """
-    if widths is None:
-        if columns % len(features):
-            raise InputError(
-                f"{columns} columns are no whole number of samples of {len(features)} "
-                "features"
-            )
-        return (columns // len(features),) * len(features)
-    if len(widths) != len(features) or sum(widths) != columns:
-        raise InputError(f"{columns} columns are not those of {len(features)} features")
-    return tuple(widths)
-
-
 def scale_of(
-    X: NDArray[np.float64],
+    X: Floats,
     method: str,
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Gain of each feature type. The methods' offsets are left out, as centring takes
     them away.
 
@@ -121,9 +100,7 @@ def scale_of(
     return gain
 
 
-def _inverse(
-    scale: NDArray[np.float64], powers: NDArray[np.int32]
-) -> NDArray[np.float64]:
+def _inverse(scale: Floats, powers: NDArray[np.int32]) -> Floats:
     """1 / (scale * 2^powers); 0 where the scale is 0."""
     gain = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)
     with np.errstate(over="ignore"):  # `centred_and_scaled` refuses infinite gains
@@ -131,10 +108,10 @@ def _inverse(
 
 
 def _deviations(
-    X: NDArray[np.float64],
-    sizes: NDArray[np.int64],
-    wide: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+    X: Floats,
+    sizes: Integers,
+    wide: Booleans,
+) -> Floats:
     """(features,) standard deviation of each feature type over all of its columns.
 
     Each cell or joint has a level of its own, which says nothing about a trial: a wide
@@ -149,11 +126,11 @@ def _deviations(
 
 
 def centred_and_scaled(
-    X: NDArray[np.float64],
+    X: Floats,
     method: str,
     features: Sequence[str] = FEATURES,
     widths: Sequence[int] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats, Floats]:
     """Mean (p,) and gain (p,) of each column of X (n, p), and (X - mean) * gain (n, p).
 
     A scaling shifts each type by a constant, which centring takes away again: the mean

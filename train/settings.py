@@ -46,11 +46,13 @@ class Settings:
         chosen = dict(self.chosen)
         without = list(map(dict, self.without))
         for task, settled in self.chosen.items():
-            if settled.known is not None:
-                chosen[task] = replace(settled, choice=settled.known)
+            if settled.choice_of_known is not None:
+                chosen[task] = replace(settled, choice=settled.choice_of_known)
                 for by_task, choice in zip(without, settled.known_by_fold, strict=True):
                     by_task[task] = choice
-        early = self.early and replace(self.early, settings=self.early.known)
+        early = self.early
+        if early is not None:
+            early = replace(early, settings=early.settings_of_known)
         return replace(self, chosen=chosen, without=without, early=early)
 
     @property
@@ -58,7 +60,7 @@ class Settings:
         """Number of trials that calibrate."""
         return int((self.folds >= 0).sum())
 
-    def taken(self, *, folds: bool = False) -> set[str]:
+    def features(self, *, folds: bool = False) -> set[str]:
         """The names of the features that the settings take.
 
         Args:

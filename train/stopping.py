@@ -27,9 +27,8 @@ labels then names nothing, so an `unknown` for a trained object is an error of i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
-from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -94,23 +93,16 @@ Answers = dict[str, tuple[Strings, Floats]]
 
 def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
     """The answers of models, one for each decision point, to vectors (points, m, p)."""
-    points = [_answers(model, x) for model, x in zip(models, X, strict=True)]
-    by_task = {}
-    for task in points[0]:
-        labels = np.array([point[task][0] for point in points])
-        margins = np.array([point[task][1] for point in points])
-        by_task[task] = labels, margins
-    return by_task
-
-
-def _answers(model: ContactClassifier, x: Floats) -> dict[str, tuple[Any, ...]]:
-    """{task: labels and margins} of vectors (m, p)."""
-    answered = {}
-    for task, (labels, distances) in model.decide(x).items():
-        pairs = zip(distances.tolist(), labels, strict=True)
-        margins = [margin(to_labels, int(label)) for to_labels, label in pairs]
-        answered[task] = model.classes_[task][labels], margins
-    return answered
+    by_task: dict[str, tuple[list[Strings], list[list[float]]]] = {}
+    for model, x in zip(models, X, strict=True):
+        for task, (indices, distances) in model.decide(x).items():
+            labels, margins = by_task.setdefault(task, ([], []))
+            labels.append(model.classes_[task][indices])
+            margins.append(list(map(margin, distances.tolist(), indices.tolist())))
+    return {
+        task: (np.array(labels), np.array(margins))
+        for task, (labels, margins) in by_task.items()
+    }
 
 
 def held_out(
@@ -168,8 +160,8 @@ class Curve:
         spread = columns.std(axis=0)
         # The spread of equal values is the rounding of their mean.
         spread[spread <= 1e-12 * np.abs(middle)] = 1.0
-        ones = np.ones((len(columns), 1))
-        scaled = np.hstack([(columns - middle) / spread, ones])
+        constant = np.ones((len(columns), 1))
+        scaled = np.hstack([(columns - middle) / spread, constant])
         prior = np.array([1.0, DOUBT * spread[1], 0.0])
         solution = _logistic(scaled, right.ravel(), prior)
         slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
@@ -183,8 +175,8 @@ class Curve:
         share: float,
     ) -> Curve:
         """The curve with the intercept at which the mean probability is `share`."""
-        least = 0.5 / margins.size
-        target = min(max(share, least), 1.0 - least)
+        half_a_trial = 0.5 / margins.size
+        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
 
         def surplus(shift: float) -> float:
             shifted = replace(self, intercept=self.intercept + shift)
@@ -348,10 +340,8 @@ class SequentialClassifier:
 
     def _without(self, fold_choices: Sequence[Mapping[str, Choice]]) -> list[AtPoints]:
         """[fold][decision point]{task: the choice made without the fold's trials}."""
-        if self.early is None:
-            return [self._at_points(choices, {}) for choices in fold_choices]
-        pairs = zip(fold_choices, self.early.by_fold, strict=True)
-        return [self._at_points(full, early) for full, early in pairs]
+        early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
+        return list(map(self._at_points, fold_choices, early))
 
     def _at_points(
         self,
@@ -390,7 +380,7 @@ class SequentialClassifier:
     def _fit_points(self, vectors: Vectors) -> Vectors:
         """Fit the classifier of each decision point; the vectors that these take."""
         choices = [choice for at in self.choices_at for choice in at.values()]
-        features = _taken(choices, self.features)
+        features = set().union(*(c.features or self.features for c in choices))
         self.columns_ = columns_of(features, self.features, vectors.columns)
         names, widths = types_of(features, self.features, vectors.columns)
         self.n_features_in_ = len(self.columns_)
@@ -540,12 +530,6 @@ class SequentialClassifier:
                 task == self.novelty_.task,
             )
         return courses
-
-
-def _taken(choices: Iterable[Choice], features: Sequence[str]) -> list[str]:
-    """The features that some choice takes, in their order."""
-    names = set().union(*(choice.features or features for choice in choices))
-    return [name for name in features if name in names]
 
 
 def _curve(

@@ -7,8 +7,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.errors import InputError
 from edge.touch.features import FEATURES
-from train.scaling import widths_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -17,6 +17,28 @@ Strings = NDArray[np.str_]
 
 Labels = Mapping[str, Strings]
 """{task: (n,) labels}; empty where a trial has none, which then does not count."""
+
+
+def widths_of(
+    columns: int,
+    features: Sequence[str],
+    widths: Sequence[int] | None = None,
+) -> tuple[int, ...]:
+    """How many of so many columns each feature type has: `widths`, or an equal share.
+
+    Raises:
+        InputError: the columns are no whole number of samples a feature.
+    """
+    if widths is None:
+        if columns % len(features):
+            raise InputError(
+                f"{columns} columns are no whole number of samples of {len(features)} "
+                "features"
+            )
+        return (columns // len(features),) * len(features)
+    if len(widths) != len(features) or sum(widths) != columns:
+        raise InputError(f"{columns} columns are not those of {len(features)} features")
+    return tuple(widths)
 
 
 @dataclass(frozen=True)

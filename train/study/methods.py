@@ -96,26 +96,26 @@ def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
     compared = methods(context)
     cases = [(method, *split) for split in splits for method in compared.values()]
     answers = context.workers.map("methods", call, cases)
-    known = dict(zip(compared, answers, strict=False))
-    unseen = dict(zip(compared, answers[len(compared) :], strict=False))
-    return known, unseen
+    by_trial = dict(zip(compared, answers, strict=False))
+    by_object = dict(zip(compared, answers[len(compared) :], strict=False))
+    return by_trial, by_object
 
 
 def section(context: Context) -> Section:
     """Each method's accuracy on trials that were left out, and on objects that were
     left out."""
     y = context.labels
-    known, unseen = tested(context)
-    text = [sentence(task, known, unseen) for task in y]
-    known[SEARCHED] = grid_search(context.vectors(), y)
-    known[GUESS] = {task: majority(labels) for task, labels in y.items()}
+    by_trial, by_object = tested(context)
+    text = [sentence(task, by_trial, by_object) for task in y]
+    by_trial[SEARCHED] = grid_search(context.vectors(), y)
+    by_trial[GUESS] = {task: majority(labels) for task, labels in y.items()}
     never: dict[str, dict[str, float]] = {task: {} for task in y}
-    for method, results in unseen.items():
+    for method, results in by_object.items():
         for task, result in results.items():
             never[task][method] = percent(result.accuracy)
     rows: list[Row] = []
     for task in y:
-        for method, results in known.items():
+        for method, results in by_trial.items():
             result = results[task]
             row: Row = {"task": task, "method": method}
             row["accuracy %"] = percent(result.accuracy)
@@ -142,8 +142,8 @@ def section(context: Context) -> Section:
             figures.bars(
                 "methods",
                 f"{title}; diamonds show objects never met",
-                list(known),
-                by_task(known),
+                list(by_trial),
+                by_task(by_trial),
                 marks=never,
                 mark="never met",
             )
@@ -153,21 +153,21 @@ def section(context: Context) -> Section:
 
 def sentence(
     task: str,
-    known: Mapping[str, Answers],
-    unseen: Mapping[str, Answers],
+    by_trial: Mapping[str, Answers],
+    by_object: Mapping[str, Answers],
 ) -> str:
     """The accuracy of the paper's method and of the best one, with objects known and
     never met."""
 
     def share(method: str) -> str:
-        result = known[method][task]
+        result = by_trial[method][task]
         brackets = interval(result)
-        if task in unseen.get(method, {}):
-            new = unseen[method][task].accuracy
+        if task in by_object.get(method, {}):
+            new = by_object[method][task].accuracy
             brackets += f"; {100 * new:.0f} % with objects never met"
         return f"{100 * result.accuracy:.0f} % of the contacts right ({brackets})"
 
-    best = max(known, key=lambda method: known[method][task].accuracy)
+    best = max(by_trial, key=lambda method: by_trial[method][task].accuracy)
     better = "No method here does better"
     if best != PAPER:
         better = f"The best is {best}: {share(best)}"

@@ -168,17 +168,17 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
     """
     mean = mean_of(data_sets)
     shared = [entry for entry in entries() if entry.key in mean]
-    known = {entry: _beside(entry, mean[entry.key], tested) for entry in shared}
-    rows = list(known.values())
-    by_task = groupby(known, key=lambda entry: (entry.table, entry.task))
+    row_of = {entry: _beside(entry, mean[entry.key], tested) for entry in shared}
+    rows = list(row_of.values())
+    by_task = groupby(row_of, key=lambda entry: (entry.table, entry.task))
     ranks = [
-        _ranks(list(settings), known, data_sets, tested) for _, settings in by_task
+        _ranks(list(settings), row_of, data_sets, tested) for _, settings in by_task
     ]
     # {(within the interval, a headline): number}
     counts = Counter((row["within"], row["headline"]) for row in rows)
     predicted = counts["yes", ""]
     inside = predicted + counts["yes", "yes"]
-    others = predicted + counts["no", ""]
+    predictions = predicted + counts["no", ""]
     title = (
         f"Our accuracies against the paper's: {inside} of {len(rows)} within the "
         "interval"
@@ -191,16 +191,16 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
             f"contains zero. The interval allows for chance in the {tested} trials "
             f"here ({counted(len(data_sets), 'simulated data set')}) and in the "
             f"paper's {TRIALS}. The objects touched are not the same.",
-            f"{len(rows) - others} of the {len(rows)} repeat the three "
+            f"{len(rows) - predictions} of the {len(rows)} repeat the three "
             "headline accuracies of the paper's section IV-A. The free values of the "
             "scene were chosen to meet these, so they are no predictions. Of the other "
-            f"{others}, {predicted} agree. Nothing was changed to meet them.",
+            f"{predictions}, {predicted} agree. Nothing was changed to meet them.",
             _disagreements([row for row in rows if row["within"] == "no"]),
             "A negative rank correlation means that the simulation does not support "
             "the order in which the paper ranks these settings. Beside it stand the "
             "number of data sets in which it is positive, and the share of perfect "
             "replications of the paper in which it would be negative by chance.",
-            *_wrong_objects({e.key: e.percent for e in known}, mean),
+            *_wrong_objects({e.key: e.percent for e in row_of}, mean),
         ],
         [
             Table("paper", "The paper's accuracies and ours", rows),
@@ -211,7 +211,7 @@ def comparison(data_sets: Sequence[Numbers], tested: int) -> Section:
                 narrow=5,
             ),
         ],
-        [_against(known, title)],
+        [_against(row_of, title)],
     )
 
 
@@ -239,7 +239,7 @@ def _beside(entry: Entry, ours: float, tested: int) -> Row:
 
 def _ranks(
     settings: Sequence[Entry],
-    known: Mapping[Entry, Row],
+    row_of: Mapping[Entry, Row],
     data_sets: Sequence[Numbers],
     tested: int,
 ) -> Row:
@@ -247,7 +247,7 @@ def _ranks(
 
     Args:
         settings: the paper's numbers for the task.
-        known: their rows beside ours.
+        row_of: their rows beside ours.
         data_sets: our percents, for each data set.
         tested: number of our trials.
     """
@@ -256,7 +256,7 @@ def _ranks(
     rank = rank_correlation(theirs, np.mean(ours, axis=0))
     correlations = [rank_correlation(theirs, percents) for percents in ours]
     positive = sum(value is not None and value > 0.0 for value in correlations)
-    within = sum(known[entry]["within"] == "yes" for entry in settings)
+    within = sum(row_of[entry]["within"] == "yes" for entry in settings)
     return {
         "table": settings[0].table,
         "task": settings[0].task,
@@ -302,18 +302,18 @@ def _disagreements(outside: Sequence[Row]) -> str:
     )
 
 
-def _against(known: Mapping[Entry, Row], title: str) -> Figure:
+def _against(row_of: Mapping[Entry, Row], title: str) -> Figure:
     """Our accuracies against the paper's; a point is hollow if its interval misses the
     diagonal."""
-    marks = dict(zip(dict.fromkeys(e.table for e in known), "os^", strict=False))
-    strokes = dict(zip(sorted({e.task for e in known}), STROKES, strict=False))
-    lowest = min(min(row["paper %"], row["ours %"]) for row in known.values())
+    marks = dict(zip(dict.fromkeys(e.table for e in row_of), "os^", strict=False))
+    strokes = dict(zip(sorted({e.task for e in row_of}), STROKES, strict=False))
+    lowest = min(min(row["paper %"], row["ours %"]) for row in row_of.values())
     ends = (lowest - 4.0, 102.0)
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
         axes.plot(ends, ends, color="0.4", lw=1, label="equal")
-        for entry, row in known.items():
+        for entry, row in row_of.items():
             colour, _, dashes = strokes[entry.task]
             x = entry.percent
             bar = [x + row["from"], x + row["to"]]

@@ -168,13 +168,18 @@ def _compared(
     """
     answers = context.workers.map(column, grid_search, list(cases.values()))
     results = dict(zip(cases, answers, strict=True))
-    theirs = None
-    if context.scene is not None:
-        theirs = {task: papers(table, task) for task in context.labels}
+    theirs = _papers_of(context, table)
     png = figures.bars(column, title, list(results), by_task(results), marks=theirs)
     heading = f"Accuracy with each choice of {column}"
     cells = Table(column, heading, rows(column, results, table))
     return Section(title, [text], [cells], [png])
+
+
+def _papers_of(context: Context, table: str) -> dict[str, dict[str, float]] | None:
+    """The paper's accuracies beside which a simulation of its scene stands."""
+    if context.scene is None:
+        return None
+    return {task: papers(table, task) for task in context.labels}
 
 
 def _with_skin(
@@ -197,27 +202,22 @@ def resolution(context: Context) -> Section:
     cases = [(*skin, data.chain, labels) for skin in skins]
     answers = context.workers.map("taxel resolution", _with_skin, cases)
     taxels = [layout.rows * layout.cols for layout, _ in skins]
-    results = {}
-    lost = {}
-    for count, (accuracies, without_contact) in zip(taxels, answers, strict=True):
-        results[count] = accuracies
-        lost[count] = without_contact
+    accuracies, missed = zip(*answers, strict=True)
+    results = dict(zip(taxels, accuracies, strict=True))
+    without_contact = dict(zip(taxels, missed, strict=True))
     title = "Effect of taxel resolution (Table I, Fig. 9)"
-    theirs = None
-    if context.scene is not None:
-        theirs = {task: papers("I", task) for task in labels}
     png = figures.lines(
         "resolution",
         title,
         taxels,
         by_task(results),
         label="taxels",
-        paper=theirs,
+        paper=_papers_of(context, "I"),
         ticks=list(map(str, taxels)),
     )
     cells = rows("taxels", results, "I")
     for row in cells:
-        row["without contact"] = lost[row["taxels"]]
+        row["without contact"] = without_contact[row["taxels"]]
     return Section(
         title,
         [

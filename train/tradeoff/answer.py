@@ -60,7 +60,7 @@ def early(measured: Measured) -> Section:
     rows: list[Row] = [
         {
             "task": task,
-            "requested error %": percent(rule.asked),
+            "requested error %": percent(rule.error),
             "right %": percent(1.0 - rule.wrong),
             "mean time s": round(rule.mean_s, 3),
             "points over waiting": points(rule.gain),
@@ -294,7 +294,7 @@ def _split(figure: Any, measured: Measured) -> None:
     stages.append((f"arithmetic {arithmetic_ms:.1f} ms", arithmetic_ms))
     whole, magnified = figure.subplots(2, 1)
     for axes in (whole, magnified):
-        left = 0.0
+        offset = 0.0
         for i, (name, length) in enumerate(stages):
             style = {
                 "color": STROKES[i][0],
@@ -302,8 +302,8 @@ def _split(figure: Any, measured: Measured) -> None:
                 "ec": "white",
                 "lw": 0,
             }
-            axes.barh(0, length, left=left, **style, label=name)
-            left += length
+            axes.barh(0, length, left=offset, **style, label=name)
+            offset += length
         axes.set_yticks([])
         axes.grid(visible=False)
         axes.spines["left"].set_visible(False)

@@ -26,7 +26,7 @@ class Certified:
     """Decisions with a requested error rate, over the folds in which it was certified.
 
     Attributes:
-        asked: the error rate.
+        error: the requested rate.
         folds: number of folds, out of `FOLDS`, that certified it.
         right: (m,) whether each contact of these folds is decided rightly. A contact
             unlike all trained ones gets no label, which counts as wrong.
@@ -36,7 +36,7 @@ class Certified:
         mean_s: mean time to decision.
     """
 
-    asked: float
+    error: float
     folds: int
     right: Booleans
     waited: Booleans
@@ -142,8 +142,8 @@ def _folds(dataset: DataSet, leave_out: str) -> tuple[tuple[str, ...], Integers]
     if groups is None:
         tasks = tuple(y) if leave_out == TRIAL else ()
         return tasks, stratified_folds(y[finest(y)], FOLDS)
-    others = [task for task in y if task != leave_out and groupable(y[task], groups)]
-    return tuple(others), group_folds(groups, FOLDS)
+    tasks = tuple(t for t in y if t != leave_out and groupable(y[t], groups))
+    return tasks, group_folds(groups, FOLDS)
 
 
 @dataclass(frozen=True)

@@ -54,9 +54,9 @@ def uses(measured: Measured, task: str) -> list[Use]:
         options.append(Use(f"after {window:g} s", seconds, result, (command,), window))
     export = measured.commands.export(*EARLY)
     for rule in distinct(measured.comparisons[task]):
-        name = f"early, at most {rule.asked:.0%} wrong"
+        name = f"early, at most {rule.error:.0%} wrong"
         seconds = rule.mean_s + measured.after_s
-        run = f"edge-classify run --error {rule.asked:g}"
+        run = f"edge-classify run --error {rule.error:g}"
         options.append(Use(name, seconds, rule.result, (export, run)))
     return options
 
