@@ -13,7 +13,7 @@ import numpy as np
 from train.simulate.arm import Array
 from train.simulate.engine import begin, run_physics
 from train.simulate.plan import RESOLVE, make_plan, required_effects
-from train.simulate.scene_model import Scene, SceneObject, TrialSpec, Value
+from train.simulate.scene_model import Scene, TrialSpec, Value
 
 Kind = tuple[str, ...]
 """The effects that trials call for, which name a kind of trials."""
@@ -166,10 +166,11 @@ def measure(
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
-    judged = []
-    for kind, force in zip(kinds, _forces_as_given(scene, kinds), strict=True):
-        judged.append(_judged(kind, force, tolerance))
-    return dict(zip(trials_by_kind, judged, strict=True))
+    forces = _forces_as_given(scene, kinds)
+    return {
+        effects: _judged(kind, force, tolerance)
+        for effects, kind, force in zip(trials_by_kind, kinds, forces, strict=True)
+    }
 
 
 def _forces_as_given(scene: Scene, kinds: list[_Kind]) -> list[Array]:
@@ -185,13 +186,11 @@ def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:
     """One trial of each object and condition, at most `MOST_OBJECTS`, with the value in
     the middle of every range."""
     first = list({spec.key: spec for spec in reversed(specs)}.values())
-    chosen = first[:: -(-len(first) // MOST_OBJECTS)]
-    return [replace(spec, object=_at_middle(spec.object)) for spec in chosen]
-
-
-def _at_middle(item: SceneObject) -> SceneObject:
-    values = {key: _middle(value) for key, value in item.values.items()}
-    return replace(item, values=values)
+    chosen = []
+    for spec in first[:: -(-len(first) // MOST_OBJECTS)]:
+        values = {key: _middle(value) for key, value in spec.object.values.items()}
+        chosen.append(replace(spec, object=replace(spec.object, values=values)))
+    return chosen
 
 
 def _run(scene: Scene, work: list[tuple[_Kind, float]], *, paced: bool = True) -> None:

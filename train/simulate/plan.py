@@ -278,9 +278,8 @@ def summary(scene: Scene) -> list[str]:
     """Lines on the effects that a scene's trials call for, those that none does, how
     much of the effects' work that leaves out, and steps that are not measured."""
     counts = dict.fromkeys(EFFECTS, 0)
-    trials = 0
+    trials = scene.count * len(scene.kinds)
     for item, condition in scene.kinds:
-        trials += scene.count
         for effect in required_effects(scene, item, condition):
             counts[effect] += scene.count
     entries = [f"{name} ({n})" for name, n in counts.items() if n]

@@ -428,9 +428,13 @@ def draw_family(
     count = table.whole("count", allowed=range(1, 1001))
     part = table.value("kinetic_part", PART, [0.8, 0.95])
     push_n = table.field("push_n", schema.LABELS["push_n"], push_n)
-    ranges = _ranges(table, family)
-    defaults = schema.keys_of(family).items()
-    usual = {key: default for key, default in defaults if default is not None}
+    defaults = schema.keys_of(family)
+    del defaults["friction_kinetic"]  # which kinetic_part gives
+    keys = set(filter(table.has, defaults))
+    table.done()
+    # The draws follow the order of the file.
+    ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in keys}
+    usual = {key: value for key, value in defaults.items() if value is not None}
     movable = "movable" in conditions
     generator = stream(seed, "family", name)
     for number in range(count):
@@ -445,27 +449,8 @@ def draw_family(
             "family": family,
             "conditions": list(conditions),
             "name": f"{name} {number + 1:02d}",
-            **_counted(values),
+            **values,
         }
-
-
-def _ranges(table: SceneTable, family: str) -> dict[str, Value]:
-    """The ranges of a family, in the order of the file, which the draws follow."""
-    keys = schema.keys_of(family)
-    del keys["friction_kinetic"]  # which kinetic_part gives
-    keys_in_file = set(filter(table.has, keys))
-    table.done()
-    return {
-        key: table.value(key, OBJECT[key]) for key in table.raw if key in keys_in_file
-    }
-
-
-def _counted(values: Mapping[str, float]) -> dict[str, Any]:
-    """The values of an object, those that count something rounded."""
-    return {
-        key: round(value) if OBJECT[key].integer else value
-        for key, value in values.items()
-    }
 
 
 def _draw_object(
@@ -473,8 +458,12 @@ def _draw_object(
     ranges: Mapping[str, Value],
     part: Value,
 ) -> dict[str, float]:
-    """The values of an object, with its kinetic friction as a part of the static."""
-    values = {key: _draw(generator, value) for key, value in ranges.items()}
+    """The values of an object, those that count something rounded, with its kinetic
+    friction as a part of the static."""
+    values = {}
+    for key, value in ranges.items():
+        number = _draw(generator, value)
+        values[key] = round(number) if OBJECT[key].integer else number
     if "friction_static" in values:
         kinetic = values["friction_static"] * _draw(generator, part)
         values["friction_kinetic"] = kinetic
@@ -495,7 +484,7 @@ def passed_on(values: Mapping[str, float], skin: Cylinder) -> float:
     its elastic layer (`effects.foundation`) `PRESSED_M` deep; infinite for other
     objects."""
     if "stem_n_m" in values:
-        return round(values["stem_count"]) * values["stem_n_m"] * PRESSED_M
+        return values["stem_count"] * values["stem_n_m"] * PRESSED_M
     if "modulus_pa" in values:
         length = min(values["width_m"], skin.rows * skin.pitch[0])
         half_width = math.sqrt(2.0 * skin.radius_m * PRESSED_M)

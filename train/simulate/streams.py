@@ -1,6 +1,7 @@
 """Random numbers in one stream for each name, condition and trial."""
 
 import hashlib
+import struct
 from functools import cache
 from statistics import NormalDist
 
@@ -15,7 +16,8 @@ FARTHEST = 2.5
 def key(name: str) -> tuple[int, int]:
     """Two 32-bit words that identify `name` on every machine and in every run."""
     digest = hashlib.sha256(name.encode()).digest()
-    return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
+    first, second = struct.unpack_from("<2I", digest)
+    return first, second
 
 
 def stream(

@@ -370,11 +370,6 @@ class Trials:
         """The number of trials."""
         return len(self.places)
 
-    @property
-    def specs(self) -> list[TrialSpec]:
-        """What each trial is."""
-        return [self.batch.specs[place] for place in self.places]
-
     def only(self, which: Mask) -> "Trials":
         """Those of these trials for which `which` (m,) is true."""
         within = which.nonzero()[0]

@@ -4,6 +4,7 @@ import json
 import re
 import sys
 import types
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -30,14 +31,8 @@ MOVES = {"mass_kg": 1.0, "friction_static": 0.5, "friction_kinetic": 0.4}
 
 
 def scene(*add, leave_out=(), objects=None, axes=1, **trials):
-    box = {
-        "name": "box",
-        "family": "rigid",
-        "conditions": ["fixed", "movable"],
-        **MOVES,
-    }
     return scenes.scene(
-        objects or [box],
+        objects or scenes.one_object(conditions=["fixed", "movable"], **MOVES),
         seed=3,
         trials={"count": 3, "after_s": 0.6, **trials},
         spread={"place_m": 0.01, "roll_deg": 5.0, "friction": 0.1},
@@ -92,9 +87,8 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         for name in EFFECTS:
             if name not in effects:
                 bomb = types.ModuleType(name)
-                bomb.__getattr__ = lambda attribute, name=name: pytest.fail(
-                    f"{name} was touched"
-                )
+                fail = partial(pytest.fail, f"{name} was touched")
+                bomb.__getattr__ = lambda attribute, fail=fail: fail()
                 monkeypatch.setitem(sys.modules, f"train.simulate.effects.{name}", bomb)
         after = batch_of(trial_scene, i)[0]
         monkeypatch.undo()
@@ -149,16 +143,10 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     assert all(a[key].tobytes() == b[key].tobytes() for key in a)
     # Before the contact nothing but the noise's own draws is to be seen.
     far = {"lead_s": 5.0, "after_s": 0.1}
-    trial_scene = scene("noise", **far)
-    other_scene = scene(
-        "noise",
-        "dropped_frames",
-        "crosstalk",
-        "tilt",
-        "saturation",
-        **far,
+    more = ("dropped_frames", "crosstalk", "tilt", "saturation")
+    first, second = (
+        batch_of(scene("noise", *add, **far))[0].counts[:, :499] for add in ((), more)
     )
-    first, second = (batch_of(s)[0].counts[:, :499] for s in (trial_scene, other_scene))
     assert first.any()
     np.testing.assert_array_equal(first, second)
 
@@ -223,9 +211,8 @@ def test_each_required_effect_has_its_reason():
     reasons = {"relaxation": "family foam", "sliding": "movable", "cover": "cover_n_m"}
     reasons |= {"tipping": "base_m and height_m", "noise": "effects.add"}
     assert required.items() >= reasons.items()
-    assert not {"sliding", "stribeck"} & set(
-        required_effects(trial_scene, foam, "fixed")
-    )
+    fixed = required_effects(trial_scene, foam, "fixed")
+    assert not {"sliding", "stribeck"} & set(fixed)
     trial_scene = scene(leave_out=["relaxation"], objects=everything())
     required = required_effects(trial_scene, foam, "fixed")
     assert "foundation" in required
@@ -233,29 +220,20 @@ def test_each_required_effect_has_its_reason():
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
-    wall = {"name": "wall", "family": "rigid", "conditions": ["fixed"]}
-    box = {
-        **wall,
-        "name": "box",
-        "conditions": ["fixed", "movable"],
-        "foot_m": 0.2,
-        **MOVES,
-    }
-    trial_scene = from_dict(
-        {"object": [box, wall], "spread": {"slope_deg": 1.0, "aside_m": 0.01}}
-    )
+    wall = scenes.one_object(name="wall")
+    box = scenes.one_object(conditions=["fixed", "movable"], foot_m=0.2, **MOVES)
+    spread = {"slope_deg": 1.0, "aside_m": 0.01}
+    trial_scene = from_dict({"object": box + wall, "spread": spread})
     pushed, still = trial_scene.objects
     assert {"slope", "turning"} <= set(required_effects(trial_scene, pushed, "movable"))
-    assert not {"slope", "turning"} & set(
-        required_effects(trial_scene, pushed, "fixed")
-    )
+    fixed = required_effects(trial_scene, pushed, "fixed")
+    assert not {"slope", "turning"} & set(fixed)
     assert pushed.values["slope_deg"].low == 0.0
     assert "slope_deg" not in still.values
     for key, partner in (("slope_deg", "mass_kg"), ("aside_m", "foot_m")):
-        with pytest.raises(
-            InputError, match=f"spread.{key} .*: give a movable object {partner}"
-        ):
-            from_dict({"object": [wall], "spread": {key: 1e-3}})
+        sentence = f"spread.{key} .*: give a movable object {partner}"
+        with pytest.raises(InputError, match=sentence):
+            from_dict({"object": wall, "spread": {key: 1e-3}})
 
 
 @pytest.mark.parametrize("band", [10.0, 30.0])

@@ -234,22 +234,17 @@ def test_a_skin_of_one_row_meets_things_there(family):
 
 def test_a_motion_about_the_forearm_itself_is_refused():
     scene = from_dict({**GOOD, "motion": {"rate_deg_s": [0.0, 0.0, 0.0, 0.0, 20.0]}})
-    with pytest.raises(
-        InputError, match=r"motion\.rate_deg_s does not move the forearm"
-    ):
+    with pytest.raises(InputError, match="rate_deg_s does not move the forearm"):
         next(simulate(scene))
 
 
 def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
-    robot = (
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint '
-        'name="lift" '
-        'type="{}"><parent link="a"/><child link="b"/><axis xyz="0 -1 0"/><limit '
-        'lower="-1" '
-        'upper="1"/></joint><joint name="tip" type="fixed"><parent link="b"/><child '
-        'link="c"/>'
-        '<origin xyz="0 0 -0.4"/></joint></robot>'
-    )
+    robot = """
+        <robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+        <joint name="lift" type="{}"><parent link="a"/><child link="b"/>
+        <axis xyz="0 -1 0"/><limit lower="-1" upper="1"/></joint>
+        <joint name="tip" type="fixed"><parent link="b"/><child link="c"/>
+        <origin xyz="0 0 -0.4"/></joint></robot>"""
     urdf = tmp_path / "arm.urdf"
     place = str(tmp_path / "scene.toml")
     arm = {"chain": "arm.urdf", "base": "a", "tip": "c"}
@@ -261,14 +256,14 @@ def test_an_arm_may_come_from_a_urdf_unless_it_slides(tmp_path):
     assert next(simulate(scene))[1].frames.max() > 0
     urdf.write_text(robot.format("prismatic"))
     with pytest.raises(
-        InputError, match=r"arm\.chain: joint 'lift' slides; .* make it fixed"
+        InputError, match="chain: joint 'lift' slides; .* make it fixed"
     ):
         from_dict(table, place)
 
 
 def test_a_key_that_no_condition_of_the_object_heeds_is_refused():
-    table = changed("object.0.conditions", ["fixed"])
-    table["object"][0]["slope_deg"] = 5.0
+    keys = {"conditions": ["fixed"], "slope_deg": 5.0}
+    table = changed("object.0", GOOD["object"][0] | keys)
     with pytest.raises(
         InputError, match="gives slope_deg, which has no effect without"
     ):

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -29,14 +30,8 @@ class TestRelaxation:
         trace = rig.run(150)
         t = trace.t
         ramp = np.minimum(t, up)
-        z = (
-            ratio
-            * k
-            * rate
-            * tau
-            * (1.0 - np.exp(-ramp / tau))
-            * np.exp(-(t - ramp) / tau)
-        )
+        rise = 1.0 - np.exp(-ramp / tau)
+        z = ratio * k * rate * tau * rise * np.exp(-(t - ramp) / tau)
         np.testing.assert_allclose(trace.force, k * rate * ramp + z, rtol=1e-8)
 
 
@@ -95,30 +90,22 @@ class TestBed:
         assert math.log2(twice / force) == pytest.approx(2.0, abs=0.05)
 
     def test_the_closed_form_is_the_bed_in_fractions(self):
-        from fractions import Fraction
-
         rng = np.random.default_rng(11)
         for furthest in [50, 4000] * 60:
             gaps = np.sort(rng.integers(0, 50, 5)) / 1024.0
             k = 2.0 ** rng.integers(-3, 30, 5)
             c = float(2.0 ** rng.integers(-12, 2))
             free = float(rng.integers(1, furthest)) / 1024.0
-            law = contact.bed_law(gaps[:, None], k[:, None])
-            force = contact.closed_form(
-                gaps[:, None],
-                *law,
-                np.array([free]),
-                np.array([c]),
-            )[0]
-            best = Fraction(0)
-            total_k = total_b = Fraction(0)
+            law = gaps[:, None], *contact.bed_law(gaps[:, None], k[:, None])
+            (force,) = contact.closed_form(*law, np.array([free]), np.array([c]))
+            best = total_k = total_b = Fraction(0)
             for g, s in zip(gaps, k, strict=True):
-                total_k += Fraction(float(s))
-                total_b += Fraction(float(s)) * Fraction(float(g))
-                best = max(
-                    best,
-                    (total_k * Fraction(free) - total_b) / (1 + Fraction(c) * total_k),
+                total_k += Fraction(s)
+                total_b += Fraction(s) * Fraction(g)
+                line = (total_k * Fraction(free) - total_b) / (
+                    1 + Fraction(c) * total_k
                 )
+                best = max(best, line)
             assert force == pytest.approx(float(best), rel=1e-14, abs=1e-300)
 
 
@@ -169,11 +156,10 @@ class TestLateral:
         foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
         batch = run(make(foam))
         depth = batch.traces["depth_m"][0, -1] / 0.1
-        widths = np.array(
-            [layer_solution(a)[:2] for a in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
-        )
+        parts_of_depth = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+        loads, depths, _ = zip(*map(layer_solution, parts_of_depth), strict=True)
         scale = RADIUS / 0.1
-        want = np.interp(depth * scale, widths[:, 1], widths[:, 0]) / scale
+        want = np.interp(depth * scale, depths, loads) / scale
         length = batch.trials.scene.skin.pitch[0] * batch.trials.bed.weight[:, 0].sum()
         assert batch.force[0, -1] == pytest.approx(12e3 * 0.1 * want * length, rel=0.1)
 
@@ -226,9 +212,8 @@ class TestAskew:
         t.touch.force[:] = force
         # Half a column from the nearest on either side, as in the block's sum over
         # taxels.
-        angles_off = (
-            np.arange(len(t.bed.columns)) - len(t.bed.columns) // 2 + 0.5
-        ) * 0.26166
+        columns = len(t.bed.columns)
+        angles_off = (np.arange(columns) - columns // 2 + 0.5) * 0.26166
         radius = t.scene.skin.radius_m
         gaps = lateral.touched_at(radius * (1.0 - np.cos(angles_off)), radius, 0.1)
         t.bed.column_gaps[:] = gaps[:, None]
@@ -253,10 +238,8 @@ def test_foam_pressed_flat_is_as_hard_as_the_skin():
 
 
 def test_a_sleeve_is_in_series_with_the_skin():
-    covered = run(make(one_object(cover_n_m=2500.0)))
-    np.testing.assert_allclose(
-        covered.trials.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0)
-    )
+    t = run(make(one_object(cover_n_m=2500.0))).trials
+    np.testing.assert_allclose(t.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
 
 
 def test_a_sleeve_spreads_the_load_and_loses_none():
@@ -288,22 +271,14 @@ class TestBubbles:
     STIFFNESS = 1500.0
 
     def wrap(self, **keys):
-        thing = {
-            "family": "bubbles",
-            "bubble_m": self.HEIGHT,
-            "bubble_n_m": self.STIFFNESS,
-        }
-        scene = make(one_object(**thing, **keys))
-        return run(
-            replace(scene, taxel_n_m=Value(1e12, 1e12))
-            if keys["pop_n"] > 1e3
-            else scene
-        )
+        bubbles = {"bubble_m": self.HEIGHT, "bubble_n_m": self.STIFFNESS}
+        return make(one_object(family="bubbles", **bubbles, **keys))
 
     @pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
     def test_they_stiffen_by_the_gas_law(self, part):
         # f = k0 d / (1 - d / b), touched by its tangents at b / 2 and 3 b / 4.
-        t = self.wrap(pop_n=1e6).trials
+        rigid = replace(self.wrap(pop_n=1e6), taxel_n_m=Value(1e12, 1e12))
+        t = run(rigid).trials
         bed = t.bed
         columns = len(t.bed.reach)
         middle = slice(columns // 2, None, columns)
@@ -315,7 +290,7 @@ class TestBubbles:
         assert force == pytest.approx(want if part >= 0.5 else 0.75 * want, rel=1e-6)
 
     def test_burst_ones_leave_their_backing(self):
-        batch = self.wrap(pop_n=0.5)
+        batch = run(self.wrap(pop_n=0.5))
         alive = batch.trials.bed.intact
         alive = alive.reshape(4, -1, *alive.shape[1:])
         burst = alive[3] == 1.0
@@ -327,7 +302,7 @@ class TestBubbles:
         assert batch.traces["depth_m"][0, -1] > self.HEIGHT
 
     def test_the_law_of_the_bed_holds_the_springs_that_are_left(self):
-        t = self.wrap(pop_n=0.5, width_m=0.05).trials
+        t = run(self.wrap(pop_n=0.5, width_m=0.05)).trials
         weight = t.bed.weight[:, 0]
         assert sorted(set(weight.tolist()))[0] == 0.0
         intact = weight * t.bed.intact[..., 0] * t.bed.stiffness[:, :1]
@@ -373,41 +348,29 @@ def test_no_row_that_the_face_does_not_cover_is_the_deepest():
     np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)
 
 
+def loads_of(t):
+    """The elastic load of each spring at the rows' depths."""
+    bed = t.bed
+    return contact.spring_loads(t.touch.line_depth, bed.gaps, bed.stiffness, bed.weight)
+
+
 def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     foam = {"family": "foam", "relax_ratio": 2.0, "relax_s": 0.05, "width_m": 0.08}
     t = run(replace(make(one_object(**foam), "tilt", after_s=3.0), travel_s=0.6)).trials
     viscous = t.states["viscous"]
-    elastic = contact.spring_loads(
-        t.touch.line_depth,
-        t.bed.gaps,
-        t.bed.stiffness,
-        t.bed.weight,
-    ).sum(axis=0)
+    elastic = loads_of(t).sum(axis=0)
     assert (np.ptp(elastic, axis=0) > 0.1).all()
     np.testing.assert_allclose(t.bed.row_force, elastic, atol=1e-3)
     np.testing.assert_allclose(viscous.before, viscous.ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
-    wrap = make(
-        one_object(family="bubbles", pop_n=0.3, width_m=0.08),
-        "tilt",
-        after_s=2.0,
-    )
-    t = run(replace(wrap, travel_s=0.6)).trials
-    bed = t.bed
-    assert (np.ptp(bed.intact.sum(axis=0), axis=0) > 0.0).all()
-    loads = contact.spring_loads(
-        t.touch.line_depth,
-        bed.gaps,
-        bed.stiffness,
-        bed.weight,
-    )
-    np.testing.assert_allclose(
-        bed.row_force,
-        (loads * bed.intact).sum(axis=0),
-        atol=1e-6,
-    )
+    wrap = one_object(family="bubbles", pop_n=0.3, width_m=0.08)
+    t = run(replace(make(wrap, "tilt", after_s=2.0), travel_s=0.6)).trials
+    intact = t.bed.intact
+    assert (np.ptp(intact.sum(axis=0), axis=0) > 0.0).all()
+    want = (loads_of(t) * intact).sum(axis=0)
+    np.testing.assert_allclose(t.bed.row_force, want, atol=1e-6)
 
 
 def test_the_tangents_of_a_bubble_lie_below_the_gas_law_by_a_third_at_most():

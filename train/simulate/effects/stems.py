@@ -45,7 +45,9 @@ def lay(t: Trials) -> None:
     shape = (int(counts.max()), len(t))
     depth = np.ones(shape)
     along, around, stiffness = np.zeros((3, *shape))
-    for trial, (spec, count) in enumerate(zip(t.specs, counts.tolist(), strict=True)):
+    for trial, place in enumerate(t.places):
+        spec = t.batch.specs[place]
+        count = counts[trial]
         generator = streams.stream(t.scene.seed, "stems", spec.key, spec.number)
         depth[:count, trial] = generator.random(count)
         along[:count, trial] = generator.random(count)
