@@ -47,8 +47,8 @@ def one_node(operator, arrays, attributes, outputs=("y",)):
     names = [f"x{i}" for i in range(len(arrays))]
     node = helper.make_node(operator, names, outputs, **attributes)
     constants = map(numpy_helper.from_array, map(np.asarray, arrays), names)
-    shown = [helper.make_empty_tensor_value_info(name) for name in outputs]
-    graph = helper.make_graph([node], "g", [], shown, list(constants))
+    values = [helper.make_empty_tensor_value_info(name) for name in outputs]
+    graph = helper.make_graph([node], "g", [], values, list(constants))
     opset = [helper.make_opsetid("", 18)]
     proto = helper.make_model(graph, opset_imports=opset, ir_version=8)
     return onnx_file.read(proto.SerializeToString(), "one node")

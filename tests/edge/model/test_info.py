@@ -64,16 +64,16 @@ def test_the_fastest_rule_that_is_certified_is_taken():
 
 def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
     _, at_nine_tenths, _ = stopping().rules
-    needed = 2.0 * math.log(9.0)
-    assert stopping().sure(at_nine_tenths, [0.0, needed + 1e-9], 0, excess=0.0)
-    assert not stopping().sure(at_nine_tenths, [0.0, needed - 1e-9], 0, excess=0.0)
+    evidence = 2.0 * math.log(9.0)
+    assert stopping().sure(at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.0)
+    assert not stopping().sure(at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.0)
 
 
 def test_a_novel_contact_needs_a_larger_margin():
     _, at_nine_tenths, _ = stopping().rules
-    needed = 2.0 * (math.log(9.0) + 0.7)
-    assert stopping().sure(at_nine_tenths, [0.0, needed + 1e-9], 0, excess=0.7)
-    assert not stopping().sure(at_nine_tenths, [0.0, needed - 1e-9], 0, excess=0.7)
+    evidence = 2.0 * (math.log(9.0) + 0.7)
+    assert stopping().sure(at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.7)
+    assert not stopping().sure(at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.7)
 
 
 @pytest.mark.parametrize(
@@ -94,16 +94,16 @@ def test_novelty_lowers_the_log_odds_by_the_doubt(point, odds):
 def test_a_refusal_names_the_smallest_error_and_how_many_trials_would_do():
     text = refusal(stopping(), 0.08)
     assert "the smallest error that 140 calibration trials certify is 0.100" in text
-    needed = int(text.split("about ")[1].split()[0])
+    trials = int(text.split("about ")[1].split()[0])
     # So many trials with the same share of errors pass the exact binomial test.
-    wrong = math.floor(needed * 7 / 140)
+    wrong = math.floor(trials * 7 / 140)
     tail = sum(
-        math.comb(needed, k) * 0.08**k * 0.92 ** (needed - k) for k in range(wrong + 1)
+        math.comb(trials, k) * 0.08**k * 0.92 ** (trials - k) for k in range(wrong + 1)
     )
     assert 0.0025 < tail <= 0.05
     # Chernoff's bound: the level over the divergence of the two shares.
     divergence = 0.95 * math.log(0.95 / 0.92) + 0.05 * math.log(0.05 / 0.08)
-    assert needed == math.ceil(-math.log(TEST_SHARE * 0.1) / divergence)
+    assert trials == math.ceil(-math.log(TEST_SHARE * 0.1) / divergence)
 
 
 def test_a_refusal_asks_for_more_trials_than_there_were():
@@ -115,8 +115,8 @@ def test_a_refusal_asks_for_more_trials_than_there_were():
 
 def test_an_error_rate_below_the_resolution_of_1_still_has_a_number_of_trials():
     task = stopping(wrong=0)
-    needed = float(refusal(task, 1e-17).split()[-2])
-    assert needed == pytest.approx(-math.log(TEST_SHARE * task.risk) / 1e-17, rel=1e-6)
+    trials = float(refusal(task, 1e-17).split()[-2])
+    assert trials == pytest.approx(-math.log(TEST_SHARE * task.risk) / 1e-17, rel=1e-6)
 
 
 def test_where_the_full_window_errs_more_often_trials_do_not_help():

@@ -150,6 +150,10 @@ def meta(**changes):
     return edited(lambda metadata: metadata.update(changes))
 
 
+def category(**changes):
+    return edited(lambda metadata: metadata["tasks"]["category"].update(changes))
+
+
 REFUSED = {
     no_metadata: "no edge-classify metadata",
     another_attribute: "ONNX Runtime refuses it",
@@ -187,27 +191,25 @@ REFUSED = {
             factors={"category": [0, 0, 1, 1], "object": [0, 1, 2, 3]}
         )
     ): "task 'object' is not the product of its factors",
-    edited(
-        lambda m: m["tasks"]["category"].update(labels=["soft", "soft"])
+    category(
+        labels=["soft", "soft"]
     ): "labels must be a list of different, printable texts",
-    edited(
-        lambda m: m["tasks"]["category"].update(labels=["soft", "rig\x1b[2Jid"])
+    category(
+        labels=["soft", "rig\x1b[2Jid"]
     ): "labels must be a list of different, printable texts, not",
-    edited(
-        lambda m: m["tasks"]["category"].update(components=10**9)
+    category(
+        components=10**9
     ): "task 'category' has 1000000000 components of 120 features",
     edited(lambda m: m["skin"].update(pitch_m=1e308)): "skin.pitch_m must be a number",
     meta(tracking={"debounce": 0}): "debounce must be a whole number from 1 to 1000",
     meta(tracking={"debounce": 1001}): "debounce must be a whole number from 1",
     meta(name="arm\n"): "its name, its tasks' names and its answers must be printable",
-    edited(
-        lambda m: m["tasks"]["category"].update(no_contact="nothing\a")
-    ): "and its answers must be printable",
+    category(no_contact="nothing\a"): "and its answers must be printable",
     edited(
         lambda m: m["trials"].__setitem__(0, "box\x1b[2J")
     ): "its trials' names must be printable",
-    edited(
-        lambda m: m["tasks"]["category"].update(labels=["soft", "soft "])
+    category(
+        labels=["soft", "soft "]
     ): "category.labels must be a list of different, printable texts",
     edited(
         lambda m: m.update(
@@ -255,9 +257,9 @@ def test_labels_that_are_made_of_their_factors_labels_stand_for_these(model):
     lying = with_factors(model.info, names, [1, 1, 0, 0], [0, 1, 0, 1])
     with pytest.raises(InputError, match="'category' is not the product of its"):
         from_json(lying, "m")
-    others = ("wall", "box", "sofa", "pillow")
-    free = with_factors(model.info, others, [1, 1, 0, 0], [0, 1, 0, 1])
-    assert from_json(free, "m").tasks["category"].labels == others
+    free_names = ("wall", "box", "sofa", "pillow")
+    free = with_factors(model.info, free_names, [1, 1, 0, 0], [0, 1, 0, 1])
+    assert from_json(free, "m").tasks["category"].labels == free_names
 
 
 @pytest.mark.parametrize("frames", [1, 1000])

@@ -36,7 +36,7 @@ def add(name="Add", **attributes):
 
 
 def a_function():
-    own = helper.make_function(
+    function = helper.make_function(
         "own",
         "F",
         ["a"],
@@ -44,7 +44,7 @@ def a_function():
         [helper.make_node("Sqrt", ["a"], ["b"])],
         [helper.make_opsetid("", 18)],
     )
-    return model([add()], functions=[own])
+    return model([add()], functions=[function])
 
 
 def a_sparse_constant():

@@ -15,7 +15,7 @@ INF = float("inf")
 
 
 @pytest.mark.parametrize(
-    ("seen", "expected", "share"),
+    ("value", "expected", "share"),
     [
         (0.5, 0.25, 0.5),  # below 1 the bound is absolute
         (150.0, 100.0, 1.0),  # above, a share of the expected
@@ -28,25 +28,24 @@ INF = float("inf")
         (-INF, INF, INF),
     ],
 )
-def test_a_bound_allows_its_share_of_what_is_expected(seen, expected, share):
-    check = compared("it", np.array([0.0, seen]), np.array([0.0, expected]), 0.5)
+def test_a_bound_allows_its_share_of_what_is_expected(value, expected, share):
+    check = compared("it", np.array([0.0, value]), np.array([0.0, expected]), 0.5)
     assert check.worst == pytest.approx(share)
     assert check.passed == (share <= 1.0)
     assert check.row == (1 if share else None)
 
 
 def test_a_bound_of_zero_allows_nothing():
-    one = np.array([1.0])
-    other = np.array([np.nextafter(1.0, 2.0)])
-    assert compared("it", one, one, 0.0).passed
-    assert not compared("it", other, one, 0.0).passed
+    golden = np.array([1.0])
+    assert compared("it", golden, golden, 0.0).passed
+    assert not compared("it", np.nextafter(golden, 2.0), golden, 0.0).passed
 
 
 def test_a_row_of_whole_numbers_that_differs_is_shown():
     golden = np.array([[1, 2], [3, 4], [5, 6]])
-    seen = golden.copy()
-    seen[1, 0] = 7
-    check = compared("it", seen, golden, 0.0)
+    values = golden.copy()
+    values[1, 0] = 7
+    check = compared("it", values, golden, 0.0)
     assert not check.passed
     assert check.row == 1
     assert check.seen == "[7 4]"

@@ -1,9 +1,13 @@
-"""Frames in which a few taxels are pressed, and the contact that they make."""
+"""Frames in which a few taxels are pressed, the contact that they make, and the whole
+numbers of a frame's zones."""
 
 import numpy as np
 
+from edge.touch.active import ActiveTaxels
+from edge.touch.contact import feature_types
 from edge.touch.frame import Frame
 from edge.touch.track import DEBOUNCE, ContactTracker
+from edge.touch.zones import Zones
 
 
 def pressed(layout, t, taxels, **more):
@@ -22,3 +26,22 @@ def followed(layout, frames, debounce=DEBOUNCE, **options):
     for frame in frames:
         (contact,) = tracker.push(frame) or [contact]
     return contact
+
+
+def active_of(layout, frame):
+    """The active taxels of a frame."""
+    return ActiveTaxels(
+        frame.counts,
+        layout.threshold_counts,
+        valid=frame.valid,
+        wraps=layout.wraps,
+    )
+
+
+def zones_of(layout, frame, features):
+    """{zone: its whole numbers} of a frame, as features need them."""
+    active = active_of(layout, frame)
+    zones = Zones(layout, feature_types(features))
+    row = zones.measure(active, active.largest(), frame.shear)
+    split = zones.split(np.array([row], dtype=np.int64))
+    return {zone: numbers[0].tolist() for zone, numbers in split.items()}

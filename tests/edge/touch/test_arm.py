@@ -43,10 +43,10 @@ def test_many_poses_at_once_are_the_single_ones():
 
 def test_a_chain_survives_json_and_toml(tmp_path, urdf):
     for chain in (Chain.cody(), Chain.from_urdf(urdf, "base", "tool")):
-        again = Chain.from_dict(chain.to_dict())
+        copy = Chain.from_dict(chain.to_dict())
         q = np.linspace(-1, 1, chain.dof)
-        assert (again.pose(q) == chain.pose(q)).all()
-        assert again.names == chain.names
+        assert (copy.pose(q) == chain.pose(q)).all()
+        assert copy.names == chain.names
 
 
 @pytest.mark.parametrize(
@@ -133,5 +133,5 @@ def test_a_point_is_where_the_pose_takes_it(seed):
         q = rng.normal(size=chain.dof)
         at = rng.normal(size=3)
         pose = chain.pose(q)
-        seen = chain.point(q, tuple(at))
-        assert seen == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)
+        point = chain.point(q, tuple(at))
+        assert point == pytest.approx(pose[:3, :3] @ at + pose[:3, 3], abs=1e-14)

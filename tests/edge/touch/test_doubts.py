@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.doubts import SELDOM, frame_doubts, is_several
+from edge.touch.doubts import SELDOM, flags_of, frame_doubts, is_several
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
@@ -33,8 +33,7 @@ def pressed(i):
 
 
 def doubts(felt, several_share=1.0, limits=()):
-    found = frame_doubts(felt, WINDOW_S, several_share, limits)
-    return {flag for flag, holds in found.items() if holds}
+    return set(flags_of(frame_doubts(felt, WINDOW_S, several_share, limits)))
 
 
 TIMES = np.arange(140) * 0.01

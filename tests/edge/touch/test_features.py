@@ -42,10 +42,10 @@ def test_a_short_lift_off_is_bridged():
         area[away] = peak[away] = 0
         motion = 0.1 * t
         motion[away] = motion[first - 1]
-        seen = feature_vector(series(t, peak, area, motion), 1.2)
-        assert seen[:80].tolist() == held[:80].tolist()
+        bridged = feature_vector(series(t, peak, area, motion), 1.2)
+        assert bridged[:80].tolist() == held[:80].tolist()
         if first + length < 120:
-            assert seen == pytest.approx(held, abs=1e-15)
+            assert bridged == pytest.approx(held, abs=1e-15)
 
 
 def test_a_contact_that_is_over_was_over_when_it_lifted_off():
@@ -141,8 +141,8 @@ def between(values, t):
 
 def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
     motion = [0.0, 0.1, np.nan, np.nan, 0.9]
-    given = series([0.0, 0.4, 0.8, 1.2, 1.6], [1] * 5, motion=motion)
-    held = feature_vector(given, 1.2, samples=4)[8:]
+    contact = series([0.0, 0.4, 0.8, 1.2, 1.6], [1] * 5, motion=motion)
+    held = feature_vector(contact, 1.2, samples=4)[8:]
     assert held == pytest.approx([0.0, 0.1, 0.1, 0.1])
 
 

@@ -42,12 +42,12 @@ def wire():
 def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
     """What is known after each line, of poses [t, -t] whose sender's clock is ahead of
     ours."""
-    known = []
+    poses = []
     for i in lines:
         wire.now = i / hz + 0.002
         wire.send(i / hz + ahead(i), [i / hz, -i / hz])
-        known.append(wire.at())
-    return known
+        poses.append(wire.at())
+    return poses
 
 
 def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(
@@ -102,8 +102,8 @@ def test_a_sender_that_starts_anew_is_believed(wire):
 
 
 def test_the_clocks_may_drift_apart(wire):
-    """A sender whose clock is slow by 100 ppm: after an hour it is off by 0.36 s."""
-    for i in range(36_000):
+    """A sender whose clock is slow by 100 ppm: after ten minutes it is off by 0.06 s."""
+    for i in range(6_000):
         wire.now = i * 0.1
         wire.send(wire.now * (1.0 - 1e-4), [wire.now, 0.0])
         q = wire.at()
@@ -208,9 +208,9 @@ def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
     stream(wire, range(50))
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
     assert wire.at() is not None
-    known = stream(wire, range(50, 100))
+    poses = stream(wire, range(50, 100))
     np.testing.assert_allclose(
-        known,
+        poses,
         [[i / 100, -i / 100] for i in range(50, 100)],
         atol=1e-6,
     )
@@ -230,21 +230,21 @@ def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_sec
     place,
     hz,
 ):
-    known = stream(
+    poses = stream(
         wire,
         range(2 * hz),
         hz=hz,
         ahead=lambda i: 1000.0 + 0.3 * (i == place),
     )
-    assert None not in known[place + hz :]
+    assert None not in poses[place + hz :]
 
 
 @pytest.mark.parametrize("step_s", [0.5, -0.5])
 def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
     stream(wire, range(50))
-    known = stream(wire, range(50, 150), ahead=lambda _: 1000.0 + step_s)
-    assert None not in known[60:]
-    assert known[-1] == pytest.approx([1.49, -1.49], abs=1e-6)
+    poses = stream(wire, range(50, 150), ahead=lambda _: 1000.0 + step_s)
+    assert None not in poses[60:]
+    assert poses[-1] == pytest.approx([1.49, -1.49], abs=1e-6)
 
 
 def test_a_flood_of_lines_is_bounded_in_each_frame(wire):

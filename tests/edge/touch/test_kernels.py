@@ -47,12 +47,12 @@ def by_hand(channels, table):
     rows = []
     for row, shift in zip(channels.tolist(), table.shifts, strict=True):
         rows.append([moved(value, shift) for value in row])
-    taken = kernels._mixes(len(rows)).astype(bool).tolist()
+    mixes = kernels._mixes(len(rows)).astype(bool).tolist()
     convolutions = convolution_of_bias(len(table.biases)).tolist()
     counts = []
     for bias, convolution in zip(table.biases, convolutions, strict=True):
         dilation, kernel = divmod(convolution, 84)
-        mixed = list(map(sum, zip(*compress(rows, taken[convolution]), strict=True)))
+        mixed = list(map(sum, zip(*compress(rows, mixes[convolution]), strict=True)))
         padded = (dilation + kernel) % 2 == 0
         reach = 0 if padded else 4 * (dilation + 1)
         above = 0
@@ -137,8 +137,8 @@ def touch():
     ]
 
 
-def series_of(frames, *wanted):
-    return followed(SKIN, frames, features=wanted).series()
+def series_of(frames, *features):
+    return followed(SKIN, frames, features=features).series()
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_a_channel_holds_the_last_frame_before_each_time(name, channels):
     frames = touch()
     held = kernel_channels(series_of(frames, name), 1.56, name)
     assert held.shape == (channels, SAMPLES) == (channels_of(name, SKIN), SAMPLES)
-    # Frame i is 0.04 s i after the onset, at which sample i is taken.
+    # Frame i is 0.04 s i after the onset, at which sample i is mixes.
     forces = [int(frame.counts.sum()) for frame in frames]
     sums = held.sum(axis=0) if name == "taxel_kernels" else held[10]
     assert sums.tolist() == forces

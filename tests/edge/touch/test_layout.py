@@ -124,8 +124,8 @@ def test_what_differs_from_the_models_skin_is_said(changes, sentence):
         counts_per_newton=1000.0,
         pitch_m=0.01,
     )
-    (said, *_) = differences(model, replace(model, **changes))
-    assert sentence in said
+    (difference, *_) = differences(model, replace(model, **changes))
+    assert sentence in difference
     assert differences(model, model) == []
 
 

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.model.verify import integers_of
-from edge.touch.active import ActiveTaxels
 from edge.touch.cells import MOST_CELLS, Cells
 from edge.touch.contact import feature_types
 from edge.touch.feature import PAPER
@@ -20,9 +19,7 @@ from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import QUANTITIES, ZONES, feature, names
-from edge.touch.region import largest_region
-from edge.touch.zones import Zones
-from tests.edge.touch.pressed import followed, pressed
+from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
 ROUND = replace(FLAT, wraps=True)
@@ -61,20 +58,16 @@ def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
     active = (counts > layout.threshold_counts) & (
         True if frame.valid is None else frame.valid
     )
-    largest = largest_region(
-        counts,
-        layout.threshold_counts,
-        valid=frame.valid,
-        wraps=layout.wraps,
-    )
-    left = np.zeros(layout.shape, dtype=bool)
-    left[:, : layout.cols // 2] = True
+    largest = active_of(layout, frame).largest()
+    if largest is None:
+        return dict.fromkeys(ZONES, [0] * 8)
+    left_half = np.arange(layout.cols) < layout.cols // 2
     turn = layout.cols if layout.wraps else None
     return {
         "contact": weighted_sums(taxels_of(counts, largest.mask), turn),
         "skin": weighted_sums(taxels_of(counts, active), turn),
-        "left": weighted_sums(taxels_of(counts, active & left), None),
-        "right": weighted_sums(taxels_of(counts, active & ~left), None),
+        "left": weighted_sums(taxels_of(counts, active & left_half), None),
+        "right": weighted_sums(taxels_of(counts, active & ~left_half), None),
     }
 
 
@@ -101,16 +94,8 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(
 ):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
     frame = frame_of(seed, shape, density, high)
-    active = ActiveTaxels(frame.counts, 10, valid=frame.valid, wraps=wraps)
-    contact = active.largest()
-    zones = Zones(layout, feature_types(ALL))
-    assert zones.names == ZONES
-    row = zones.measure(active, contact, None)
-    if contact is None:
-        assert row == [0] * 32
-        return
-    seen = {zone: row[8 * i : 8 * i + 8] for i, zone in enumerate(ZONES)}
-    assert seen == expected(layout, frame)
+    sums = zones_of(layout, frame, ALL)
+    assert sums == expected(layout, frame)
 
 
 @pytest.mark.parametrize("wraps", [False, True])
@@ -119,9 +104,6 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
     cols = 1024
     layout = SkinLayout(rows, cols, wraps=wraps)
     frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
-    active = ActiveTaxels(frame.counts, 0)
-    zones = Zones(layout, feature_types(["skin_length"]))
-    row = zones.measure(active, active.largest(), None)
     line = sum(range(cols))
     squares = sum(c * c for c in range(cols))
     sums = (
@@ -132,20 +114,21 @@ def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
         line * line,
         rows * squares,
     )
-    assert row[2:] == [65535 * v for v in sums]
-    wanted = ["skin_spread_along", "skin_slant"]
-    vector = vector_of(layout, [frame, replace(frame, t=1.0)], wanted, 2)
+    zones = zones_of(layout, frame, ["skin_length"])
+    assert zones["skin"][2:] == [65535 * v for v in sums]
+    features = ["skin_spread_along", "skin_slant"]
+    vector = vector_of(layout, [frame, replace(frame, t=1.0)], features, 2)
     assert vector[0] == pytest.approx(np.sqrt((rows**2 - 1) / 12), rel=1e-15)
     assert vector[2] == 0.0
 
 
-def series_of(layout: SkinLayout, frames, wanted):
-    return followed(layout, frames, features=wanted).series()
+def series_of(layout: SkinLayout, frames, features):
+    return followed(layout, frames, features=features).series()
 
 
-def vector_of(layout: SkinLayout, frames, wanted, samples: int):
+def vector_of(layout: SkinLayout, frames, features, samples: int):
     """The features of the first second."""
-    return feature_vector(series_of(layout, frames, wanted), 1.0, samples, wanted)
+    return feature_vector(series_of(layout, frames, features), 1.0, samples, features)
 
 
 def value(layout: SkinLayout, counts, name: str) -> float:
@@ -230,10 +213,10 @@ def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
         pressed(FLAT, i / 4, {(1, 1): 60 if i < 4 else 0, (i % 4, 5): force})
         for i, force in enumerate(right)
     ]
-    wanted = ["right_along", "right_force", "right_area"]
-    vector = feature_vector(series_of(FLAT, frames, wanted), 1.25, 6, wanted).reshape(
-        3, 6
-    )
+    features = ["right_along", "right_force", "right_area"]
+    vector = feature_vector(
+        series_of(FLAT, frames, features), 1.25, 6, features
+    ).reshape(3, 6)
     assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
     assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]
     assert vector[2].tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
@@ -242,8 +225,8 @@ def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
 
 def test_a_rate_is_the_change_a_second_of_the_sampled_values():
     frames = [pressed(FLAT, i / 10, {(1, 1): 100 + 20 * i}) for i in range(11)]
-    wanted = ["max_force", "max_force_rate", "contact_area_rate"]
-    vector = vector_of(FLAT, frames, wanted, 5).reshape(3, 5)
+    features = ["max_force", "max_force_rate", "contact_area_rate"]
+    vector = vector_of(FLAT, frames, features, 5).reshape(3, 5)
     assert vector[0] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0])
     assert vector[1] == pytest.approx([2.0] * 5)
     assert vector[2].tolist() == [0.0] * 5
@@ -262,8 +245,8 @@ def test_force_motion_follows_the_force_where_the_area_stays():
 def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
     readings = (0.0, {(1, 1): 50}), (0.1, {(1, 1): 50}), (0.1, {(1, (1, 2)): 70})
     frames = [pressed(FLAT, *reading) for reading in readings]
-    wanted = [*ALL[:3], "skin_force", "force_motion"]
-    series = series_of(FLAT, frames, wanted)
+    features = [*ALL[:3], "skin_force", "force_motion"]
+    series = series_of(FLAT, frames, features)
     assert integers_of(series).shape == (2, 4 + 8 * 2)
     assert series.zones["skin"][:, 2].tolist() == [50, 140]
     assert series.force_motion.shape == series.motion.shape == (2,)
@@ -282,7 +265,7 @@ def test_the_papers_three_are_the_default_and_come_first():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "sentence"),
+    ("features", "sentence"),
     [
         (["skin_forse"], "no feature 'skin_forse'; the nearest are skin_force"),
         (["max_force_rate_rate"], "no feature"),
@@ -298,9 +281,9 @@ def test_the_papers_three_are_the_default_and_come_first():
         (["max_force", "skin_area", "max_force"], "max_force is named twice"),
     ],
 )
-def test_a_wrong_name_is_one_sentence(wanted, sentence):
+def test_a_wrong_name_is_one_sentence(features, sentence):
     with pytest.raises(InputError, match=sentence) as caught:
-        feature_types(tuple(wanted))
+        feature_types(tuple(features))
     assert "\n" not in str(caught.value)
 
 
@@ -357,9 +340,9 @@ def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
     cells = Cells(layout)
     readable = counts.astype(int) * (1 if valid is None else valid)
     squares = [
-        np.s_[top : top + cells.side, left : left + cells.side]
-        for top in range(0, rows, cells.side)
-        for left in range(0, cols, cells.side)
+        np.s_[row : row + cells.side, col : col + cells.side]
+        for row in range(0, rows, cells.side)
+        for col in range(0, cols, cells.side)
     ]
     expected = [int(readable[s].sum()) for s in squares if layout.alive[s].any()]
     assert cells.read(Frame(0.0, counts, valid=valid)).tolist() == expected

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch import shear
-from edge.touch.active import ActiveTaxels, best_cut
-from edge.touch.contact import feature_types
+from edge.touch.active import best_cut
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import SHEAR, ZONES, feature
-from edge.touch.zones import ZONE_WIDTH, Zones
-from tests.edge.touch.pressed import followed
+from edge.touch.zones import ZONE_WIDTH
+from tests.edge.touch.pressed import active_of, followed, zones_of
 
 THRESHOLD = 10
 LAYOUT = SkinLayout(
@@ -41,23 +40,9 @@ def sheared_frame(seed, shape, high=32767, t=0.0) -> Frame:
     return Frame(t, counts.astype(np.uint16), valid, shear=tangential.astype(np.int16))
 
 
-def measured(layout, frame) -> tuple[dict[str, list[int]], ActiveTaxels]:
-    """The whole numbers of every zone, and the frame's active taxels."""
-    active = ActiveTaxels(
-        frame.counts,
-        THRESHOLD,
-        valid=frame.valid,
-        wraps=layout.wraps,
-    )
-    zones = Zones(layout, feature_types(ALL))
-    row = zones.measure(active, active.largest(), frame.shear)
-    return {
-        zone: row[WIDTH * i : WIDTH * (i + 1)] for i, zone in enumerate(ZONES)
-    }, active
-
-
-def looped(layout, frame, zone, active) -> list[int]:
+def looped(layout, frame, zone) -> list[int]:
     """The sums of a zone's shear, taxel by taxel."""
+    active = active_of(layout, frame)
     mask = active.largest().mask if zone == "contact" else active.mask
     half = layout.cols // 2
     inside = {"left": range(half), "right": range(half, layout.cols)}
@@ -85,20 +70,19 @@ def looped(layout, frame, zone, active) -> list[int]:
 def test_sums_are_those_of_plain_loops(seed, wraps, shape):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=THRESHOLD, axes=3)
     frame = sheared_frame(seed, shape)
-    if not ((frame.counts > THRESHOLD) & frame.valid).any():
+    if not active_of(layout, frame).bits:
         return
-    zones, active = measured(layout, frame)
+    zones = zones_of(layout, frame, ALL)
     for zone in ZONES:
-        assert zones[zone][ZONE_WIDTH:] == looped(layout, frame, zone, active)
+        assert zones[zone][ZONE_WIDTH:] == looped(layout, frame, zone)
 
 
 def test_the_normal_numbers_are_the_same_with_and_without_shear():
     frame = sheared_frame(3, LAYOUT.shape)
-    active = ActiveTaxels(frame.counts, THRESHOLD, valid=frame.valid, wraps=False)
-    normal = Zones(LAYOUT, feature_types(["contact_force"]))
-    plain = normal.measure(active, active.largest(), None)
-    zones, _ = measured(LAYOUT, frame)
-    assert zones["contact"][:ZONE_WIDTH] == plain
+    plain = zones_of(LAYOUT, replace(frame, shear=None), ["contact_force"])
+    assert len(plain["contact"]) == ZONE_WIDTH
+    sheared = zones_of(LAYOUT, frame, ALL)
+    assert sheared["contact"][:ZONE_WIDTH] == plain["contact"]
 
 
 def test_a_skin_turned_by_half_gives_turned_sums():
@@ -110,9 +94,8 @@ def test_a_skin_turned_by_half_gives_turned_sums():
         shear=-np.maximum(frame.shear, -32767)[::-1, ::-1],
     )
     straight = replace(frame, shear=np.maximum(frame.shear, -32767))
-    before, after = (
-        quantities_of(measured(LAYOUT, f)[0]["skin"]) for f in (straight, turned)
-    )
+    before = skin_quantities(LAYOUT, straight)
+    after = skin_quantities(LAYOUT, turned)
     assert after["shear_along"] == -before["shear_along"]
     assert after["shear_around"] == -before["shear_around"]
     assert after["shear_size"] == before["shear_size"]
@@ -131,7 +114,7 @@ def test_a_contact_moved_across_the_seam_keeps_its_twist():
             np.roll(frame.valid, step, 1),
             shear=np.roll(frame.shear, step, 1),
         )
-        twists.append(quantities_of(measured(layout, rolled)[0]["skin"])["twist"])
+        twists.append(skin_quantities(layout, rolled)["twist"])
     assert twists == pytest.approx(twists[:1] * 7, rel=1e-12)
 
 
@@ -140,26 +123,34 @@ def quantities_of(row: list[int]) -> dict[str, float]:
     return {name: float(value[0]) for name, value in values.items()}
 
 
+def skin_quantities(layout, frame) -> dict[str, float]:
+    return quantities_of(zones_of(layout, frame, ALL)["skin"])
+
+
 @settings(max_examples=60)
 @given(seed=st.integers(0, 1 << 32))
 def test_quantities_are_those_of_fractions(seed):
     frame = sheared_frame(seed, LAYOUT.shape)
-    if not ((frame.counts > THRESHOLD) & frame.valid).any():
+    if not active_of(LAYOUT, frame).bits:
         return
-    row = measured(LAYOUT, frame)[0]["skin"]
+    row = zones_of(LAYOUT, frame, ALL)["skin"]
     _, _, force, rows, cols, *_ = row
     along, around, rows_around, cols_along = row[ZONE_WIDTH:]
-    seen = quantities_of(row)
-    assert seen["shear_along"] == along / 100.0
-    assert seen["shear_around"] == around / 100.0
+    quantities = quantities_of(row)
+    assert quantities["shear_along"] == along / 100.0
+    assert quantities["shear_around"] == around / 100.0
     size = Fraction(along) ** 2 + Fraction(around) ** 2
-    assert seen["shear_size"] == pytest.approx(float(size) ** 0.5 / 100.0, rel=1e-15)
-    assert seen["shear_ratio"] == pytest.approx(float(size) ** 0.5 / force, rel=1e-15)
+    assert quantities["shear_size"] == pytest.approx(
+        float(size) ** 0.5 / 100.0, rel=1e-15
+    )
+    assert quantities["shear_ratio"] == pytest.approx(
+        float(size) ** 0.5 / force, rel=1e-15
+    )
     first = Fraction(rows_around) - Fraction(rows, force) * around
     second = Fraction(cols_along) - Fraction(cols, force) * along
     twist = first * Fraction(0.01) / 100 - second * Fraction(0.02) / 100
     scale = float(abs(first) * Fraction(0.01) + abs(second) * Fraction(0.02)) / 100
-    assert abs(seen["twist"] - float(twist)) <= 1e-15 * scale
+    assert abs(quantities["twist"] - float(twist)) <= 1e-15 * scale
 
 
 def test_opposite_pulls_are_a_twist_without_a_sum():
@@ -185,9 +176,7 @@ def test_the_largest_skin_full_of_the_largest_shear_does_not_overflow(wraps):
     layout = SkinLayout(side, side, wraps=wraps, axes=3)
     tangential = np.full((side, side, 2), -32768, dtype=np.int16)
     frame = Frame(0.0, np.full((side, side), 65535, np.uint16), shear=tangential)
-    active = ActiveTaxels(frame.counts, 0)
-    skin = Zones(layout, feature_types(["skin_twist"]))
-    row = skin.measure(active, active.largest(), frame.shear)
+    row = zones_of(layout, frame, ["skin_twist"])["skin"]
     line = side * sum(range(side))
     assert row[ZONE_WIDTH:] == [
         -32768 * v for v in (side * side, side * side, line, line)
@@ -215,9 +204,8 @@ def test_features_follow_the_shear_of_a_contact():
 
 def test_a_frame_without_shear_is_named():
     frame = replace(sheared_frame(1, LAYOUT.shape), shear=None)
-    active = ActiveTaxels(frame.counts, THRESHOLD, wraps=False)
     with pytest.raises(InputError, match="need shear, which a frame lacks"):
-        Zones(LAYOUT, feature_types(ALL)).measure(active, active.largest(), None)
+        zones_of(LAYOUT, frame, ALL)
 
 
 def test_components_have_no_logarithm_and_the_size_has():
@@ -240,5 +228,5 @@ def test_components_have_no_logarithm_and_the_size_has():
 def test_an_axis_that_never_changes_is_named(still, sentence):
     tangential = np.arange(4 * 6 * 2, dtype=np.int16).reshape(4, 2, 3, 2)
     tangential[..., list(still)] = 7
-    said = shear.doubt(tangential)
-    assert (said is None) if sentence is None else (sentence in said)
+    doubt = shear.doubt(tangential)
+    assert (doubt is None) if sentence is None else (sentence in doubt)

@@ -72,10 +72,8 @@ def test_an_arm_that_bounces_touches_once_and_two_quick_taps_are_two(
 
 
 def test_nothing_is_kept_beyond_the_horizon():
-    found = follow([30] * 20, horizon_s=0.055)
-    assert found == [
-        (0.0, [30] * 7, False)
-    ]  # one frame past it, to interpolate up to it
+    # One frame past it, to interpolate up to it.
+    assert follow([30] * 20, horizon_s=0.055) == [(0.0, [30] * 7, False)]
 
 
 def test_motion_counts_from_the_reading_that_counts():
@@ -203,8 +201,8 @@ def test_another_skin_is_refused(device, word):
 
 def test_the_first_of_two_contacts_is_given_whole(make_touch, forearm):
     first = make_touch(seconds=0.5)
-    both = in_a_row(first, replace(first, frames=2 * first.frames), rest=30)
-    onset_s, series = first_contact(both, ContactTracker(forearm))
+    touches = in_a_row(first, replace(first, frames=2 * first.frames), rest=30)
+    onset_s, series = first_contact(touches, ContactTracker(forearm))
     assert onset_s == 0.2
     assert series.ended
     assert series.peak.max() == first.frames.max()

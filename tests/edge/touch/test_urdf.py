@@ -27,11 +27,11 @@ ARM = """<?xml version="1.0"?>
 def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_file(
     urdf,
 ):
-    given = [joint["name"] for joint in joints_between(urdf, "base", "lower")]
-    assert given == ["shoulder", "bracket", "elbow"]
-    assert [joint["name"] for joint in joints_between(urdf, "upper", "aside")] == [
-        "camera"
-    ]
+    def names(tip):
+        return [joint["name"] for joint in joints_between(urdf, "base", tip)]
+
+    assert names("lower") == ["shoulder", "bracket", "elbow"]
+    assert names("aside") == ["shoulder", "camera"]
     with pytest.raises(
         InputError, match="link 'upper' is both base and tip; name the arm's two"
     ):
@@ -39,7 +39,7 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "sentence"),
     [
         ("robot", "sdf", "not a URDF file: its root is <sdf> instead of <robot>"),
         (
@@ -82,11 +82,11 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
         ('type="continuous"', "", "prismatic, fixed, not ''"),
     ],
 )
-def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, said):
+def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, sentence):
     urdf.write_text(ARM.replace(old, new))
     with pytest.raises(InputError, match=r"arm\.urdf: .*") as caught:
         Chain.from_urdf(urdf, "base", "tool")
-    assert said in str(caught.value)
+    assert sentence in str(caught.value)
 
 
 def test_a_urdf_that_is_not_there_is_one_sentence(tmp_path):
