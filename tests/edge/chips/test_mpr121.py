@@ -14,23 +14,30 @@ from tests.edge.chips.chips import sense
 SPEC = ChipSpec(MPR121, 0x5A, tuple(range(12)))
 
 
-def test_is_stopped_written_and_started_once():
+@pytest.fixture
+def model():
+    return FakeMPR121(sense)
+
+
+@pytest.fixture
+def chip(model):
+    return MPR121(FakeBus(chips={0x5A: model}), 0x5A)
+
+
+def test_is_stopped_written_and_started_once(model, chip):
     sent = []
-    bus = FakeBus(chips={0x5A: FakeMPR121(sense)})
-    chip = MPR121(bus, 0x5A)
-    model_write = bus.chips[0x5A].write
-    bus.chips[0x5A].write = lambda data, t: (sent.append(data), model_write(data, t))
+    write = model.write
+    model.write = lambda data, t: (sent.append(data), write(data, t))
     list(chip.settings())
     ecr = [d for d in sent if len(d) == 2 and d[0] == mpr121.ECR]
     assert ecr == [b"\x5e\x00", b"\x5e\x8f"]
     assert sent[0] == b"\x80\x63"
 
 
-def test_model_loses_writes_while_it_runs():
-    bus = FakeBus(chips={0x5A: FakeMPR121(sense)})
-    list(MPR121(bus, 0x5A).settings())
-    send(bus, 0x5A, [mpr121.CONFIG2, 0x77])
-    assert fetch(bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
+def test_model_loses_writes_while_it_runs(chip):
+    list(chip.settings())
+    send(chip.bus, 0x5A, [mpr121.CONFIG2, 0x77])
+    assert fetch(chip.bus, 0x5A, bytes([mpr121.CONFIG2]), 1) == b"\x20"
 
 
 def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
@@ -42,10 +49,10 @@ def test_parses_low_byte_first_and_tells_damaged_and_saturated_words():
     assert intact[0].tolist() == [True, False, False, True] + [False] * 8
 
 
-def test_over_current_is_named_with_its_resistor_and_later_shows_as_lost_settings():
+def test_over_current_is_named_with_its_resistor_and_later_shows_as_lost_settings(
+    model, chip
+):
     """It forbids ECR, so that the chip cannot start."""
-    model = FakeMPR121(sense)
-    chip = MPR121(FakeBus(chips={0x5A: model}), 0x5A)
     list(chip.settings())
     model.over_current = True
     model.write(b"\x00", 0.0)

@@ -39,30 +39,28 @@ def served() -> FakeBus:
     return FakeBus(chips={0x28: fake})
 
 
-def test_each_taxel_is_three_signed_numbers_on_the_wire():
-    bus = served()
-    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
-    bus.transfer(chip.frame)
+@pytest.fixture
+def data():
+    """(1, bytes) of a frame."""
+    chip = ThreeAxisBlock(served(), 0x28, taxels=TAXELS)
+    chip.read()
+    return chip.frame.buffer[None]
+
+
+def test_each_taxel_is_three_signed_numbers_on_the_wire(data):
     wire = pack(numbers().reshape(-1).astype(np.uint16), 16)
-    assert chip.frame.buffer[2:-2].tobytes() == wire
+    assert data[0, 2:-2].tobytes() == wire
 
 
-def test_the_normal_values_are_parsed_apart_from_the_shear():
-    bus = served()
-    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
-    bus.transfer(chip.frame)
-    values, intact = ThreeAxisBlock.parse(chip.frame.buffer[None], SPEC)
+def test_the_normal_values_are_parsed_apart_from_the_shear(data):
+    values, intact = ThreeAxisBlock.parse(data, SPEC)
     assert intact.all()
     assert (values[0].astype(int) - ZERO).tolist() == numbers()[:, 0].tolist()
-    shear = axes(chip.frame.buffer[None], TAXELS)[0, :, 1:]
+    shear = axes(data, TAXELS)[0, :, 1:]
     assert (shear.astype(int) - ZERO).tolist() == numbers()[:, 1:].tolist()
 
 
-def test_a_flipped_bit_spoils_the_frame():
-    bus = served()
-    chip = ThreeAxisBlock(bus, 0x28, taxels=TAXELS)
-    bus.transfer(chip.frame)
-    data = chip.frame.buffer[None].copy()
+def test_a_flipped_bit_spoils_the_frame(data):
     data[0, 9] ^= 1
     assert not ThreeAxisBlock.parse(data, SPEC)[1].any()
 

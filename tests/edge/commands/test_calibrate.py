@@ -1,7 +1,7 @@
 """`edge-classify calibrate`: exact means and deviations, and a skin that must be at
 rest."""
 
-from dataclasses import replace
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -32,19 +32,25 @@ def test_a_taxel_is_noisy_beyond_the_limit_and_not_at_it():
     assert noisiest_taxels(noise) == [(1, 0), (2, 3)]
 
 
-def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin, quiet):
+@pytest.fixture
+def measured(edge, skin):
+    """Calibrate the skin from a recording; returns status, event and stderr."""
+
+    def run(recording, *options, frames=30):
+        fake = ("--skin", skin, "--fake", recording, "--frames", frames)
+        status, events, err = edge("calibrate", *fake, *options)
+        return status, events[0] if events else None, err
+
+    return run
+
+
+def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
+    edge, skin, quiet, measured
+):
     before = skin.read_text()
-    status, (event,), _ = edge(
-        "calibrate",
-        "--skin",
-        skin,
-        "--fake",
-        quiet,
-        "--frames",
-        50,
-    )
+    status, event, _ = measured(quiet)
     assert status == 0
-    assert event["frames"] == 50
+    assert event["frames"] == 30
     assert event["kept"] == 0
     assert Path(event["backup"]).read_text() == before
     file = skinfile.load(skin)
@@ -59,57 +65,27 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(edge, skin,
     [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
 )
 def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
-    edge,
-    skin,
-    quiet,
-    options,
-    deviation,
+    skin, quiet, measured, options, deviation
 ):
-    fake = ("--skin", skin, "--fake", quiet, *options)
-    (first,), (repetition,) = (
-        edge("calibrate", *fake, "--frames", 180)[1] for _ in range(2)
-    )
+    first, repetition = (measured(quiet, *options, frames=90)[1] for _ in range(2))
     assert first == repetition
     file = skinfile.load(skin)
     assert (file.calibration.noise**2).mean() ** 0.5 == pytest.approx(
         deviation, rel=0.03
     )
     assert dead_band(file.signal, file.calibration.noise).min() >= 4 * deviation
-    assert (
-        edge("calibrate", *fake, "--frames", 180, "--noise", 0)[1][0]["noise_largest"]
-        == 0.0
-    )
+    assert measured(quiet, "--noise", 0)[1]["noise_largest"] == 0.0
 
 
-def test_a_skin_that_is_touched_is_refused(edge, skin, make_touch, tmp_path):
+def test_a_skin_that_is_touched_is_refused(skin, make_touch, tmp_path, measured):
     touched = tmp_path / "touched.npz"
     saving.save(touched, make_touch(arm=False))
     before = skin.read_text()
-    status, _, err = edge(
-        "calibrate",
-        "--skin",
-        skin,
-        "--fake",
-        touched,
-        "--frames",
-        100,
-    )
+    status, _, err = measured(touched)
     assert status == 2
     assert "taxels that vary while they should be at rest: " in err
     assert skin.read_text() == before
-    assert (
-        edge(
-            "calibrate",
-            "--skin",
-            skin,
-            "--fake",
-            touched,
-            "--frames",
-            100,
-            "--force",
-        )[0]
-        == 0
-    )
+    assert measured(touched, "--force")[0] == 0
 
 
 UNUSABLE = pytest.mark.parametrize(
@@ -118,10 +94,10 @@ UNUSABLE = pytest.mark.parametrize(
         (
             20946,
             0.4,
-            "the first at [0, 2], which was valid in 20 of 50 frames and rests at "
+            "the first at [0, 2], which was valid in 12 of 30 frames and rests at "
             "20946",
         ),
-        (0, 1.0, "was valid in 50 of 50 frames and rests at 0"),
+        (0, 1.0, "was valid in 30 of 30 frames and rests at 0"),
         (65535, 1.0, "rests at 65535; check the chips"),
     ],
 )
@@ -133,31 +109,24 @@ def spoil(monkeypatch):
     """Let the measurement of a taxel give a value, valid in a share of the frames."""
 
     def patch(value, share):
-        def measured(*arguments):
+        def spoiled(*arguments):
             result = measure(*arguments)
             result.calibration.baseline[0, 2] = value
             result.valid[0, 2] = share * result.frames
             return result
 
-        monkeypatch.setattr(calibrate, "measure", measured)
+        monkeypatch.setattr(calibrate, "measure", spoiled)
 
     return patch
 
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values(
-    edge,
-    skin,
-    quiet,
-    spoil,
-    value,
-    share,
-    sentence,
+    skin, quiet, measured, spoil, value, share, sentence
 ):
     spoil(value, share)
-    arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
     for options in ((), ("--force",)):
-        status, _, err = edge(*arguments, *options)
+        status, _, err = measured(quiet, *options)
         assert status == 2
         assert skinfile.load(skin).calibration is None
         assert sentence in err
@@ -165,21 +134,16 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
-    edge,
-    skin,
-    quiet,
-    spoil,
-    value,
-    share,
-    sentence,
+    skin, quiet, measured, spoil, value, share, sentence
 ):
-    arguments = ("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)
-    assert edge(*arguments)[0] == 0
+    assert measured(quiet)[0] == 0
     before = skin.read_text()
     spoil(value, share)
-    assert edge(*arguments)[0] == 2
+    status, _, err = measured(quiet)
+    assert status == 2
+    assert sentence in err
     assert skin.read_text() == before
-    status, (event,), err = edge(*arguments, "--force")
+    status, event, err = measured(quiet, "--force")
     assert status == 0
     assert event["kept"] == 1
     assert "their former values are kept" in err
@@ -210,73 +174,60 @@ def test_mean_and_deviation_are_exact_at_a_large_offset():
     np.testing.assert_allclose(deviation, exact, rtol=1e-12, atol=1e-12)
 
 
-def shifted(skin, tmp_path, counts, taxels):
-    """A recording of rest in which some taxels rest higher, steadily."""
-    still = recording.load(tmp_path / "rest.npz")
-    frames = still.frames.copy()
-    for row, col in taxels:
-        frames[:, row, col] = counts
-    path = tmp_path / "leant.npz"
-    saving.save(path, replace(still, frames=frames))
-    return path
-
-
-@pytest.fixture
-def calibrated(edge, skin, quiet, tmp_path):
-    """A skin file that was calibrated at rest."""
-    saving.save(tmp_path / "rest.npz", recording.load(quiet))
-    assert edge("calibrate", "--skin", skin, "--fake", quiet, "--frames", 50)[0] == 0
-    return skin
-
-
 SIX = [(5, 5), (5, 6), (5, 7), (6, 5), (6, 6), (6, 7)]
 
 
-def leant_on(skin, folder):
-    """The command that calibrates a skin on which something leans steadily."""
-    leant = shifted(skin, folder, 120, SIX)
-    return ("calibrate", "--skin", skin, "--fake", leant, "--frames", 50)
+@pytest.fixture
+def leant(quiet, tmp_path):
+    """Record a skin of which some taxels rest higher, steadily."""
+
+    def save(counts, taxels):
+        still = recording.load(quiet)
+        for row, col in taxels:
+            still.frames[:, row, col] = counts
+        saving.save(tmp_path / "leant.npz", still)
+        return tmp_path / "leant.npz"
+
+    return save
 
 
-def test_a_skin_that_something_leans_on_steadily_is_refused(edge, calibrated, tmp_path):
-    before = calibrated.read_text()
-    words = leant_on(calibrated, tmp_path)
-    status, _, err = edge(*words)
+@pytest.fixture
+def calibrated(skin, quiet, measured):
+    """A skin file that was calibrated at rest."""
+    assert measured(quiet)[0] == 0
+    return skin
+
+
+@pytest.mark.parametrize(
+    ("former", "compared"),
+    [("calibrated", "off the former calibration"), ("skin", "beyond the others")],
+)
+def test_a_skin_that_something_leans_on_steadily_is_refused(
+    request, measured, leant, former, compared
+):
+    skin = request.getfixturevalue(former)
+    before = skin.read_text()
+    path = leant(120, SIX)
+    status, _, err = measured(path)
     assert status == 2
     assert "6 taxels side by side rest more than the onset" in err
-    assert calibrated.read_text() == before
-    assert edge(*words, "--force")[0] == 0
+    assert compared in err
+    assert skin.read_text() == before
+    assert measured(path, "--force")[0] == 0
 
 
 @pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])
 def test_a_single_taxel_or_a_small_drift_is_calibrated(
-    edge,
-    calibrated,
-    tmp_path,
-    counts,
-    taxels,
+    calibrated, measured, leant, counts, taxels
 ):
-    drifted = shifted(calibrated, tmp_path, counts, taxels)
-    words = ("calibrate", "--skin", calibrated, "--fake", drifted, "--frames", 50)
-    status, _, err = edge(*words)
+    status, _, err = measured(leant(counts, taxels))
     assert status == 0
     named = "taxel [5, 5] rests 120 counts off the former calibration" in err
     assert named == (len(taxels) == 1)
 
 
-def test_a_first_calibration_under_a_contact_is_refused(edge, skin, quiet, tmp_path):
-    saving.save(tmp_path / "rest.npz", recording.load(quiet))
-    before = skin.read_text()
-    status, _, err = edge(*leant_on(skin, tmp_path))
-    assert status == 2
-    assert "6 taxels side by side rest more than the onset" in err
-    assert "beyond the others" in err
-    assert skin.read_text() == before
-
-
 def test_a_microcontrollers_skin_may_rest_above_0_which_is_said(edge, tmp_path):
-    skin = tmp_path / "matrix.toml"
-    skin.write_text(skinfile.shipped("matrix").read_text())
+    skin = shutil.copy(skinfile.shipped("matrix"), tmp_path)
     file = skinfile.load(skin)
     saving.save(tmp_path / "still.npz", still(file, 1.0))
     words = ("calibrate", "--skin", skin, "--fake", tmp_path / "still.npz")
@@ -298,16 +249,12 @@ def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
 
 
 def test_a_calibration_that_would_make_taxels_deaf_is_refused(
-    edge,
-    calibrated,
-    tmp_path,
+    edge, calibrated, quiet, measured
 ):
-    rest = tmp_path / "rest.npz"
-    words = ("calibrate", "--skin", calibrated, "--fake", rest, "--frames", 50)
-    status, _, err = edge(*words, "--noise", 9)
+    status, _, err = measured(quiet, "--noise", 9)
     assert status == 2
     assert "would be deaf" in err
-    assert edge(*words, "--noise", 9, "--force")[0] == 0
+    assert measured(quiet, "--noise", 9, "--force")[0] == 0
     status, (event,), _ = edge("check", calibrated)
     assert status == 1
     assert any("taxels deaf, such as" in remark for remark in event["remarks"])

@@ -12,11 +12,22 @@ from edge.skin.file import TaxelCalibration
 from tests.edge.skin.small import mpr121, one_chip
 
 
-def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
-    (tmp_path / "skin.toml").write_text(mpr121())
-    status, (event,), _ = edge("check", tmp_path / "skin.toml")
+@pytest.fixture
+def checked(edge, tmp_path):
+    """Check the text of a skin file; returns status and remarks."""
+
+    def check(text):
+        (tmp_path / "skin.toml").write_text(text)
+        status, (event,), _ = edge("check", tmp_path / "skin.toml")
+        return status, event["remarks"]
+
+    return check
+
+
+def test_a_pad_that_says_little_is_told_what_is_missing(checked):
+    status, remarks = checked(mpr121())
     assert status == 0
-    assert [r.split(":")[0] for r in event["remarks"]] == [
+    assert [remark.split(":")[0] for remark in remarks] == [
         "pitch_m is missing",
         "not calibrated yet",
     ]
@@ -40,24 +51,20 @@ def test_a_pad_that_says_little_is_told_what_is_missing(edge, tmp_path):
         ),
     ],
 )
-def test_a_skin_that_cannot_work_is_exit_1(edge, tmp_path, text, status, sentence):
-    (tmp_path / "skin.toml").write_text(text)
-    exit_status, (event,), _ = edge("check", tmp_path / "skin.toml")
-    assert sentence in " ".join(event["remarks"])
+def test_a_skin_that_cannot_work_is_exit_1(checked, text, status, sentence):
+    exit_status, remarks = checked(text)
+    assert sentence in " ".join(remarks)
     assert exit_status == status
 
 
-def test_several_muxes_on_a_bus_are_advised_against(edge, tmp_path):
+@pytest.mark.parametrize(
+    ("second", "advised"), [("channel = 1,", False), ("mux = 0x71, channel = 1,", True)]
+)
+def test_several_muxes_on_a_bus_are_advised_against(checked, second, advised):
     text = skinfile.shipped("mpr121").read_text()
-    (tmp_path / "one.toml").write_text(text)
-    (tmp_path / "two.toml").write_text(
-        text.replace("{ channel = 1,", "{ mux = 0x71, channel = 1,")
-    )
-    for name, advised in (("one", False), ("two", True)):
-        status, (event,), _ = edge("check", tmp_path / f"{name}.toml")
-        assert status == 0
-        remarks = " ".join(event["remarks"])
-        assert ("use one mux, and wire its reset line" in remarks) == advised
+    status, remarks = checked(text.replace("channel = 1,", second))
+    assert status == 0
+    assert ("use one mux, and wire its reset line" in " ".join(remarks)) == advised
 
 
 def test_check_counts_what_the_wire_carries(edge, skin):
@@ -104,14 +111,10 @@ def test_the_software_s_time_for_each_transaction_may_be_counted_too(edge, skin)
     ],
 )
 def test_check_says_where_the_wires_are_too_slow(edge, skin, more, rate, sentence):
-    text = (
-        skin.read_text()
-        .replace("verify_mux = true", "")
-        .replace("[read]\n", f"[read]\n{more}")
-    )
+    text = skin.read_text().replace("verify_mux = true", more)
     skin.write_text(text.replace("clock_hz = 400_000", "clock_hz = 150_000"))
-    exit_status, (event,), err = edge("check", skin)
-    assert exit_status == 1
+    status, (event,), err = edge("check", skin)
+    assert status == 1
     assert event["frame_rate_hz"] == rate
     assert err == ""
     assert sentence in " ".join(event["remarks"])

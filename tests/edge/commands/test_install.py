@@ -32,12 +32,16 @@ def running(tmp_path):
     return folder / "model.onnx"
 
 
+@pytest.fixture
+def installed(edge, new, running):
+    """Install the new model."""
+    return lambda *options: edge("install", new, "--to", running, *options)
+
+
 def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
-    edge,
-    new,
-    running,
+    installed, new, running
 ):
-    status, (event,), _ = edge("install", new, "--to", running)
+    status, (event,), _ = installed()
     assert status == 0
     assert event == {"event": "installed", "version": Model(new).version}
     assert running.read_bytes() == new.read_bytes()
@@ -45,11 +49,11 @@ def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
     assert running.with_name("golden.npz.former").read_bytes() == b"former golden"
 
 
-def test_the_former_model_comes_back_once(edge, new, running):
+def test_the_former_model_comes_back_once(edge, installed, new, running):
     metadata = to_json(replace(Model(new).info, name="former"))
     former = rewritten(new.read_bytes(), {}, {METADATA_KEY: metadata})
     running.write_bytes(former)
-    edge("install", new, "--to", running)
+    installed()
     assert edge("install", "--back", "--to", running)[0] == 0
     assert running.read_bytes() == former
     assert sorted(path.name for path in running.parent.iterdir()) == [
@@ -61,19 +65,15 @@ def test_the_former_model_comes_back_once(edge, new, running):
     assert "has no former model to go back to" in err
 
 
-def test_a_model_that_is_installed_twice_is_not_its_own_way_back(edge, new, running):
+def test_a_model_that_is_installed_twice_is_not_its_own_way_back(installed, running):
     for _ in range(2):
-        assert edge("install", new, "--to", running)[0] == 0
+        assert installed()[0] == 0
     assert running.with_name("model.onnx.former").read_bytes() == b"former model"
 
 
 @pytest.mark.parametrize("damage", ["model", "golden", "missing"])
 def test_a_model_that_does_not_verify_leaves_the_former_one(
-    edge,
-    new,
-    running,
-    damage,
-    exported,
+    installed, new, running, damage
 ):
     golden = new.with_name("golden.npz")
     if damage == "model":
@@ -82,31 +82,28 @@ def test_a_model_that_does_not_verify_leaves_the_former_one(
         golden.write_bytes(b"PK")
     else:
         golden.unlink()
-    status, _, err = edge("install", new, "--to", running)
+    status, _, err = installed()
     assert status == 2
     assert str(new.parent) in err
     assert running.read_bytes() == b"former model"
 
 
 def test_a_service_that_does_not_run_with_the_new_model_gets_the_former_one(
-    edge,
-    new,
-    running,
-    monkeypatch,
+    installed, running, monkeypatch
 ):
     restarted = []
     monkeypatch.setattr(install, "restart", restarted.append)
     monkeypatch.setattr(install, "runs_on", lambda is_active: False)
-    status, _, err = edge("install", new, "--to", running, "--service", "robot")
+    status, _, err = installed("--service", "robot")
     assert status == 1
     assert "the former model is back" in err
     assert running.read_bytes() == b"former model"
     assert restarted == ["robot", "robot"]
 
 
-def test_a_machine_without_systemd_is_told_so(edge, new, running, monkeypatch):
+def test_a_machine_without_systemd_is_told_so(installed, running, monkeypatch):
     monkeypatch.setenv("PATH", "")
-    status, _, err = edge("install", new, "--to", running, "--service", "robot")
+    status, _, err = installed("--service", "robot")
     assert status == 2
     assert "robot cannot be restarted with systemctl: No such file or directory" in err
     assert "the former model is back" in err

@@ -11,7 +11,7 @@ from edge.commands import source
 from edge.fake.touches import still
 from edge.skin import file as skinfile
 from edge.skin.loop import Stop
-from tests.conftest import lines, python
+from tests.conftest import decided, lines, python
 
 
 def test_scan_over_the_fake_maps_the_whole_skin(edge, quiet):
@@ -66,14 +66,21 @@ def answered(event):
     return {**answer, "flags": set(event.get("flags", ())) - {"as_trained"}}
 
 
+@pytest.fixture
+def run(edge, exported):
+    """Run with the exported model."""
+    return lambda *options: edge("run", "--model", exported / "model.onnx", *options)
+
+
 @pytest.mark.parametrize("name", ["hard_0", "soft_3"])
-def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings, name):
+def test_run_over_the_fake_decides_as_replay_does(
+    edge, run, exported, recordings, name
+):
     """The same frames, once from the file and once through drivers, wires and
     threads."""
-    model = exported / "model.onnx"
     path = recordings / f"{name}.npz"
-    status, (*live, end), err = edge("run", "--model", model, "--fake", path)
-    _, played, _ = edge("replay", "--model", model, path)
+    status, (*live, end), err = run("--fake", path)
+    _, played, _ = edge("replay", "--model", exported / "model.onnx", path)
     assert status == 0
     assert err == ""
     assert list(map(answered, live)) == list(map(answered, played))
@@ -86,16 +93,16 @@ def test_run_over_the_fake_decides_as_replay_does(edge, exported, recordings, na
     }
 
 
-def test_run_ends_with_its_recording_unless_told_to_loop(edge, exported, parted):
-    model = exported / "model.onnx"
-    path = parted
-    once = edge("run", "--model", model, "--fake", path)[1]
-    twice = edge("run", "--model", model, "--fake", path, "--loop", "--seconds", 4.6)[1]
-    assert [sum(e["event"] == "onset" for e in events) for events in (once, twice)] == [
-        1,
-        2,
-    ]
-    assert twice[-1]["frames"] == 460
+@pytest.mark.parametrize(
+    ("options", "onsets", "frames"),
+    [((), 1, 230), (("--loop", "--seconds", 4.6), 2, 460)],
+)
+def test_run_ends_with_its_recording_unless_told_to_loop(
+    run, parted, options, onsets, frames
+):
+    events = run("--fake", parted, *options)[1]
+    assert sum(event["event"] == "onset" for event in events) == onsets
+    assert events[-1]["frames"] == frames
 
 
 @pytest.fixture
@@ -113,23 +120,10 @@ def bare(make_touch, tmp_path):
         (("--without-joints", "skin"), "skin_motion"),
     ],
 )
-def test_run_flags_a_decision_whose_joints_never_came(
-    edge,
-    exported,
-    bare,
-    options,
-    flag,
-):
-    status, events, _ = edge(
-        "run",
-        "--model",
-        exported / "model.onnx",
-        "--fake",
-        bare,
-        *options,
-    )
+def test_run_flags_a_decision_whose_joints_never_came(run, bare, options, flag):
+    status, events, _ = run("--fake", bare, *options)
     assert status == 0
-    assert [e["flags"][0] for e in events if e["event"] == "decision"] == [flag] * 2
+    assert [flags[0] for flags in decided(events, "flags")] == [flag] * 2
 
 
 def test_run_takes_joints_from_stdin(exported, recordings):
@@ -143,7 +137,8 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     command = ("-m", "edge", "run", *options, "--joints", "stdin")
     process = python(*command, input=sent + "nonsense\n", timeout=60)
     assert process.returncode == 0
-    flags = [e["flags"] for e in lines(process.stdout) if e["event"] == "decision"]
+    flags = decided(lines(process.stdout), "flags")
+    assert len(flags) == 2
     assert all("missing_pose" in f for f in flags)
     assert "unusable lines: 1; the last one: a line is not" in process.stderr
 
@@ -176,13 +171,7 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     ],
 )
 def test_a_bad_option_is_one_sentence(
-    edge,
-    exported,
-    recordings,
-    bare,
-    tmp_path,
-    arguments,
-    sentence,
+    run, recordings, bare, tmp_path, arguments, sentence
 ):
     files = {
         "REC": recordings / "hard_0.npz",
@@ -191,8 +180,7 @@ def test_a_bad_option_is_one_sentence(
         "FLAT": tmp_path / "flat.npz",
     }
     saving.save(files["FLAT"], still(skinfile.load(files["PAD"]), 0.5))
-    options = [files.get(a, a) for a in arguments]
-    status, events, err = edge("run", "--model", exported / "model.onnx", *options)
+    status, events, err = run(*(files.get(a, a) for a in arguments))
     assert status == 2
     assert events == []
     assert err.startswith("edge-classify: ")

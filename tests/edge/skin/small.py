@@ -1,9 +1,19 @@
 """Small skins for tests to change, and the sentence for a mistake in one."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from edge.errors import InputError
 from edge.skin import file as skinfile
+
+CODY = skinfile.load(skinfile.shipped("cody"))
+FIRST = CODY.buses[0]
+CHIP = replace(CODY, buses=(replace(FIRST, chips=FIRST.chips[:1]),))
+"""Cody's skin with its first chip alone, which has 4 x 3 taxels."""
+PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
+"""Random counts of its taxels."""
 
 SMALL = """
 [skin]

@@ -8,10 +8,8 @@ import pytest
 
 from edge.fake.clock import VirtualClock
 from edge.fake.player import still
-from edge.skin import file as skinfile
 from edge.skin.loop import Loop, Periods, Schedule, Stop, stop_on
-
-CODY = skinfile.load(skinfile.shipped("cody"))
+from tests.edge.skin.small import CODY
 
 
 def test_ticks_stay_on_the_grid_however_long_the_work_takes():

@@ -17,12 +17,11 @@ from edge.skin.file import Reading
 from edge.skin.loop import Loop
 from edge.skin.skin import SILENT_FRAMES, Skin
 from edge.skin.wiring import BusSpec
+from tests.edge.skin.small import CHIP, CODY, PICTURE
 from tests.faults import SKINS
 from tests.faulty import Fault, faulty_buses, faulty_skin
 
-CODY = skinfile.load(skinfile.shipped("cody"))
 PAD = skinfile.load(skinfile.shipped("mpr121"))
-PICTURE = np.random.default_rng(0).integers(0, 5000, (16, 24)).astype(np.uint16)
 
 
 def on_buses(n, *, kind=ad7147.AD7147, verify=False, recheck=100_000):
@@ -50,7 +49,7 @@ def test_the_wires_carry_these_frame_rates_at_400_khz(kind, buses, hz):
 
 
 def test_all_checks_together_cost_at_most_3_percent_of_the_wire():
-    frames = 400
+    frames = 160
     assert sum(frame_bits(CODY, frames)) <= 1.03 * 8320
     single = replace(on_buses(1, verify=True), reading=CODY.reading)
     assert frame_bits(single, frames)[0] <= 1.03 * 8320
@@ -101,13 +100,13 @@ def test_the_baseline_follows_drift_until_something_touches():
     """15 counts a second of drift, then a contact on top of it, held for two
     seconds."""
     contact = np.zeros((16, 24), dtype=np.uint16)
-    contact[4:8, 5:9] = 3000
+    contact[:2, :2] = 3000
     with fake_skin(
-        CODY, lambda t: np.uint16(15.0 * t) + contact * (4.0 <= t < 6.0)
+        CHIP, lambda t: np.uint16(15.0 * t) + contact * (4.0 <= t < 6.0)
     ) as skin:
         frames = list(Loop(skin, lasts_s=6.5).frames())
     quiet = [int(frame.counts.max()) for frame in frames if frame.t < 4.0]
-    held = [int(frame.counts[5, 6]) for frame in frames if 4.0 <= frame.t < 6.0]
+    held = [int(frame.counts[1, 1]) for frame in frames if 4.0 <= frame.t < 6.0]
     assert max(quiet) <= 4
     # Frozen: the drift adds to the contact, and nothing of the contact is lost.
     assert held[0] in range(2999, 3005)
@@ -117,7 +116,7 @@ def test_the_baseline_follows_drift_until_something_touches():
 @pytest.mark.parametrize("above", [0, 1])
 def test_counts_above_the_threshold_are_a_touch_and_are_not_followed(above):
     level = np.full((16, 24), CODY.layout.threshold_counts + above, dtype=np.uint16)
-    with fake_skin(CODY, lambda t: level) as skin:
+    with fake_skin(CHIP, lambda t: level) as skin:
         assert skin.touch_counts == CODY.layout.threshold_counts
         frames = list(Loop(skin, lasts_s=3.0).frames())
     lost = int(frames[0].counts.max()) - int(frames[-1].counts.max())
