@@ -1,6 +1,7 @@
 """Why a model answers as it does, by hand and by the graph's own distances."""
 
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -49,11 +50,15 @@ def test_the_feature_that_has_to_change_least_comes_first():
     assert [change.feature for change in why.changes] == ["force", "area"]
 
 
+def unscaled(features, **more):
+    """A space of features with a sample each, which stand as they are."""
+    columns = np.arange(features)
+    return Space(columns, np.zeros(features), np.ones(features), **more)
+
+
 def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
-    space = Space(
-        columns=np.arange(4),
-        mean=np.zeros(4),
-        gain=np.ones(4),
+    space = unscaled(
+        4,
         weights=np.array([[0.0, 0.0], [1.0, 2.0], [0.5, 0.0], [0.25, 0.0]]),
         rows=np.array([[0.0, 0.0], [2.0, 0.0], [1.5, 3.0], [5.5, 11.0]]),
         labels=np.array([0, 1, 0, 1]),
@@ -70,10 +75,8 @@ def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
         assert change.size == change.mean == pytest.approx(size)
 
 
-VOTES = Space(
-    columns=np.arange(1),
-    mean=np.zeros(1),
-    gain=np.ones(1),
+VOTES = unscaled(
+    1,
     weights=np.ones((1, 1)),
     rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [5.0], [np.inf]]),
     labels=np.array([1, 0, 0, 1, 0, -1]),
@@ -116,10 +119,8 @@ def test_a_trial_without_a_label_is_no_rival():
     assert votes(VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))).rival is None
 
 
-def why_of(model, space, vector, rows, label):
-    """The explanation of a model's decision, and the distances of the trials that
-    voted."""
-    info = model.info
+def why_of(info, space, vector, rows, label):
+    """The explanation of a decision, and the distances of the trials that voted."""
     why = explain(space, vector, rows.tolist(), label, info.features, info.widths)
     return why, [near.distance for near in why.voters]
 
@@ -148,7 +149,8 @@ def test_a_task_is_explained_by_its_own_columns_and_trials_at_the_full_window(
         for vector in vectors:
             decision = model.decide(vector)[name]
             answer = task.labels.index(decision.label)
-            why, distances = why_of(model, space, vector, decision.neighbours, answer)
+            rows = decision.neighbours
+            why, distances = why_of(model.info, space, vector, rows, answer)
             assert distances == pytest.approx(decision.distances.tolist(), abs=1e-5)
             for near in (*why.voters, why.rival):
                 assert task.labels[near.label] == y[name][near.row]
@@ -169,12 +171,10 @@ def test_the_parts_add_up_to_the_graphs_distances(name, exported):
     for task in info.tasks:
         space = Space.of(model, task)
         reach = np.abs(space.rows).max()  # whose 22 bits are the graph's coordinates
-        for i in range(24):
-            label = int(golden[f"{task}_label"][i])
-            vector = golden["vectors"][i]
-            expected = golden[f"{task}_distances"][i]
-            rows = golden[f"{task}_neighbours"][i]
-            why, distances = why_of(model, space, vector, rows, label)
+        keys = (f"{task}_{key}" for key in ("label", "distances", "neighbours"))
+        cases = zip(golden["vectors"], *map(golden.get, keys), strict=True)
+        for vector, label, expected, rows in islice(cases, 24):
+            why, distances = why_of(info, space, vector, rows, label)
             assert distances == pytest.approx(expected, abs=1e-5 * reach)
             z = ((vector[space.columns] - space.mean) * space.gain) @ space.weights
             for near, distance in zip(why.voters, expected, strict=True):

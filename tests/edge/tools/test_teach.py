@@ -22,11 +22,20 @@ def everywhere(touch):
 def teach(edge, exported, tmp_path):
     """Teach the exported model; returns status, the lines and stderr."""
 
-    def run(*recordings):
-        given = ["--model", exported / "model.onnx", "--out", tmp_path / "taught"]
-        return edge("teach", *given, *recordings)
+    command = (
+        "teach",
+        "--model",
+        exported / "model.onnx",
+        "--out",
+        tmp_path / "taught",
+    )
+    return lambda *words: edge(*command, *words)
 
-    return run
+
+@pytest.fixture
+def taught(tmp_path):
+    """The path of the model that `teach` writes."""
+    return tmp_path / "taught" / "model.onnx"
 
 
 def of_tasks(lines, key="trials"):
@@ -45,59 +54,52 @@ def cup(make_touch, tmp_path):
     return tmp_path / "cup.npz"
 
 
-def test_a_trial_is_taught_for_the_tasks_whose_label_is_known(teach, cup, tmp_path):
+def test_a_trial_is_taught_for_the_tasks_whose_label_is_known(teach, cup, taught):
     status, lines, messages = teach(cup)
     assert status == 0
     assert of_tasks(lines) == {"category": 1, "object": 0}
     left_out = "object: left out 1 trial of the new label 'cup'; --new-labels adds it\n"
     assert left_out in messages
     assert "its accuracy is not measured, and no error rate is certified" in messages
-    after = Model(tmp_path / "taught" / "model.onnx").info
+    after = Model(taught).info
     assert after.rows == 17
     assert after.taught == 1
     assert after.trials[-1:] == ("cup",)
 
 
-def test_a_taught_trial_is_known_again(teach, exported, cup, tmp_path):
+def decisions_about(path, model):
+    """A model's decisions about a recording."""
+    _, series = first_series(load(path), model)
+    return model.decide(model.info.vector(series))
+
+
+def test_a_taught_trial_is_known_again(teach, model, cup, taught):
     teach(cup)
-    before = Model(exported / "model.onnx")
-    after = Model(tmp_path / "taught" / "model.onnx")
-    _, series = first_series(load(cup), after)
-    vector = after.info.vector(series)
-    decisions = after.decide(vector)
+    decisions = decisions_about(cup, Model(taught))
     assert decisions["category"].neighbours[0] == 16
     assert decisions["category"].distances[0] == 0.0
     # No label of its object is known, so the answers about objects are what they were.
-    former = before.decide(vector)["object"].distances
+    former = decisions_about(cup, model)["object"].distances
     assert (decisions["object"].distances == former).all()
 
 
-def test_another_model_in_its_place_is_kept_and_named(teach, cup, make_touch, tmp_path):
-    folder = tmp_path / "taught"
+def test_another_model_in_its_place_is_kept_and_named(teach, cup, touches, taught):
+    golden = taught.with_name("golden.npz")
     _, _, messages = teach(cup)
     assert "is kept" not in messages
-    former = [(folder / name).read_bytes() for name in ("model.onnx", "golden.npz")]
-    other = tmp_path / "other.npz"
-    save(other, labelled(make_touch(seed=71), category="soft-fixed"))
-    _, _, messages = teach(other)
-    assert f"{folder}/model.onnx: the model that was there is kept" in messages
-    assert (folder / "model.onnx").read_bytes() != former[0]
-    assert (folder / "model.onnx.former").read_bytes() == former[0]
-    assert (folder / "golden.npz.former").read_bytes() == former[1]
+    former_model = taught.read_bytes()
+    former_golden = golden.read_bytes()
+    _, _, messages = teach("--new-labels", touches[0])
+    assert f"{taught}: the model that was there is kept" in messages
+    assert taught.read_bytes() != former_model
+    assert taught.with_name("model.onnx.former").read_bytes() == former_model
+    assert golden.with_name("golden.npz.former").read_bytes() == former_golden
 
 
-def test_the_new_golden_file_agrees_with_the_taught_model(teach, edge, cup, tmp_path):
-    teach(cup)
-    taught = tmp_path / "taught"
-    files = ("--model", taught / "model.onnx", "--golden", taught / "golden.npz")
-    assert edge("verify", *files)[0] == 0
-
-
-def test_a_file_whose_name_is_no_text_can_be_taught(teach, make_touch, tmp_path):
-    save(tmp_path / "cup.npz", labelled(make_touch(seed=70), category="soft-fixed"))
-    (tmp_path / "cup.npz").rename(tmp_path / "c\udcff.npz")
-    assert teach(tmp_path / "c\udcff.npz")[0] == 0
-    assert Model(tmp_path / "taught" / "model.onnx").info.trials[-1] == r"c\udcff"
+def test_a_file_whose_name_is_no_text_can_be_taught(teach, cup, taught):
+    path = cup.rename(cup.with_name("c\udcff.npz"))
+    assert teach(path)[0] == 0
+    assert Model(taught).info.trials[-1] == r"c\udcff"
 
 
 @pytest.fixture
@@ -113,18 +115,18 @@ def touches(make_touch, tmp_path):
 
 
 @pytest.fixture
-def with_cup(teach, touches, tmp_path):
+def with_cup(teach, touches, taught):
     """The path of a model that was taught the cup."""
     assert teach("--new-labels", *touches[:3])[0] == 0
-    return tmp_path / "taught" / "model.onnx"
+    return taught
 
 
 @pytest.fixture
 def with_mug(edge, with_cup, touches, tmp_path):
     """The path of the same that was then taught the mug."""
-    path = tmp_path / "again" / "model.onnx"
-    given = ["--out", path.parent, "--new-labels", touches[3]]
-    assert edge("teach", "--model", with_cup, *given)[0] == 0
+    path = tmp_path / "with mug" / "model.onnx"
+    options = ["--out", path.parent, "--new-labels", touches[3]]
+    assert edge("teach", "--model", with_cup, *options)[0] == 0
     return path
 
 
@@ -138,22 +140,17 @@ def test_new_labels_are_counted_and_named(teach, touches):
     assert "'soft-movable'; did you mean 'soft-fixed'?" not in messages
 
 
-def test_new_labels_stand_behind_the_known_ones(exported, with_cup):
-    before = Model(exported / "model.onnx").info.tasks
-    after = Model(with_cup).info.tasks
+def test_new_labels_stand_behind_the_known_ones(model, with_mug):
+    before = model.info.tasks
+    after = Model(with_mug).info.tasks
     assert after["category"].labels == (*before["category"].labels, "soft-movable")
-    assert after["object"].labels == (*before["object"].labels, "cup")
-
-
-def test_labels_can_be_added_again(with_mug):
-    assert Model(with_mug).info.tasks["object"].labels[-2:] == ("cup", "mug")
+    assert after["object"].labels == (*before["object"].labels, "cup", "mug")
 
 
 def test_a_new_object_is_known_again(with_cup, touches):
     model = Model(with_cup)
     for path in touches[:3]:
-        _, series = first_series(load(path), model)
-        decision = model.decide(model.info.vector(series))["object"]
+        decision = decisions_about(path, model)["object"]
         assert decision.label == "cup"
         assert len(decision.scores) == 5
 
@@ -170,41 +167,35 @@ def test_every_command_takes_a_model_with_new_labels(name, edge, touches, reques
 
 
 def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_path):
-    touch = labelled(make_touch(seed=71), category="sofft-fixed", object="hard 1")
-    save(tmp_path / "x.npz", touch)
+    path = tmp_path / "x.npz"
+    save(path, labelled(make_touch(), category="sofft-fixed", object="hard 1"))
     sentence = "category: {}1 trial of the new label 'sofft-fixed'{}; did you mean 'soft-fixed'?\n"
     left_out = sentence.format("left out ", "; --new-labels adds it")
-    assert left_out in teach(tmp_path / "x.npz")[2]
-    assert sentence.format("", "") in teach(tmp_path / "x.npz", "--new-labels")[2]
+    assert left_out in teach(path)[2]
+    assert sentence.format("", "") in teach(path, "--new-labels")[2]
 
 
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (labelled, "odd.npz: has no label that the model knows (category: rigid-fixed"),
+        (labelled, "cup.npz: has no label that the model knows (category: rigid-fixed"),
         (
             lambda t: labelled(t, object="sotf 1"),
             "label it, or teach it with --new-labels; did you mean 'soft 1'?",
         ),
-        (
-            lambda t: replace(t, frames=0 * t.frames),
-            "odd.npz: holds no contact; leave it out",
-        ),
-        (
-            everywhere,
-            "odd.npz: lies far outside the trials that the model was fitted on",
-        ),
+        (lambda t: replace(t, frames=0 * t.frames), "cup.npz: holds no contact"),
+        (everywhere, "cup.npz: lies far outside the trials that the model was fitted"),
     ],
 )
 def test_what_cannot_be_taught_is_one_sentence_and_writes_nothing(
     change,
     sentence,
     teach,
-    make_touch,
-    tmp_path,
+    cup,
+    taught,
 ):
-    save(tmp_path / "odd.npz", change(make_touch(seed=1)))
-    status, _, messages = teach(tmp_path / "odd.npz")
+    save(cup, change(load(cup)))
+    status, _, messages = teach(cup)
     assert status == 2
     assert sentence in messages
-    assert not (tmp_path / "taught").exists()
+    assert not taught.parent.exists()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.model import onnx_file
 from edge.model.graph import Graph, coordinates_of
 from edge.model.model import Model
 from edge.tools.rewriting import rewritten
@@ -50,8 +49,7 @@ def test_labels_that_are_not_known_are_counted_and_become_the_last_ones(model):
     unknown = unknown_labels(info, [*labels, {"category": "soft-fixed"}])
     assert unknown == {"category": {}, "object": {"cup": 1, "mug": 2}}
     after = with_labels(info, unknown).tasks
-    known = info.tasks["object"].labels
-    assert after["object"].labels == (*known, "cup", "mug")
+    assert after["object"].labels == (*info.tasks["object"].labels, "cup", "mug")
     assert after["category"].k == 5
     assert after["object"].k == 1
 
@@ -65,12 +63,12 @@ def test_no_label_is_added_to_tasks_that_are_decided_together(model):
         "softness": replace(category, labels=("rigid", "soft")),
         "mobility": replace(category, labels=("fixed",)),
     }
+    info = replace(info, tasks=pair)
     for task in pair:
-        with pytest.raises(
-            InputError, match=f"^{task} 'odd' is new, but each category is a pair"
-        ):
-            with_labels(replace(info, tasks=pair), {task: {"odd": 3}})
-    assert with_labels(replace(info, tasks=pair), {"softness": {}}).tasks == pair
+        sentence = f"^{task} 'odd' is new, but each category is a pair"
+        with pytest.raises(InputError, match=sentence):
+            with_labels(info, {task: {"odd": 3}})
+    assert with_labels(info, {"softness": {}}).tasks == pair
 
 
 def test_a_misspelled_label_is_asked_about_and_another_one_is_not():
@@ -78,22 +76,18 @@ def test_a_misspelled_label_is_asked_about_and_another_one_is_not():
     assert spelled_like("blue cup", ("red cup", "tool box")) == ""
 
 
-def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(
-    model,
-    exported,
-    tmp_path,
-):
-    data = (exported / "model.onnx").read_bytes()
-    constants = Graph(onnx_file.read(data, "model")).constants
+def test_a_file_that_is_rewritten_without_a_change_keeps_its_bytes(model, tmp_path):
+    data = model.contents.data
     assert rewritten(data, {}, {}) == data
+    constants = Graph(model.contents).constants
     names = ("columns of category", "columns of object")
     same = {name: constants[name] for name in names}
-    again = rewritten(data, same, {})
-    (tmp_path / "model.onnx").write_bytes(again)
-    assert len(again) == len(data)
+    path = tmp_path / "model.onnx"
+    path.write_bytes(rewritten(data, same, {}))
+    assert path.stat().st_size == len(data)
     vectors = np.random.default_rng(0).normal(size=(5, model.info.width))
     before = model.run(vectors)
-    after = Model(tmp_path / "model.onnx").run(vectors)
+    after = Model(path).run(vectors)
     assert all((values == before[key]).all() for key, values in after.items())
 
 
