@@ -94,7 +94,7 @@ class Recording:
         """
         if self.joints is None or self.joint_names in (None, tuple(names)):
             return self
-        from edge.touch.joint_names import joint_columns  # few recordings need it
+        from edge.touch.joint_angles import joint_columns  # few recordings need it
 
         with about(where):
             columns = joint_columns(self.joint_names or (), names)

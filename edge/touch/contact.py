@@ -19,6 +19,7 @@ from edge.touch.layout import SkinLayout
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector
     from edge.touch.cells import Cells
+    from edge.touch.joint_angles import JointAngles
     from edge.touch.zones import Zones
 
 CLOCK_ROUNDING_S = 1e-6
@@ -126,9 +127,8 @@ class Measurer:
         motion: whether the contact's centroid is followed.
         force_motion: whether its force-weighted centroid is followed.
         zones: that are measured, or None.
-        cells: {name in `FeatureSeries`: the skin's cells that are read}.
-        joints: number of joint angles kept of each frame; 0 where no feature needs
-            them.
+        readers: {name in `FeatureSeries`: what reads the skin's cells, or the joint
+            angles, of a frame}.
     """
 
     def __init__(
@@ -142,17 +142,20 @@ class Measurer:
         self.layout = layout
         self.motion = "motion" in quantities
         self.force_motion = not quantities.isdisjoint(("force_motion", "stiffness"))
-        self.joints = joints if any(feature.of_joints for feature in types) else 0
         self.zones: Zones | None = None
         if any(feature.zones for feature in types):
             from edge.touch.zones import Zones
 
             self.zones = Zones(layout, types)
-        self.cells: dict[str, Cells] = {}
+        self.readers: dict[str, Cells | JointAngles] = {}
         if not quantities.isdisjoint(("taxel_force", "taxel_kernels")):
             from edge.touch.cells import cells_for
 
-            self.cells = cells_for(layout, quantities)
+            self.readers.update(cells_for(layout, quantities))
+        if joints and any(feature.of_joints for feature in types):
+            from edge.touch.joint_angles import JointAngles
+
+            self.readers["joints"] = JointAngles(joints)
 
 
 class Contact:
@@ -239,10 +242,10 @@ class Contact:
             "counted": np.array(counted, dtype=np.int64),
             **self._motions(frame, region, counted),
         }
-        for name, cells in measurer.cells.items():
-            row[name] = cells.read(frame)
-        if measurer.joints:
-            row["joints"] = self._joints_of(frame)
+        for name, reader in measurer.readers.items():
+            row[name] = reader.read(frame)
+        if "joints" in row and frame.joints is None:
+            self.missing_pose = True
         self._rows.append(row)
         self.age_s = age_s
 
@@ -283,22 +286,6 @@ class Contact:
             distance = self._distance("force_motion", centroid, frame.joints)
             motions["force_motion"] = distance
         return motions
-
-    def _joints_of(self, frame: Frame) -> NDArray[np.float64]:
-        if frame.joints is None:
-            self.missing_pose = True
-            return np.full(self._measurer.joints, np.nan)
-        if len(frame.joints) != self._measurer.joints:
-            raise InputError(
-                f"a frame has {len(frame.joints)} joint angles, "
-                f"the features were measured with {self._measurer.joints}"
-            )
-        finite = np.isfinite(frame.joints)
-        if not finite.all():
-            raise InputError(
-                f"angle {int(finite.argmin())} of a frame's joints is not finite"
-            )
-        return frame.joints.copy()
 
     def _distance(
         self,

@@ -30,7 +30,7 @@ from edge.address import parse_address
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import refusing
-from edge.touch.joint_names import joint_columns
+from edge.touch.joint_angles import joint_columns
 
 LOG = logging.getLogger(__name__)
 

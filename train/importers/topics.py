@@ -40,7 +40,7 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
-from edge.touch.joint_names import joint_columns
+from edge.touch.joint_angles import joint_columns
 from edge.touch.layout import RELEASE_S
 from train.importers import clock, counts
 from train.importers.axes import Axes

@@ -3,7 +3,7 @@
 import pytest
 
 from edge.errors import InputError
-from edge.touch.joint_names import joint_columns
+from edge.touch.joint_angles import joint_columns
 
 
 def test_joints_that_a_source_lacks_are_named_with_those_that_it_has():
