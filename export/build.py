@@ -92,24 +92,19 @@ class Builder:
 
     def stored(self, values: Sequence[Any], dtype: Any, name: str = "") -> str:
         """As `by_decision_point`, of values that a smaller type holds."""
-        with np.errstate(over="ignore"):
-            small = [np.asarray(value).astype(dtype) for value in values]
+        small = [np.asarray(value).astype(dtype) for value in values]
         stored = self.by_decision_point(small, name)
         return self.node("Cast", stored, to=TensorProto.DOUBLE)
 
     def shifted(self, operator: str, x: str, y: str, shifts: Sequence[int]) -> str:
         """Name of an operator's whole result, divided by 2^shift and rounded."""
-        parts = self.by_decision_point([2.0**-shift for shift in shifts])
+        factors = self.by_decision_point([2.0**-shift for shift in shifts])
         product = self.node(operator, x, y)
-        return self.node("Round", self.node("Mul", product, parts))
+        return self.node("Round", self.node("Mul", product, factors))
 
     def squared_length(self, x: str) -> str:
         """Name of the squared lengths (n, 1) of vectors x (n, p)."""
         return self.node("ReduceSumSquare", x, [1], keepdims=1)
-
-    def taken(self, x: str, columns: Integers, width: int) -> str:
-        """Name of some columns of x (n, width); of x itself where they are all."""
-        return x if len(columns) == width else self.node("Gather", x, columns, axis=1)
 
     def node(
         self,
@@ -231,13 +226,16 @@ def project(
     for point in range(1, count):
         if not np.array_equal(columns[point], columns[point - 1]):
             starts.append(point)
-    parts = []
+    products = []
     for start, end in zip(starts, [*starts[1:], count], strict=True):
         part = build if len(starts) == 1 else build.among(range(start, end), count)
-        selected = build.taken(x, columns[start], width)
-        parts.append(product(part, selected, decision_points[start:end], components))
-    rounded, far = parts[0]
-    for start, (later, later_far) in zip(starts[1:], parts[1:], strict=True):
+        selected = x
+        if len(columns[start]) < width:
+            selected = build.node("Gather", x, columns[start], axis=1)
+        points = decision_points[start:end]
+        products.append(product(part, selected, points, components))
+    rounded, far = products[0]
+    for start, (later, later_far) in zip(starts[1:], products[1:], strict=True):
         is_earlier = build.by_decision_point([point < start for point in range(count)])
         rounded = build.node("Where", is_earlier, rounded, later)
         far = build.node("Where", is_earlier, far, later_far)

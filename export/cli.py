@@ -239,12 +239,12 @@ def by_folder(fitted: Fitted, data: Sequence[str]) -> list[str]:
         trials = [fitted.dataset.trials[i] for i in judged.nonzero()[0]]
         hits = chosen.accuracy.hits
         assert hits is not None
-        parts = []
+        tallies = []
         for name, folder in folders.items():
             inside = [trial.path.resolve().is_relative_to(folder) for trial in trials]
             if any(inside):
-                parts.append(f"{name} {hits[inside].sum()} of {sum(inside)}")
-        lines.append(f"{task} by folder: {', '.join(parts)}")
+                tallies.append(f"{name} {hits[inside].sum()} of {sum(inside)}")
+        lines.append(f"{task} by folder: {', '.join(tallies)}")
     return lines
 
 

@@ -98,9 +98,9 @@ def _frames(model: Model, recordings: Sequence[Recording]) -> dict[str, NDArray[
     return arrays
 
 
-def _starts(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
+def _starts(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
     """Where parts start and end that are laid end to end."""
-    return np.cumsum([0, *map(len, parts)])
+    return np.cumsum([0, *map(len, arrays)])
 
 
 def _vectors(model: Model, series: Sequence[FeatureSeries], X: Floats) -> Floats:

@@ -265,7 +265,7 @@ def _label_distances(
 ) -> str:
     """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
     rows)."""
-    rows, most, taken, counts = (
+    rows, most, is_vote, counts = (
         build.constant(table, f"{name} of {task}")
         for name, table in label_tables(labels, classes).items()
     )
@@ -280,7 +280,7 @@ def _label_distances(
         sorted=1,
     )
     roots = build.node("Round", build.node("Sqrt", nearest))
-    counted = build.node("Where", taken, roots, 0.0)
+    counted = build.node("Where", is_vote, roots, 0.0)
     total = build.node("ReduceSum", counted, [2], keepdims=0)
     return build.node("Div", total, counts)
 
@@ -292,16 +292,18 @@ def _outputs(model: Fitted) -> dict[str, Any]:
     enlarges.
     """
     sequential = isinstance(model, SequentialClassifier)
-    parts = {
+    of_task = {
         "label": Int64TensorType([None]),
         "scores": DoubleTensorType([None, None]),
         "distances": DoubleTensorType([None, None]),
         "neighbours": Int64TensorType([None, None]),
     }
     if sequential or model.products_:
-        parts["label_distances"] = DoubleTensorType([None, None])
+        of_task["label_distances"] = DoubleTensorType([None, None])
     outputs = {
-        f"{task}_{part}": kind for task in model.choices for part, kind in parts.items()
+        f"{task}_{name}": kind
+        for task in model.choices
+        for name, kind in of_task.items()
     }
     outputs["out_of_range"] = DoubleTensorType([None])
     if sequential:
@@ -324,9 +326,7 @@ def _parse(
 
 
 def _shapes(operator: Any) -> None:
-    kinds = _outputs(operator.raw_operator).values()
-    for variable, kind in zip(operator.outputs, kinds, strict=True):
-        variable.set_type(kind)
+    """Keep the types with which `_parse` declares the outputs."""
 
 
 def to_onnx(model: Fitted, info: ModelInfo) -> bytes:

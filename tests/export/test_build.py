@@ -43,9 +43,9 @@ def graph():
             [helper.make_tensor_value_info(name, TensorProto.DOUBLE, [None, None])]
             for name in ("x", output)
         )
-        made = helper.make_graph(names.nodes, "g", before, after, names.initial)
+        graph_proto = helper.make_graph(names.nodes, "g", before, after, names.initial)
         opset = [helper.make_opsetid("", OPSET)]
-        model = helper.make_model(made, opset_imports=opset, ir_version=8)
+        model = helper.make_model(graph_proto, opset_imports=opset, ir_version=8)
         onnx.checker.check_model(model)
         (value,) = session(model.SerializeToString()).run([output], {"x": x})
         return value

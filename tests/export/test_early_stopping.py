@@ -234,12 +234,12 @@ def test_a_task_without_a_certified_rule_is_decided_as_without_an_error_rate(
     seed,
 ):
     touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
-    asked = decided(uncertified, touch, error)["object"]
+    limited = decided(uncertified, touch, error)["object"]
     plain = decided(uncertified, touch, None)["object"]
-    assert asked.label == plain.label
-    assert asked.confidence == plain.confidence
-    assert asked.window_s == plain.window_s
-    assert {*asked.flags} == {*plain.flags, "uncertified"}
+    assert limited.label == plain.label
+    assert limited.confidence == plain.confidence
+    assert limited.window_s == plain.window_s
+    assert {*limited.flags} == {*plain.flags, "uncertified"}
 
 
 @pytest.fixture
@@ -257,8 +257,8 @@ def hasty(early, monkeypatch):
 @pytest.fixture
 def strange(make_touch):
     """A touch unlike all others."""
-    known = make_touch(kind="hard", seed=50)
-    return replace(known, frames=np.minimum(known.frames.astype(int) * 40, 65535))
+    ordinary = make_touch(kind="hard", seed=50)
+    return replace(ordinary, frames=np.minimum(ordinary.frames.astype(int) * 40, 65535))
 
 
 def stops_of(events):
@@ -309,8 +309,10 @@ def test_a_stranger_with_onnxruntime_alone_is_answered_at_the_full_window(
     ):
         runtime = session(data, level)
         names = [output.name for output in runtime.get_outputs()]
-        seen = runtime.run(names, {"features": X})
-        assert [v.tolist() for v in seen] == [expected[name].tolist() for name in names]
+        outputs = runtime.run(names, {"features": X})
+        assert [v.tolist() for v in outputs] == [
+            expected[name].tolist() for name in names
+        ]
         assert set(names) == set(expected)
 
 
@@ -336,17 +338,17 @@ def agreeing(make_touch, tmp_path_factory):
     return fitted, Model(folder / "model.onnx")
 
 
-@pytest.mark.parametrize("asked", [None, 0.3, 0.5, 0.9])
-def test_no_decision_contradicts_another(agreeing, make_touch, asked):
+@pytest.mark.parametrize("rate", [None, 0.3, 0.5, 0.9])
+def test_no_decision_contradicts_another(agreeing, make_touch, rate):
     _, model = agreeing
     assert model.info.products.keys() == {"category"}
     for recording in pressed(make_touch, range(50, 55)):
-        events = decided(model, recording, asked)
-        parts = [events[task] for task in ("softness", "mobility")]
+        events = decided(model, recording, rate)
+        factors = [events[task] for task in ("softness", "mobility")]
         category = events["category"]
-        assert category.label == "-".join(part.label for part in parts)
+        assert category.label == "-".join(factor.label for factor in factors)
         assert category.decision.label == category.label
-        assert category.window_s == max(part.window_s for part in parts)
+        assert category.window_s == max(factor.window_s for factor in factors)
 
 
 def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
@@ -509,5 +511,5 @@ def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):
     for engine in ("onnxruntime", "numpy"):
         loaded = Model(path, engine)
         for point, expected in enumerate(scores.tolist()):
-            seen = [float(loaded.run(v[None], point)["novelty"][0]) for v in vectors]
-            assert seen == expected
+            outputs = [float(loaded.run(v[None], point)["novelty"][0]) for v in vectors]
+            assert outputs == expected

@@ -21,8 +21,8 @@ def test_a_folder_that_cannot_be_written_is_named_before_any_work(tmp_path, caps
     (tmp_path / "file").touch()
     out = tmp_path / "file"
     assert main(["--data", str(tmp_path / "missing"), "--out", str(out)]) == 2
-    said = f"export: {out}: cannot be written: File exists\n"
-    assert capsys.readouterr().err == said
+    sentence = f"export: {out}: cannot be written: File exists\n"
+    assert capsys.readouterr().err == sentence
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +53,10 @@ def test_it_prints_the_candidates_with_a_star_for_each_task(printed):
 
 
 def test_it_prints_the_accuracy_of_each_task(printed):
-    told = "of 16 trials are classified correctly (95 % interval "
-    assert told in line_of(printed, "object")
+    share = "of 16 trials are classified correctly (95 % interval "
+    assert share in line_of(printed, "object")
     low, high = wilson(6.4, 6.4)
-    interval = f"{told}{100 * low:.0f} to {100 * high:.0f})"
+    interval = f"{share}{100 * low:.0f} to {100 * high:.0f})"
     assert interval in line_of(printed, "category")
     assert f"{printed.info.tasks['category'].accuracy:.1%}" in line_of(
         printed, "category"
@@ -64,8 +64,8 @@ def test_it_prints_the_accuracy_of_each_task(printed):
 
 
 def test_the_model_measures_what_its_tasks_take(printed):
-    taken = [task.features for task in printed.info.tasks.values()]
-    assert set(printed.info.features) == set().union(*taken)
+    features = [task.features for task in printed.info.tasks.values()]
+    assert set(printed.info.features) == set().union(*features)
 
 
 def test_it_prints_its_files(printed):
@@ -161,11 +161,11 @@ def test_decision_points_before_a_window_hold_it_fixed(
     tmp_path,
     monkeypatch,
 ):
-    asked = Mock(side_effect=InputError("enough"))
-    monkeypatch.setattr("export.cli.fit", asked)
+    fit = Mock(side_effect=InputError("enough"))
+    monkeypatch.setattr("export.cli.fit", fit)
     assert main(["--data", "x", "--out", str(tmp_path), *options]) == 2
-    assert asked.call_args.kwargs["window_s"] == window_s
-    assert asked.call_args.kwargs["decision_points_s"] == points
+    assert fit.call_args.kwargs["window_s"] == window_s
+    assert fit.call_args.kwargs["decision_points_s"] == points
 
 
 @pytest.mark.parametrize(
@@ -201,9 +201,9 @@ def held_out(recordings, tmp_path):
 
 
 def test_what_is_held_out_must_not_be_fitted(recordings, capsys):
-    one = sorted(recordings.iterdir())[0]
-    assert main(["--data", str(recordings), "--test", str(one)]) == 2
-    assert f"{one}: is in --data and in --test" in capsys.readouterr().err
+    file = sorted(recordings.iterdir())[0]
+    assert main(["--data", str(recordings), "--test", str(file)]) == 2
+    assert f"{file}: is in --data and in --test" in capsys.readouterr().err
 
 
 def test_the_accuracy_of_each_folder_is_printed(recordings, tmp_path, capsys):

@@ -79,9 +79,9 @@ def test_a_task_that_some_trials_lack_names_its_neighbours_by_their_rows(export)
     choices = dict.fromkeys(("t", "some"), Choice("none", 2, 3))
     fitted, model = export(X, choices, labels=3, lack=["some"])
     answers = model.run(X)
-    known = np.arange(30) % 3 > 0
+    labelled = np.arange(30) % 3 > 0
     assert differences(fitted, answers, X) == []
-    assert (answers["some_neighbours"][known, 0] == np.arange(30)[known]).all()
+    assert (answers["some_neighbours"][labelled, 0] == np.arange(30)[labelled]).all()
     assert (answers["some_neighbours"] % 3 > 0).all()
 
 
@@ -165,10 +165,10 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     ours, theirs = (run(queries) for run in runs)
     z, *answers = ours
     assert z[:, :c].tolist() == points.tolist()
-    for (name, values), seen in zip(expected.items(), answers, strict=True):
-        assert seen.tolist() == values, name
-    for name, mine, other in zip(outputs, ours, theirs, strict=True):
-        assert mine.tobytes() == other.tobytes(), name
+    for (name, values), numbers in zip(expected.items(), answers, strict=True):
+        assert numbers.tolist() == values, name
+    for name, our_values, their_values in zip(outputs, ours, theirs, strict=True):
+        assert our_values.tobytes() == their_values.tobytes(), name
 
 
 def test_an_ulp_more_in_every_feature_changes_no_bit(export):
@@ -266,7 +266,7 @@ def test_vectors_that_are_not_finite_have_no_label_and_spoil_no_other(export, k)
     queries[4] = 1e305  # infinite once scaled
     answer = model.run(queries)
     spoilt = [1, 2, 3, 4]
-    others = [0, 5, 6, 7]
+    sound = [0, 5, 6, 7]
     assert (answer["t_label"][spoilt] == -1).all()
     assert not answer["t_scores"][spoilt].any()
-    assert (answer["t_label"][others] == model.run(X[others])["t_label"]).all()
+    assert (answer["t_label"][sound] == model.run(X[sound])["t_label"]).all()

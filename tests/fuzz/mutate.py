@@ -152,8 +152,8 @@ def of_npz(data, draw):
             archive.writestr(
                 name, npy(of_array(array, draw) if way < 5 else array, draw)
             )
-        for other, array in arrays.items():
-            archive.writestr(f"{other}.npy", npy(array, draw))
+        for name, array in arrays.items():
+            archive.writestr(f"{name}.npy", npy(array, draw))
     return out.getvalue()
 
 
@@ -187,8 +187,8 @@ def of_onnx(data, draw):
 
 def _operator(graph, draw):
     """An operator of the graph, or another that ONNX has."""
-    known = [node.op_type for node in graph.node]
-    return draw.choice(["Loop", "Exp", "Identity", *known])
+    operators = [node.op_type for node in graph.node]
+    return draw.choice(["Loop", "Exp", "Identity", *operators])
 
 
 def _input(graph, draw):

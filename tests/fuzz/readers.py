@@ -173,7 +173,7 @@ def read_grasp(path):
     importing("sdh2")(folder)
 
 
-def made(write):
+def bytes_of(write):
     """The bytes of a file that a function writes."""
     with tempfile.TemporaryDirectory() as folder:
         return write(Path(folder) / "log").read_bytes()
@@ -183,7 +183,7 @@ def logs():
     """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
     ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
     return [
-        made(lambda path, way=way: write_mcap(path, *json_topics(), **way))
+        bytes_of(lambda path, way=way: write_mcap(path, *json_topics(), **way))
         for way in ways
     ]
 
@@ -191,7 +191,9 @@ def logs():
 def bags():
     """A ROS 1 bag of arrays."""
     topic = skin([array(frame, version=1, dims=frame.shape) for frame in FRAMES])
-    return [made(lambda path: write_bag(path.with_suffix(".bag"), topic, version=1))]
+    return [
+        bytes_of(lambda path: write_bag(path.with_suffix(".bag"), topic, version=1))
+    ]
 
 
 FRAME_FILES = [

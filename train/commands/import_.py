@@ -68,9 +68,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the recordings."""
     arm = open_arm(arguments)
-    if not os.path.exists(
-        arguments.file
-    ):  # Path.exists raises for a name that is too long
+    # Path.exists raises for a name that is too long.
+    if not os.path.exists(arguments.file):
         raise InputError(f"{arguments.file}: no such file or folder")
     if arguments.file.name in ("", ".."):  # a bag is a folder, perhaps the current one
         arguments.file = arguments.file.resolve()
@@ -195,7 +194,7 @@ def set_thresholds(trials: Sequence[tuple[Path, Recording]]) -> str:
     onset = proposal.onset
     for path, recording in trials:
         skin = {"threshold_counts": threshold, "onset_counts": onset}
-        meta = {**recording.meta, "skin": {**recording.meta.get("skin", {}), **skin}}
+        meta = {**recording.meta, "skin": {**recording.meta["skin"], **skin}}
         save(path, replace(recording, meta=meta))
     touched = count_felt(recordings, onset)
     return (
@@ -209,5 +208,4 @@ def zeroed(recording: Recording) -> Recording:
     """The recording minus each taxel's median over the first three frames, and at least
     0."""
     offset = np.median(recording.frames[:ZERO_FRAMES], axis=0).astype(np.uint16)
-    frames = np.where(recording.frames > offset, recording.frames - offset, 0)
-    return replace(recording, frames=frames.astype(np.uint16))
+    return replace(recording, frames=np.maximum(recording.frames, offset) - offset)

@@ -120,8 +120,8 @@ class Long:
         """The frames of recordings that fit together."""
 
         def joined(name: str) -> Any:
-            parts = [getattr(recording, name) for recording in recordings]
-            return None if parts[0] is None else np.concatenate(parts)
+            arrays = [getattr(recording, name) for recording in recordings]
+            return None if arrays[0] is None else np.concatenate(arrays)
 
         lengths = [len(recording.t) for recording in recordings]
         row = np.repeat(np.arange(len(lengths)), lengths)

@@ -125,7 +125,7 @@ def draw(
     """
     touch = contact_of(where, recording)[1]
     answers = list(explanations(model, recording, where))
-    names = [trial["trial"] for answer in answers for trial in _shown(answer)]
+    names = [trial["trial"] for answer in answers for trial in _trials_drawn(answer)]
     series_of = {name: _trial(folder, name) for name in dict.fromkeys(names)}
     if not any(series_of.values()):
         raise InputError(
@@ -143,7 +143,7 @@ def draw(
             figure.savefig(file, format="png", dpi=110)
 
 
-def _shown(answer: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _trials_drawn(answer: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The nearest trials of an explanation, and last the nearest of its rival."""
     return [*answer["nearest"][:MOST_NEAR], *filter(None, [answer["rival"]])]
 
@@ -155,7 +155,7 @@ def _case(
 ) -> Case:
     """The picture of an explanation, with the contact and {trial: its contact}."""
     near = []
-    for trial in _shown(answer):
+    for trial in _trials_drawn(answer):
         series = series_of[trial["trial"]]
         text = f"{trial['trial']}: {trial['label']}, {trial['distance']:.3g} away"
         if series is None:

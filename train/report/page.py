@@ -50,19 +50,16 @@ def _text(text: str) -> str:
 
 def _decimals(values: Sequence[Any]) -> int:
     """The number of decimals that a column needs, at most two."""
-    shown = (f"{value:.2f}".rstrip("0") for value in values if isinstance(value, float))
-    return max((len(text) - text.index(".") - 1 for text in shown), default=0)
+    texts = (f"{value:.2f}".rstrip("0") for value in values if isinstance(value, float))
+    return max((len(text) - text.index(".") - 1 for text in texts), default=0)
 
 
 def _cell(value: Any, more: bool, decimals: int) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     text = f"{value:.{decimals}f}" if isinstance(value, float) else str(value)
     kinds = " ".join(["number"] * number + ["more"] * more)
-    return (
-        f'<td class="{kinds}">{_text(text)}</td>'
-        if kinds
-        else f"<td>{_text(text)}</td>"
-    )
+    style = f' class="{kinds}"' if kinds else ""
+    return f"<td{style}>{_text(text)}</td>"
 
 
 def _table(table: Table) -> str:

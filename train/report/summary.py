@@ -141,7 +141,10 @@ def warnings(fitted: Fitted) -> list[str]:
 
 def _untouched(dataset: DataSet) -> Iterator[str]:
     """A sentence on the recordings without a contact whose labels name one."""
-    paths = [path for path, labels in dataset.untouched if _names_contact(labels)]
+    paths = []
+    for path, labels in dataset.untouched:
+        if NO_CONTACT not in labels.values():
+            paths.append(path)
     if not paths:
         return
     line = f"no contact above {dataset.layout.onset} counts, so counted as wrong: "
@@ -152,16 +155,12 @@ def _untouched(dataset: DataSet) -> Iterator[str]:
     yield line
 
 
-def _names_contact(labels: Mapping[str, str]) -> bool:
-    return NO_CONTACT not in labels.values()
-
-
 def _left_out(dataset: DataSet) -> Iterator[str]:
     """Sentences on recordings, and on contacts of a recording, that are not used."""
-    used = {trial.path for trial in dataset.trials}
+    files = {trial.path for trial in dataset.trials}
     for lacking, paths in dataset.left_out.items():
         yield (
-            f"warning: {len(paths)} of {len(used.union(paths))} recordings are left out "
+            f"warning: {len(paths)} of {len(files.union(paths))} recordings are left out "
             f"for lack of {lacking}: {_files(paths)}"
         )
     if dataset.unused:

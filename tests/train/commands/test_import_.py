@@ -26,9 +26,9 @@ def test_a_constant_offset_is_subtracted_and_nothing_goes_below_zero(make_touch)
 
 
 def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
-    given = tmp_path / f"{'n' * 300}.csv"
-    said = refusal("import", "csv", given, "--out", tmp_path / "out")
-    assert said == f"train: {given}: no such file or folder"
+    file = tmp_path / f"{'n' * 300}.csv"
+    message = refusal("import", "csv", file, "--out", tmp_path / "out")
+    assert message == f"train: {file}: no such file or folder"
 
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
@@ -40,8 +40,8 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
             touch.t,
             np.maximum(touch.frames, noise),
         )
-    given = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
-    assert main([*given, str(tmp_path / "out")]) == 0
+    words = ["import", "csv", str(tmp_path / "csv"), "--frames", "--out"]
+    assert main([*words, str(tmp_path / "out")]) == 0
     assert (
         "threshold 80 and onset 120 counts, from the noise before contact: 2 of 2 have "
         "a" in (capsys.readouterr().out)
@@ -50,7 +50,7 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     assert layout.threshold_counts == 80
     assert layout.onset == 120
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
-    assert main([*given, str(tmp_path / "own")]) == 0
+    assert main([*words, str(tmp_path / "own")]) == 0
     assert "noise" not in capsys.readouterr().out
     assert load(tmp_path / "own" / "trial0.npz").layout.threshold_counts == 90
 

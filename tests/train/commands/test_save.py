@@ -101,25 +101,25 @@ def changed(folder, **meta):
 def refused(refusal, folder):
     """The sentence by which recordings are not saved."""
     out = folder.parent / "all.parquet"
-    said = refusal("save", folder, "--as", "parquet", "--out", out)
+    message = refusal("save", folder, "--as", "parquet", "--out", out)
     assert not out.exists()
-    return said
+    return message
 
 
 def test_recordings_that_do_not_fit_together_are_named(folder, make_touch, refusal):
     edge.save(folder / "z.npz", make_touch(arm=False))
-    said = refused(refusal, folder)
-    assert "z.npz: its skin or joints are not those of" in said
+    message = refused(refusal, folder)
+    assert "z.npz: its skin or joints are not those of" in message
 
 
 def test_joints_of_other_names_are_not_saved_under_the_firsts(folder, refusal):
     changed(folder, joint_names=[f"other {i}" for i in range(5)])
-    said = refused(refusal, folder)
-    assert "touch_1.npz: its skin or joints are not" in said
+    message = refused(refusal, folder)
+    assert "touch_1.npz: its skin or joints are not" in message
 
 
 @pytest.mark.parametrize("task", ["trial", "t_s", "taxel_0_0", "joint_1"])
 def test_a_task_with_the_name_of_a_column_is_refused(folder, task, refusal):
     changed(folder, labels={task: "a"})
-    said = refused(refusal, folder)
-    assert "has the name of another column; save as hdf5" in said
+    message = refused(refusal, folder)
+    assert "has the name of another column; save as hdf5" in message

@@ -19,8 +19,8 @@ def test_labels_for_too_many_contacts_stop_before_anything_is_written(
     three = [{"object": "cup"}] * 3
     save(tmp_path / "a.npz", touch)
     save(tmp_path / "b.npz", replace(touch, meta={**touch.meta, "contacts": three}))
-    said = refusal("split", tmp_path, "--out", tmp_path / "out")
-    assert "b.npz: meta.contacts labels 3 contacts, 1 are found" in said
+    message = refusal("split", tmp_path, "--out", tmp_path / "out")
+    assert "b.npz: meta.contacts labels 3 contacts, 1 are found" in message
     assert not (tmp_path / "out").exists()
 
 
@@ -31,8 +31,8 @@ def test_recordings_of_one_name_do_not_overwrite_each_other(
 ):
     for folder in ("monday", "tuesday"):
         save(tmp_path / folder / "a.npz", make_touch(seconds=0.6))
-    said = refusal("split", tmp_path, "--out", tmp_path / "out")
-    assert "a-00.npz is that of another recording too; rename one of them" in said
+    message = refusal("split", tmp_path, "--out", tmp_path / "out")
+    assert "a-00.npz is that of another recording too; rename one of them" in message
     assert not (tmp_path / "out").exists()
 
 
@@ -42,8 +42,10 @@ def test_each_contact_becomes_a_recording_with_its_own_labels(
     capsys,
 ):
     two = in_a_row(*[make_touch(seconds=0.6)] * 2)
-    each = [{"object": "one"}, {"object": "other"}]
-    save(tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": each}))
+    labels = [{"object": "one"}, {"object": "other"}]
+    save(
+        tmp_path / "in" / "two.npz", replace(two, meta={**two.meta, "contacts": labels})
+    )
     assert main(["split", str(tmp_path / "in"), "--out", str(tmp_path / "out")]) == 0
     assert "recordings written to" in capsys.readouterr().out
     unsplit = contacts(two, ContactTracker(two.layout))

@@ -23,7 +23,7 @@ def test_the_command_says_what_its_proposal_hides(make_touch, tmp_path, capsys):
             noisy(weaker(touch, peak / touch.frames.max()), seed),
         )
     assert main(["thresholds", str(tmp_path)]) == 0
-    said = capsys.readouterr().out.splitlines()[-1]
-    assert said.startswith(
+    line = capsys.readouterr().out.splitlines()[-1]
+    assert line.startswith(
         "other thresholds show a contact in 1 more of the recordings"
     )
