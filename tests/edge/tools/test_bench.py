@@ -14,7 +14,6 @@ from edge.errors import InputError
 from edge.tools import bench
 from edge.tools.bench import summary, touch
 from edge.touch.first_contact import first_contact
-from edge.touch.track import ContactTracker
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +21,8 @@ def board(exported, tmp_path_factory):
     out = tmp_path_factory.mktemp("bench") / "board.json"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bench, "ROUNDS", 20)
-        given = ["--model", str(exported / "model.onnx"), "--out", str(out)]
-        assert main(["bench", *given]) == 0
+        options = ["--model", str(exported / "model.onnx"), "--out", str(out)]
+        assert main(["bench", *options]) == 0
     return json.loads(out.read_text())
 
 
@@ -42,14 +41,10 @@ def test_a_busy_machine_is_named_and_the_fastest_round_counts(
 ):
     """The process gets a quarter of the time; each of its rounds is slower than the one
     before."""
-    rounds = iter(range(1, 6))
+    rounds = ({"answer": {"median_us": median}} for median in range(1, 6))
     monkeypatch.setattr(bench.time, "process_time", iter((0.0, 0.25)).__next__)
     monkeypatch.setattr(bench.time, "perf_counter", iter((0.0, 1.0)).__next__)
-    monkeypatch.setattr(
-        bench,
-        "time_stages",
-        lambda *_: {"answer": {"median_us": next(rounds)}},
-    )
+    monkeypatch.setattr(bench, "time_stages", lambda *_: next(rounds))
     monkeypatch.setattr(bench, "cold_start_ms", lambda _: 100.0)
     board = bench.measure(model)
     assert board["stages"] == {"answer": {"median_us": 1}}
@@ -81,13 +76,7 @@ def test_percentiles_are_by_nearest_rank():
 def test_the_touch_is_a_contact_that_grows_over_the_whole_window(model):
     info = model.info
     frames = touch(model, info.window_s)
-    tracker = ContactTracker(
-        info.layout,
-        info.debounce,
-        chain=info.chain,
-        horizon_s=info.window_s,
-    )
-    onset, series = first_contact(frames, tracker)
+    onset, series = first_contact(frames, info.tracker(info.layout))
     assert onset == 0.0
     assert series.t[-1] == pytest.approx(info.window_s)
     assert series.area[-1] > series.area[0] > 1
@@ -101,10 +90,9 @@ def test_a_model_of_a_skin_that_no_touch_reaches_is_refused(model):
         bench.time_stages(SimpleNamespace(info=info, path="model.onnx"), 4)
 
 
-def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, capsys):
+def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, refused):
     out = tmp_path / "board.json"
-    assert main(["bench", "--model", "missing.onnx", "--out", str(out)]) == 2
-    err = capsys.readouterr().err
+    err = refused("bench", "--model", "missing.onnx", "--out", out)
     assert "missing.onnx: no such model" in err
     assert err.count("\n") == 1
     assert not out.exists()

@@ -4,7 +4,6 @@ import signal
 from contextlib import contextmanager
 
 from edge import demo
-from edge.commands.output import Output
 from edge.recording import load
 from edge.skin import file as skinfile
 from edge.tools import fake
@@ -12,27 +11,14 @@ from tests.edge.skin.small import one_chip
 
 
 def test_what_to_rehearse_next_is_said_at_a_terminal(edge, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        Output,
-        "of",
-        classmethod(lambda cls, arguments: cls(arguments.json)),
-    )
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     skin = skinfile.shipped("matrix")
-    status, out, _ = edge(
-        "fake",
-        "--skin",
-        skin,
-        "--out",
-        tmp_path,
-        "--trials",
-        1,
-        text=True,
-    )
+    options = ("--skin", skin, "--out", tmp_path, "--trials", 1)
+    status, out, _ = edge("fake", *options, text=True)
     assert status == 0
     still = tmp_path / "still.npz"
-    asked = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
-    (frames,) = (s for s in out.splitlines() if s.strip().startswith(asked))
-    assert int(frames.split()[-1]) == len(load(still).t)
+    command = f"edge-classify calibrate --skin {skin} --fake {still} --frames "
+    assert f"  {command}{len(load(still).t)}\n" in out
 
 
 def test_plug_serves_the_skin_until_a_signal_and_names_each_device(edge, monkeypatch):
@@ -58,6 +44,5 @@ def test_plug_refuses_a_serial_port_and_a_recording_of_another_skin(tmp_path, re
     skin.write_text(one_chip(1, 2, bus='serial = "/dev/ttyACM0"', at=""))
     err = refused("fake", "--skin", skin, "--plug")
     assert "/dev/ttyACM0 is a serial port" in err
-    given = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
-    err = refused("fake", *given)
-    assert "name its own skin file" in err
+    options = ("--skin", skinfile.shipped("mpr121"), "--plug", demo.recordings()[0])
+    assert "name its own skin file" in refused("fake", *options)

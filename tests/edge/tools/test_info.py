@@ -7,13 +7,12 @@ INFO = Model(demo.MODEL).info
 
 
 def test_a_program_gets_the_metadata_with_size_and_time(edge):
-    status, (said,), _ = edge("info", demo.MODEL)
+    status, (event,), _ = edge("info", demo.MODEL)
     assert status == 0
-    assert said["bytes"] == demo.MODEL.stat().st_size
-    assert said["data_digest"] == INFO.data_digest
-    assert {name: tuple(task["labels"]) for name, task in said["tasks"].items()} == {
-        name: task.labels for name, task in INFO.tasks.items()
-    }
+    assert event["bytes"] == demo.MODEL.stat().st_size
+    assert event["data_digest"] == INFO.data_digest
+    labels = {name: tuple(task["labels"]) for name, task in event["tasks"].items()}
+    assert labels == {name: task.labels for name, task in INFO.tasks.items()}
 
 
 def test_a_person_gets_sentences(edge, monkeypatch):
@@ -27,10 +26,10 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_a_program_gets_what_differs_between_two_models(edge, exported):
-    status, (comparison,), _ = edge("info", exported / "model.onnx", demo.MODEL)
+def test_a_program_gets_what_differs_between_two_models(edge, model):
+    status, (comparison,), _ = edge("info", model.path, demo.MODEL)
     changes = comparison["changes"]
-    info = Model(exported / "model.onnx").info
+    info = model.info
     labels = [list(i.tasks["category"].labels) for i in (info, INFO)]
     assert status == 0
     assert changes["rows"] == [info.rows, INFO.rows]
@@ -39,11 +38,11 @@ def test_a_program_gets_what_differs_between_two_models(edge, exported):
     assert "window_s" not in changes
 
 
-def test_a_person_gets_what_differs_between_two_models(edge, exported, monkeypatch):
+def test_a_person_gets_what_differs_between_two_models(edge, model, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    _, text, _ = edge("info", exported / "model.onnx", demo.MODEL, text=True)
+    _, text, _ = edge("info", model.path, demo.MODEL, text=True)
     out = " ".join(text.split())
-    before = Model(exported / "model.onnx").info.tasks["object"].accuracy
+    before = model.info.tasks["object"].accuracy
     after = INFO.tasks["object"].accuracy
     assert "tasks.category.labels (2 -> 4): + rigid-movable, soft-movable" in out
     assert f"rows: 16 -> {INFO.rows}" in out
@@ -51,5 +50,6 @@ def test_a_person_gets_what_differs_between_two_models(edge, exported, monkeypat
 
 
 def test_a_model_differs_from_itself_in_nothing(edge):
-    said = edge("info", demo.MODEL, demo.MODEL)
-    assert said == (0, [{"event": "comparison", "changes": {}}], "")
+    status, events, _ = edge("info", demo.MODEL, demo.MODEL)
+    assert status == 0
+    assert events == [{"event": "comparison", "changes": {}}]

@@ -40,7 +40,7 @@ def run(edge, folder, *words):
     return edge("run", "--model", demo.MODEL, "--fake", touch, "--keep", folder, *words)
 
 
-def test_a_kept_touch_has_the_frames_and_the_decision(edge, tmp_path):
+def test_a_kept_touch_has_the_decision_and_is_decided_again_as_it_was(edge, tmp_path):
     status, lines, err = run(edge, tmp_path / "kept", "--keep-if", "all")
     assert status == 0
     assert "1 recording kept" in err
@@ -52,13 +52,8 @@ def test_a_kept_touch_has_the_frames_and_the_decision(edge, tmp_path):
     assert list(answers) == decided(lines, "task")
     for key in ("label", "confidence", "flags"):
         assert [answer[key] for answer in answers.values()] == decided(lines, key)
-
-
-def test_a_kept_touch_is_decided_again_as_it_was(edge, tmp_path):
-    _, lines, _ = run(edge, tmp_path, "--keep-if", "all")
-    (path,) = tmp_path.glob("kept-*.npz")
-    _, again, _ = edge("replay", "--model", demo.MODEL, path)
-    assert decided(again, "label") == decided(lines, "label")
+    _, replayed, _ = edge("replay", "--model", demo.MODEL, path)
+    assert decided(replayed, "label") == decided(lines, "label")
 
 
 def test_what_is_sure_is_not_kept(edge, tmp_path):
@@ -69,13 +64,13 @@ def test_what_is_sure_is_not_kept(edge, tmp_path):
 def test_the_oldest_go_first(edge, tmp_path):
     for i in range(3):
         (tmp_path / f"kept-20200101T00000{i}-00000.npz").write_bytes(bytes(400_000))
-    other = tmp_path / "mine.npz"
-    other.write_bytes(bytes(2_000_000))
+    mine = tmp_path / "mine.npz"
+    mine.write_bytes(bytes(2_000_000))
     assert run(edge, tmp_path, "--keep-if", "all", "--keep-mb", 1)[0] == 0
     names = sorted(path.name[5:20] for path in tmp_path.glob("kept-*.npz"))
     assert names[0] == "20200101T000001"
     assert len(names) == 3
-    assert other.exists()
+    assert mine.exists()
 
 
 def test_two_runs_in_one_second_keep_two_touches(edge, tmp_path):

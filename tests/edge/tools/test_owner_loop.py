@@ -2,11 +2,12 @@
 code."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 
-from edge import recording, saving
 from edge.recording import load
+from edge.saving import save
 from edge.skin import file as skinfile
 from tests.conftest import PAPER, decided, export
 
@@ -27,28 +28,28 @@ def skin(tmp_path, forearm):
 @pytest.fixture
 def rest(recordings, tmp_path):
     """A recording in which nothing touches the skin."""
-    first = load(recordings / "hard_0.npz")
-    still = recording.Recording(first.t[:20], first.frames[:20], meta={})
-    saving.save(tmp_path / "rest.npz", still)
+    touch = load(recordings / "hard_0.npz")
+    save(tmp_path / "rest.npz", replace(touch, frames=0 * touch.frames))
     return tmp_path / "rest.npz"
 
 
 def record(edge, skin, touch, trials):
-    words = ["--skin", skin, "--fake", touch, "--out", trials, "--length", 1.3]
-    for task, label in load(touch).labels.items():
-        words += ["--label", f"{task}={label}"]
+    words = [
+        "--skin",
+        skin,
+        "--fake",
+        touch,
+        "--out",
+        trials,
+        "--length",
+        1.3,
+        "--trials",
+        1,
+    ]
+    words += [f"--label={task}={label}" for task, label in load(touch).labels.items()]
     status, (event,), _ = edge("record", *words)
     assert status == 0
     assert event["complete"]
-
-
-def run_and_know(edge, model, skin, touch):
-    """Run, and meet what the model was shown."""
-    status, events, _ = edge("run", "--model", model, "--skin", skin, "--fake", touch)
-    assert status == 0
-    assert decided(events, "task") == ["category", "object"]
-    assert decided(events, "label")[0] == load(touch).labels["category"]
-    assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]
 
 
 def test_record_export_run(edge, skin, rest, recordings, tmp_path, capsys):
@@ -58,17 +59,19 @@ def test_record_export_run(edge, skin, rest, recordings, tmp_path, capsys):
     assert edge("calibrate", *fake, "--frames", 20)[0] == 0
 
     trials = tmp_path / "trials"
-    shown = ("hard_0", "hard_1", "soft_0", "soft_1")
-    for name in shown:
+    for name in ("hard_0", "hard_1", "soft_0", "soft_1"):
         record(edge, skin, recordings / f"{name}.npz", trials)
-    assert len(list(trials.iterdir())) == len(shown)
+    assert len(list(trials.iterdir())) == 4
 
-    export(tmp_path / "build", "--data", trials, *PAPER)
+    export(tmp_path / "build", "--data", trials, *PAPER, "--scaling", "IV")
     capsys.readouterr()
 
     # One file goes to the board; what it was shown it knows again, live.
-    board = tmp_path / "board"
-    board.mkdir()
-    model = shutil.copy(tmp_path / "build" / "model.onnx", board)
-    for name in ("hard_1", "soft_0"):
-        run_and_know(edge, model, skin, recordings / f"{name}.npz")
+    model = shutil.copy(tmp_path / "build" / "model.onnx", tmp_path / "on_board.onnx")
+    command = ("run", "--model", model, "--skin", skin, "--fake")
+    for name, category in {"hard_1": "rigid-fixed", "soft_0": "soft-fixed"}.items():
+        status, events, _ = edge(*command, recordings / f"{name}.npz")
+        assert status == 0
+        assert decided(events, "task") == ["category", "object"]
+        assert decided(events, "label")[0] == category
+        assert [e["event"] for e in events] == ["onset", "decision", "decision", "end"]

@@ -11,7 +11,7 @@ from tests.edge.tools.kept import kept_meta
 
 
 @pytest.mark.parametrize(
-    ("given", "kinds"),
+    ("meta", "kinds"),
     [
         (kept_meta({"a": "x"}, a=("x", 0.9)), []),
         (kept_meta({"a": "x"}, a=("x", 0.8)), []),
@@ -27,25 +27,25 @@ from tests.edge.tools.kept import kept_meta
         ({"labels": {"a": "x"}, "decided": {"a": 5}}, []),
     ],
 )
-def test_a_touch_is_unsure_wrong_or_unlabelled(given, kinds):
-    assert review.kinds(given) == kinds
+def test_a_touch_is_unsure_wrong_or_unlabelled(meta, kinds):
+    assert review.kinds(meta) == kinds
 
 
 def test_what_is_unknown_or_out_of_range_is_not_accepted():
-    given = kept_meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
-    assert review.accepted(given) == {"a": "x"}
+    meta = kept_meta({}, a=("x", 0.9), b=("unknown", 0.9), c=(None, None))
+    assert review.accepted(meta) == {"a": "x"}
 
 
 def test_what_a_person_has_labelled_is_not_accepted_otherwise():
-    given = kept_meta({"a": "y"}, a=("x", 0.9), b=("z", 0.9))
-    assert review.accepted(given) == {"b": "z"}
+    meta = kept_meta({"a": "y"}, a=("x", 0.9), b=("z", 0.9))
+    assert review.accepted(meta) == {"b": "z"}
 
 
 def test_a_recording_is_selected_by_all_words():
-    given = kept_meta({"b": "z"}, a=("x", 0.5))
-    assert review.selected(given, [])
-    assert review.selected(given, ["unsure", "a", "b"])
-    assert not review.selected(given, ["unsure", "c"])
+    meta = kept_meta({"b": "z"}, a=("x", 0.5))
+    assert review.selected(meta, [])
+    assert review.selected(meta, ["unsure", "a", "b"])
+    assert not review.selected(meta, ["unsure", "c"])
 
 
 def test_a_word_that_selects_is_not_empty():

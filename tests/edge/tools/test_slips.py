@@ -25,11 +25,11 @@ def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(label, meant)
 
 
 @pytest.mark.parametrize(
-    ("label", "other"),
+    ("label", "frequent"),
     [("box 1", "box 2"), ("cup", "cap"), ("soft", "hard"), ("chair", "table")],
 )
-def test_labels_that_differ_by_a_number_or_are_short_are_no_slips(label, other):
-    labels = [{"object": other}] * 8 + [{"object": label}] * 2
+def test_labels_that_differ_by_a_number_or_are_short_are_no_slips(label, frequent):
+    labels = [{"object": frequent}] * 8 + [{"object": label}] * 2
     assert slips(labels) == []
 
 

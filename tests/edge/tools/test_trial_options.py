@@ -13,7 +13,7 @@ from edge.touch.arm import Chain
 def files(tmp_path, make_touch, urdf):
     """A URDF of two joints, and a recording of as many angles that names no arm."""
     (tmp_path / "still.toml").write_text('[[joint]]\nname="a"\naxis=[0,0,0]\n')
-    trial = make_touch()
+    trial = make_touch(seconds=0.2)
     swing = np.linspace(0.0, 0.2, len(trial.t))
     trial = replace(trial, joints=np.column_stack([swing, 0.5 + swing]))
     saving.save(tmp_path / "two.npz", trial)
@@ -21,66 +21,47 @@ def files(tmp_path, make_touch, urdf):
 
 
 @pytest.fixture
-def record(edge, files):
+def record(edge, files, monkeypatch):
     """Record the fake touch as a user does; returns status, stdout's lines and
     stderr."""
-    given = (
-        "--label",
-        "object=a",
-        "--fake",
-        files / "two.npz",
-        "--out",
-        files / "out.npz",
-    )
-    return lambda *options: edge("record", *given, *options)
+    monkeypatch.chdir(files)
+    words = "--label object=a --fake two.npz --out out.npz".split()
+    return lambda options: edge("record", *words, *options.split())
 
 
-def test_a_trial_keeps_the_chain_of_a_urdf_or_of_a_toml_file(files, record):
-    given = ("--arm", files / "arm.urdf", "--base", "base", "--tip", "lower")
-    status, (event,), _ = record(*given)
+def recorded_arm():
+    return Chain.from_dict(recording.load("out.npz").meta["arm"])
+
+
+def test_a_trial_keeps_the_chain_of_a_urdf(record):
+    status, (event,), _ = record("--arm arm.urdf --base base --tip lower")
     assert status == 0
     assert event["joints"]
-    kept = Chain.from_dict(recording.load(files / "out.npz").meta["arm"])
-    assert kept.names == ("shoulder", "elbow")
-    assert kept.pose([0.0, 0.0])[0, 3] == 0.3
-    (files / "out.npz").unlink()
-    (files / "arm.toml").write_text(
-        '[[joint]]\nname="a"\naxis=[0,0,1]\n[[joint]]\nname="b"\naxis=[0,1,0]\n'
-    )
-    assert record("--arm", files / "arm.toml")[0] == 0
-    assert Chain.from_dict(recording.load(files / "out.npz").meta["arm"]).names == (
-        "a",
-        "b",
-    )
+    assert recorded_arm().names == ("shoulder", "elbow")
+    assert recorded_arm().pose([0.0, 0.0])[0, 3] == 0.3
+
+
+def test_a_trial_keeps_the_chain_of_a_toml_file(files, record):
+    joint = '[[joint]]\nname="{}"\naxis=[0,0,1]\n'
+    (files / "arm.toml").write_text(joint.format("a") + joint.format("b"))
+    assert record("--arm arm.toml")[0] == 0
+    assert recorded_arm().names == ("a", "b")
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "sentence"),
     [
-        (["--arm", "arm.urdf"], "a URDF needs --base and --tip"),
-        (["--arm", "arm.urdf", "--base", "base", "--tip", "hand"], "no link 'hand'"),
-        (
-            ["--arm", "arm.urdf", "--base", "base", "--tip", "upper"],
-            "gives 2 joint angles",
-        ),
-        (
-            ["--arm", "arm.toml", "--tip", "skin"],
-            "--base and --tip are for a .urdf file",
-        ),
-        (["--arm", "none.toml"], "none.toml: cannot be read"),
-        (["--arm", "still.toml"], "still.toml: joint a: its axis is zero"),
-        (["--tip", "skin"], "--base and --tip need --arm arm.urdf"),
+        ("--arm arm.urdf", "a URDF needs --base and --tip"),
+        ("--arm arm.urdf --base base --tip hand", "no link 'hand'"),
+        ("--arm arm.urdf --base base --tip upper", "gives 2 joint angles"),
+        ("--arm arm.toml --tip skin", "--base and --tip are for a .urdf file"),
+        ("--arm none.toml", "none.toml: cannot be read"),
+        ("--arm still.toml", "still.toml: joint a: its axis is zero"),
+        ("--tip skin", "--base and --tip need --arm arm.urdf"),
     ],
 )
-def test_an_arm_that_cannot_be_used_is_refused(
-    files,
-    record,
-    options,
-    said,
-    monkeypatch,
-):
-    monkeypatch.chdir(files)
-    status, _, err = record(*options)
+def test_an_arm_that_cannot_be_used_is_refused(files, record, options, sentence):
+    status, _, err = record(options)
     assert status == 2
-    assert said in err
+    assert sentence in err
     assert not (files / "out.npz").exists()

@@ -5,16 +5,32 @@ import pytest
 from edge.tools import workstation
 
 
+@pytest.fixture
+def root(monkeypatch, tmp_path):
+    """The working directory, which seems to hold the package `edge`."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("edge.__file__", str(tmp_path / "edge" / "__init__.py"))
+    return tmp_path
+
+
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("package", "words", "output"),
     [
-        (["simulate", "--help"], "usage: train simulate"),
-        (["export", "--help"], "usage: export"),
+        ("train", ["simulate", "a b.toml"], "['simulate', 'a b.toml']\n"),
+        ("export", ["export", "--k", "3"], "['--k', '3']\n"),
     ],
 )
-def test_a_command_of_the_workstation_runs_in_the_checkout(words, said, capfd):
+def test_a_command_of_the_workstation_runs_in_the_checkout(
+    root,
+    package,
+    words,
+    output,
+    capfd,
+):
+    (root / package).mkdir()
+    (root / package / "__main__.py").write_text("import sys\nprint(sys.argv[1:])\n")
     assert workstation.run(words) == 0
-    assert said in capfd.readouterr().out
+    assert capfd.readouterr().out == output
 
 
 def test_the_exit_status_is_that_of_the_command(capfd):
@@ -22,11 +38,6 @@ def test_the_exit_status_is_that_of_the_command(capfd):
     assert "none.toml" in capfd.readouterr().err
 
 
-def test_where_there_is_no_checkout_it_says_where_the_command_runs(
-    monkeypatch,
-    tmp_path,
-    capsys,
-):
-    monkeypatch.setattr("edge.__file__", str(tmp_path / "edge" / "__init__.py"))
+def test_where_there_is_no_checkout_it_says_where_the_command_runs(root, capsys):
     assert workstation.run(["export"]) == 2
     assert "runs on the workstation, in a checkout" in capsys.readouterr().err
