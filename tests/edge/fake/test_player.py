@@ -17,13 +17,10 @@ from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 
 
-def noise(shape, n=20, top=65536):
-    frames = (
-        np.random.default_rng(sum(shape))
-        .integers(0, top, (n, *shape))
-        .astype(np.uint16)
-    )
-    return Recording(np.arange(n) / 100.0, frames)
+def noise(shape, top=65536):
+    rng = np.random.default_rng(sum(shape))
+    frames = rng.integers(0, top, (20, *shape), dtype=np.uint16)
+    return Recording(np.arange(20) / 100.0, frames)
 
 
 @pytest.mark.parametrize("shape", [(16, 24), (13, 6), (1, 1), (100, 90)])
@@ -41,12 +38,9 @@ def test_raw_values_saturate_as_a_chip_does():
     recording = noise((16, 24))
     file = skin_file(recording.layout)
     file = replace(file, signal=replace(file.signal, saturation_counts=65535))
-    skin, _ = play(file, recording)
-    with skin:
-        counts = skin.read().counts
-    np.testing.assert_array_equal(
-        counts, np.minimum(recording.frames[0], 65534 - 20946)
-    )
+    expected = np.minimum(recording.frames[0], 65534 - 20946)
+    with play(file, recording)[0] as skin:
+        np.testing.assert_array_equal(skin.read().counts, expected)
 
 
 def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
@@ -108,7 +102,6 @@ def test_a_paced_clock_is_no_faster_than_real_time_and_goes_on_without_a_loop_th
 
 
 def test_a_recording_of_another_shape_is_refused():
-    with pytest.raises(
-        InputError, match="3 x 3 taxels, the skin 'cody forearm' 16 x 24"
-    ):
-        play(skinfile.load(skinfile.shipped("cody")), noise((3, 3)))
+    cody = skinfile.load(skinfile.shipped("cody"))
+    with pytest.raises(InputError, match="3 x 3 taxels, the skin 'cody forearm' 16"):
+        play(cody, noise((3, 3)))

@@ -15,24 +15,22 @@ from tests.edge.skin.small import one_chip
 
 def wide(pitch=0.01, wraps="false"):
     """The file of a skin of 120 x 30 taxels."""
-    known = "counts_per_newton = 1000.0\nthreshold_counts = 1"
-    return one_chip(120, 30, skin=f"pitch_m = {pitch}\nwraps = {wraps}\n{known}")
+    scale = "counts_per_newton = 1000.0\nthreshold_counts = 1"
+    return one_chip(120, 30, skin=f"pitch_m = {pitch}\nwraps = {wraps}\n{scale}")
 
 
-def made(pitch, *, wraps="false", trials=1, seed=0):
-    return dict(touches.touches(parse(wide(pitch, wraps)), trials=trials, seed=seed))
+def on_ring(pitch):
+    """A touch of each contact on such a skin that is closed around."""
+    return dict(touches.touches(parse(wide(pitch, "true")), trials=1))
 
 
 @pytest.mark.parametrize("pitch", [0.004, 0.01, 0.02])
 def test_the_force_of_a_contact_is_kept_whatever_the_pitch(pitch):
     """But for its strength, which a trial draws; on a ring nothing falls off beside."""
-    for path in demo.recordings():
-        source = load(path)
-        recording = made(pitch, wraps="true")[f"{path.stem}-000"]
-        strength = (
-            recording.frames.sum(axis=(1, 2)).max()
-            / source.frames.sum(axis=(1, 2)).max()
-        )
+    sources = map(load, demo.recordings())
+    for source, touch in zip(sources, on_ring(pitch).values(), strict=True):
+        before, after = (r.frames.sum(axis=(1, 2)).max() for r in (source, touch))
+        strength = after / before
         assert touches.STRENGTH[0] - 0.05 < strength < touches.STRENGTH[1] + 0.05
 
 
@@ -47,9 +45,10 @@ def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
         )
 
     coarse, fine = (
-        made(p, wraps="true")["cardboard-box-fixed-000"] for p in (0.01, 0.005)
+        spread(on_ring(pitch)["cardboard-box-fixed-000"], pitch)
+        for pitch in (0.01, 0.005)
     )
-    assert spread(fine, 0.005) == pytest.approx(spread(coarse, 0.01), rel=0.1)
+    assert fine == pytest.approx(coarse, rel=0.1)
 
 
 def test_every_contact_begins_and_goes_on_for_a_window_on_a_skin_whose_scale_is_unknown():
@@ -63,17 +62,19 @@ def test_every_contact_begins_and_goes_on_for_a_window_on_a_skin_whose_scale_is_
 
 
 def test_trials_differ_and_the_same_seed_gives_the_same():
-    first_set = made(0.01, trials=2)
-    again = made(0.01, trials=2)
-    other = made(0.01, seed=1)
-    assert len(first_set) == 8
-    for name, recording in first_set.items():
-        assert np.array_equal(recording.frames, again[name].frames)
-    first = first_set["pillow-movable-000"].frames
-    assert not np.array_equal(
-        first, first_set["pillow-movable-001"].frames[: len(first)]
+    file = skinfile.load(skinfile.shipped("mpr121"))
+    frames, repeated, reseeded = (
+        {name: touch.frames for name, touch in touches.touches(file, **options)}
+        for options in ({"trials": 2}, {"trials": 2}, {"trials": 1, "seed": 1})
     )
-    assert not np.array_equal(first, other["pillow-movable-000"].frames[: len(first)])
+    assert len(frames) == 8
+    for name, counts in frames.items():
+        assert np.array_equal(counts, repeated[name])
+    first = frames["pillow-movable-000"]
+    second = frames["pillow-movable-001"]
+    with_seed = reseeded["pillow-movable-000"]
+    assert not np.array_equal(first, second[: len(first)])
+    assert not np.array_equal(first, with_seed[: len(first)])
 
 
 def test_taxels_without_a_chip_are_not_valid():

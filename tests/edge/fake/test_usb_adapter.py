@@ -17,27 +17,27 @@ READ = 1
 FIRST, LAST = 1, 2  # of a call's messages, added to request 4
 
 
+UNLINK = struct.pack(">6I24x", 2, 8, 0x10002, 0, 0, 7)
+
+
 def adapter(*faults):
     return UsbAdapter(FaultyBus(chips={MUX: FakeTCA9548A()}, faults=faults))
 
 
-def submit(kind, request, value=0, index=0, length=0, data=b"", number=7):
+def submit(kind, request, value=0, index=0, length=0, data=b""):
     """A USBIP_CMD_SUBMIT of a control request: header, set-up bytes, data."""
-    to_host = kind >> 7
-    setup = struct.pack("<BBHHH", kind, request, value, index, len(data) or length)
-    header = struct.pack(">5I", 1, number, 0x10002, to_host, 0)
-    return (
-        header + struct.pack(">Iiiii", 0, len(data) or length, 0, 0, 0) + setup + data
-    )
+    length = len(data) or length
+    header = struct.pack(">6Ii12x", 1, 7, 0x10002, kind >> 7, 0, 0, length)
+    return header + struct.pack("<BBHHH", kind, request, value, index, length) + data
 
 
 def answer(adapter, *request, **more):
     """Status, length done and data of the reply to a request."""
     reply = adapter.reply(submit(*request, **more))
-    command, number, *_, status, done = struct.unpack_from(">5Iii", reply)
+    command, number, *_, status, length = struct.unpack_from(">5Iii", reply)
     assert command == 3
     assert number == 7
-    return status, done, reply[48:]
+    return status, length, reply[48:]
 
 
 def message_out(adapter, data, place=FIRST | LAST, address=MUX):
@@ -55,9 +55,9 @@ def acknowledged(adapter):
 
 
 def test_the_descriptors_name_the_device_that_the_driver_looks_for():
-    status, done, device = answer(adapter(), 0x80, 6, 0x0100, length=18)
+    status, length, device = answer(adapter(), 0x80, 6, 0x0100, length=18)
     assert status == 0
-    assert done == 18
+    assert length == 18
     assert device[8:12] == bytes.fromhex("030431c6")
     assert answer(adapter(), 0x80, 6, 0x0200, length=9)[2][:4] == bytes([9, 2, 18, 0])
     assert len(answer(adapter(), 0x80, 6, 0x0200, length=18)[2]) == 18
@@ -99,15 +99,8 @@ def test_a_broken_transfer_and_a_read_before_other_messages_stall_the_request_an
 def test_a_hung_bus_leaves_a_request_without_an_answer_until_the_kernel_gives_it_up():
     usb = adapter(Fault(code=errno.ETIMEDOUT, at=[0]))
     assert usb.reply(submit(0x41, 7, 0, MUX, data=b"\x04")) == b""
-    unlink = struct.pack(">6I", 2, 8, 0x10002, 0, 0, 7).ljust(48, b"\0")
-    assert struct.unpack_from(">5Ii", usb.reply(unlink)) == (
-        4,
-        8,
-        0,
-        0,
-        0,
-        -errno.ECONNRESET,
-    )
+    expected = struct.pack(">5Ii24x", 4, 8, 0, 0, 0, -errno.ECONNRESET)
+    assert usb.reply(UNLINK) == expected
 
 
 @pytest.mark.parametrize("request_", [(0x80, 6, 0x0300), (0x41, 99), (0x00, 3)])
@@ -118,7 +111,7 @@ def test_an_unknown_request_is_stalled(request_):
 def test_data_follow_a_request_that_brings_some_and_no_other():
     assert data_length(submit(0x41, 7, data=b"abc")) == 3
     assert data_length(submit(0xC1, 7, length=3)) == 0
-    assert data_length(struct.pack(">6I", 2, 8, 0, 0, 0, 7).ljust(48, b"\0")) == 0
+    assert data_length(UNLINK) == 0
 
 
 STATUS = """\
