@@ -27,6 +27,7 @@ from edge.recording import load
 from edge.saving import find
 from edge.writing import PREFIX
 from tests.bench import tables
+from tests.conftest import ended
 from train.touch_map import TouchMap
 
 EDGE = (sys.executable, "-m", "edge")
@@ -55,17 +56,6 @@ class Victim:
     command: Callable[[Path], Sequence[object]]
     complaint: Callable[[Path], str]
     finished: Callable[[Path, str], str]
-
-
-def output_of(*words):
-    """Run a command to its end."""
-    return subprocess.run(
-        list(map(str, words)),
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
 
 
 def loadable(folder):
@@ -115,7 +105,7 @@ def all_or_none(folder, printed):
 def agreeing(folder, printed):
     """The model and its golden file belong together."""
     files = ("--model", folder / "model.onnx", "--golden", folder / "golden.npz")
-    result = output_of(*EDGE, "verify", *files)
+    result = ended(*EDGE, "verify", *files, timeout=PATIENCE_S)
     return f"{result.stdout}{result.stderr}" if result.returncode else ""
 
 
@@ -263,7 +253,7 @@ def killed_once(victim, moment):
         alive = killed(command, folder, moment)
         left = temporaries(folder)
         complaint = victim.complaint(folder)
-        second_run = output_of(*command)
+        second_run = ended(*command, timeout=PATIENCE_S)
         if second_run.returncode:
             complaint += second_run.stderr
         complaint += victim.finished(folder, second_run.stderr)
@@ -278,7 +268,7 @@ def whole_s(victim):
     with tempfile.TemporaryDirectory() as folder:
         victim.prepare(Path(folder))
         began = time.perf_counter()
-        result = output_of(*victim.command(Path(folder)))
+        result = ended(*victim.command(Path(folder)), timeout=PATIENCE_S)
         assert result.returncode == 0, result.stderr
         return time.perf_counter() - began
 

@@ -17,6 +17,7 @@ from collections import Counter
 from random import Random
 
 from edge.commands.options import within
+from tests.conftest import ended
 
 MUTMUT = (sys.executable, "-m", "mutmut")
 UNNOTICED = ("survived", "no tests")
@@ -24,13 +25,7 @@ UNNOTICED = ("survived", "no tests")
 
 def output(*arguments):
     """The output of a mutmut command; its errors pass through."""
-    process = subprocess.run(
-        [*MUTMUT, *arguments],
-        check=True,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    return process.stdout
+    return subprocess.check_output([*MUTMUT, *arguments], text=True)
 
 
 def statuses():
@@ -47,12 +42,7 @@ def generate():
     """
     # mutmut copies tests anew, but leaves those that were deleted here since.
     shutil.rmtree("mutants/tests", ignore_errors=True)
-    process = subprocess.run(
-        [*MUTMUT, "run", "no such mutant"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    process = ended(*MUTMUT, "run", "no such mutant")
     if "nothing matches" not in process.stderr:
         raise SystemExit(process.stdout + process.stderr)
 

@@ -73,10 +73,8 @@ def test_nothing_pickles(package):
 
 
 PACKAGES = ["edge", "train", "export"]
-FRAME = [
-    f"edge.{s}"
-    for s in "bus chips skin touch model classifier output commands tools".split()
-]
+ROOMS = "bus chips skin touch model classifier output commands tools"
+FRAME = [f"edge.{room}" for room in ROOMS.split()]
 """The way of one frame through `edge/`."""
 TOUCH = [
     f"edge.touch.{s}" for s in "frame layout active measures track features".split()
@@ -95,9 +93,8 @@ def test_a_stage_imports_only_earlier_ones(stage, later):
     passed_on = set() if stage in TOUCH else OF_A_FRAME
     for module in sorted(path.rglob("*.py")) or [path.with_suffix(".py")]:
         for name in at_the_top(module) - passed_on:
-            assert not any(f"{name}.".startswith(f"{room}.") for room in later), (
-                f"{module}: {name}"
-            )
+            rooms = tuple(f"{room}." for room in later)
+            assert not f"{name}.".startswith(rooms), f"{module}: {name}"
 
 
 @pytest.mark.parametrize(

@@ -61,11 +61,6 @@ def test_each_table_is_on_a_page_and_each_link_has_its_table():
     assert sorted(linked) == sorted(TABLES)
 
 
-def test_a_page_of_the_site_includes_its_tables():
-    text = tables.markdown([{"a": 1, "b": "x"}, {"a": 2, "b": "y"}])
-    assert text == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | y |"
-
-
 def test_every_hard_case_is_in_its_table():
     _, *markdown_tables = TABLES["hard_cases"].rstrip().split("\n\n")
     assert len(markdown_tables) == 2

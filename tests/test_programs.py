@@ -78,8 +78,8 @@ def written(monkeypatch, tmp_path):
 
 
 def test_a_table_without_a_row_is_left_out(written):
-    lines = written([[], [{"a": 1}], []])
-    assert lines[1:] == ["", "| a |", "| --- |", "| 1 |"]
+    lines = written([[], [{"a": 1, "b": "x"}, {"a": 2, "b": "y"}], []])
+    assert lines[1:] == ["", "| a | b |", "| --- | --- |", "| 1 | x |", "| 2 | y |"]
 
 
 def test_the_command_of_a_table_can_be_run_as_it_is_written(written):

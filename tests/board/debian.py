@@ -3,12 +3,13 @@ anything."""
 
 import os
 import shutil
-import subprocess
 from contextlib import contextmanager
 from pathlib import Path
 from string import Template
 
 import pytest
+
+from tests.conftest import ended
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 APT = Template((CHECKOUT / "tests" / "board" / "apt.conf").read_text())
@@ -77,12 +78,8 @@ def program(system, name):
     libraries."""
     loader = next(system.glob("lib*/ld-linux*"))
     libraries = {str(path.parent) for path in system.rglob("*-linux-gnu*/lib*.so.*")}
-    return [
-        str(loader),
-        "--library-path",
-        ":".join(libraries),
-        f"{system}/usr/bin/{name}",
-    ]
+    paths = ["--library-path", ":".join(libraries)]
+    return [str(loader), *paths, f"{system}/usr/bin/{name}"]
 
 
 def run(command, hint=""):
@@ -92,7 +89,7 @@ def run(command, hint=""):
         Unavailable: it fails; the sentence has the hint and the command's last words.
     """
     try:
-        process = subprocess.run(command, check=False, capture_output=True, text=True)
+        process = ended(*command)
     except FileNotFoundError:
         raise Unavailable(
             f"{command[0]} is not on this machine; use Debian or Ubuntu"

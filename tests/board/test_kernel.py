@@ -20,6 +20,7 @@ import pytest
 from edge.demo import MODEL
 from edge.skin import file as skinfile
 from tests.board.debian import CHECKOUT, Unavailable, program, skipping, unpacked
+from tests.conftest import ended
 
 FOLDER = CHECKOUT / "build" / "kernel"
 PACKAGES = ("qemu-system-x86", "linux-image-amd64", "busybox-static")
@@ -68,17 +69,14 @@ def run_in_guest(command):
     qemu = ["timeout", str(LONGEST_S), *program(system, "qemu-system-x86_64")]
     qemu += QEMU.format(system=system, kernel=kernel, initrd=initrd).split()
     accelerators = next(system.rglob("accel-tcg-x86_64.so")).parent
-    process = subprocess.run(
-        [*qemu, "console=ttyS0 panic=-1 quiet"],
-        env={**os.environ, "QEMU_MODULE_DIR": str(accelerators)},
-        check=False,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-    )
-    printed, ended, rest = process.stdout.decode(errors="replace").rpartition(ENDED)
-    if not ended:
+    environment = {**os.environ, "QEMU_MODULE_DIR": str(accelerators)}
+    options = {"stdin": subprocess.DEVNULL, "errors": "replace"}
+    qemu.append("console=ttyS0 panic=-1 quiet")
+    process = ended(*qemu, env=environment, **options)
+    printed, end, rest = process.stdout.rpartition(ENDED)
+    if not end:
         raise RuntimeError(
-            f"the guest did not reach its end:\n{rest}\n{process.stderr.decode()}"
+            f"the guest did not reach its end:\n{rest}\n{process.stderr}"
         )
     return int(rest.split()[0]), printed
 
@@ -124,11 +122,8 @@ def skins(tmp_path_factory):
     fake = f"edge fake --skin {folder}/pad.toml --out {touches}"
     export = f"export --data {touches}/touches --out {touches} --features paper --projection pca"
     for command in (fake, f"{export} --decision-points none"):
-        subprocess.run(
-            [sys.executable, "-m", *command.split()],
-            cwd=CHECKOUT,
-            check=True,
-        )
+        words = [sys.executable, "-m", *command.split()]
+        subprocess.run(words, cwd=CHECKOUT, check=True)
     shutil.copy(touches / "model.onnx", folder / "pad.onnx")
     shutil.copy(MODEL, folder / "cody.onnx")
     return folder

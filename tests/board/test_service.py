@@ -71,9 +71,8 @@ class Machine:
 
     def wait_for(self, **expected):
         """The unit's properties once they are as expected, or the last ones."""
-        return self.once(
-            self.properties, lambda state: expected.items() <= state.items()
-        )
+        keys = expected.items()
+        return self.once(self.properties, lambda state: keys <= state.items())
 
     def restart(self, arguments):
         """Start the service anew with these arguments."""
@@ -106,11 +105,8 @@ def started(machine):
 
 
 def test_the_unit_is_valid(machine):
-    printed = machine.run(
-        "bash",
-        "-c",
-        f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?",
-    )
+    verify = f"systemd-analyze verify /run/units/{UNIT} 2>&1; echo $?"
+    printed = machine.run("bash", "-c", verify)
     assert printed.splitlines()[-1] == "0", printed
 
 

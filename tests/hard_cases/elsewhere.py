@@ -45,17 +45,11 @@ def ask(golden, python, path=""):
     # -P: the current folder, which may be the checkout, offers no modules.
     command = [*python, "-P", "-c", GUEST, *map(str, sets(golden))]
     environment = {**os.environ, "PYTHONPATH": path}
-    process = subprocess.run(
-        command,
-        env=environment,
-        stdout=subprocess.PIPE,
-        text=True,
-        check=True,
-    )
+    text = subprocess.check_output(command, env=environment, text=True)
     machine = {}
     shares = {}
     name = ""
-    for line in map(json.loads, process.stdout.splitlines()):
+    for line in map(json.loads, text.splitlines()):
         if line["event"] == "set":
             name = line["name"]
         elif line["event"] == "check":
