@@ -43,3 +43,15 @@ def as_counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
             f"scale={factor:g}), with the same scale for all recordings"
         )
     return frames.astype(np.uint16)
+
+
+def in_rows(frames: NDArray[Any], rows: Any, cols: Any) -> NDArray[Any]:
+    """Flat frames (n, rows * cols) as (n, rows, cols).
+
+    Raises:
+        InputError: the numbers of rows and columns are not those of the frames.
+    """
+    whole = type(rows) is int and type(cols) is int
+    if not (whole and rows > 0 and rows * cols == frames.shape[1]):
+        raise InputError('frames are flat; give their "rows" and "cols" in meta.skin')
+    return frames.reshape(len(frames), rows, cols)

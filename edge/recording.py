@@ -66,8 +66,8 @@ class Recording:
     @property
     def layout(self) -> SkinLayout:
         """The skin with which the trial was recorded."""
-        skin = {"rows": self.frames.shape[1], "cols": self.frames.shape[2]}
-        skin |= self.meta.get("skin", {})
+        _, rows, cols = self.frames.shape
+        skin = {"rows": rows, "cols": cols, **self.meta.get("skin", {})}
         if self.shear is not None:
             skin["axes"] = 3
         return SkinLayout.from_dict(skin)
@@ -188,7 +188,9 @@ def _frames(
 
         frames = as_counts(frames, scale)
     if frames.ndim == 2:
-        frames = _in_rows(frames, skin.get("rows"), skin.get("cols"))
+        from edge.counts import in_rows  # few files hold flat frames
+
+        frames = in_rows(frames, skin.get("rows"), skin.get("cols"))
     if frames.dtype != np.uint16 or frames.ndim != 3:
         raise InputError(
             f"frames must be uint16 counts (n, rows, cols), not {frames.dtype} "
@@ -197,14 +199,6 @@ def _frames(
     if 0 in frames.shape:
         raise InputError(f"frames are empty {frames.shape}; record at least one frame")
     return frames
-
-
-def _in_rows(frames: NDArray[Any], rows: Any, cols: Any) -> NDArray[Any]:
-    """Flat frames (n, rows * cols) as (n, rows, cols)."""
-    whole = type(rows) is int and type(cols) is int
-    if not (whole and rows > 0 and rows * cols == frames.shape[1]):
-        raise InputError('frames are flat; give their "rows" and "cols" in meta.skin')
-    return frames.reshape(len(frames), rows, cols)
 
 
 def _times(values: Any, frames: int) -> NDArray[np.float64]:
@@ -367,12 +361,11 @@ def warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
     rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
     if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-        likely = [
-            u
-            for u, factor in units.items()
-            if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ
-        ]
-        guess = f", and these may be in {likely[0]}" if likely else ""
+        guess = ""
+        for unit, factor in units.items():
+            if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ:
+                guess = f", and these may be in {unit}"
+                break
         LOG.warning(
             f"{name}: has a median of {rate_hz:g} frames a second; t is in "
             f"seconds{guess}"

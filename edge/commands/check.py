@@ -84,8 +84,9 @@ def remarks(file: SkinFile) -> Iterator[str]:
             "pitch_m is missing: motion is measured in taxels, and joint angles cannot "
             "be used"
         )
-    if file.uncovered:
-        yield f"taxels without a chip, which are never valid: {file.uncovered}"
+    uncovered = file.layout.rows * file.layout.cols - len(file.served)
+    if uncovered:
+        yield f"taxels without a chip, which are never valid: {uncovered}"
     yield from _remarks_of_muxes(file)
     if any(bus.serial for bus in file.buses) and find_spec("serial") is None:
         yield "pyserial is not installed: run `pip install pyserial`"

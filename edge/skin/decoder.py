@@ -4,7 +4,6 @@ these to counts above a baseline that follows slow drift, in integers: results r
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,16 +36,16 @@ class TaxelMap:
         stage: (taxels,) index of its stage among the stages of all chips.
         chip: (taxels,) index of its chip.
         sign: (taxels,) 1 where a touch raises the raw value, -1 where it lowers it.
-        lowest: (taxels,) the smallest raw value that a touch can reach.
-        span: (taxels,) from there to the largest.
+        lowest, highest: (taxels,) the smallest and the largest raw value that a touch
+            can reach.
         served: (taxels,) which have a chip and are not dead.
     """
 
     stage: NDArray[np.intp]
     chip: NDArray[np.intp]
     sign: NDArray[np.int32]
-    lowest: NDArray[np.uint16]
-    span: NDArray[np.uint16]
+    lowest: NDArray[np.int64]
+    highest: NDArray[np.int64]
     served: NDArray[np.bool_]
 
 
@@ -67,20 +66,12 @@ def taxel_map(file: SkinFile) -> TaxelMap:
     if file.calibration is not None:
         rest = file.calibration.baseline.ravel().astype(np.int64)
         reach = file.signal.saturation_counts + file.signal.drift_limit_counts
-        lowest = np.maximum(rest - reach, 0)
+        lowest = rest - reach
         highest = np.minimum(highest, rest + reach)
-    span = (highest - lowest).astype(np.uint16)
     served = chip_of < len(chips)
     for row, col in file.signal.dead:
         served[row * file.layout.cols + col] = False
-    return TaxelMap(
-        stage,
-        chip_of,
-        sign[chip_of],
-        lowest.astype(np.uint16),
-        span,
-        served,
-    )
+    return TaxelMap(stage, chip_of, sign[chip_of], lowest, highest, served)
 
 
 def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -191,8 +182,7 @@ class Decoder:
         taxels = self.taxels
         self.values = self._raw.take(taxels.stage)
         self.times = read_at.take(taxels.chip)
-        # A value under the lowest wraps round to above every span.
-        reached = self.values - taxels.lowest <= taxels.span
+        reached = (taxels.lowest <= self.values) & (self.values <= taxels.highest)
         intact = self._intact.take(taxels.stage) & reached
         damaged[taxels.chip[~intact & taxels.served]] = True
         for number in np.flatnonzero(fresh).tolist():
@@ -224,55 +214,36 @@ class Decoder:
 class Baseline:
     """The rest values of n taxels.
 
-    Each call of `follow` moves them by at most `step_counts` towards the raw values,
-    and never more than `limit` counts away from the calibration. Without calls they
-    stay.
+    Each call of `follow` moves them by at most a step towards the raw values, and never
+    further from the calibration than the signal's limit. Without calls they stay.
     """
 
     def __init__(
         self,
+        signal: Signal,
+        rate_hz: float,
         rest: ArrayLike,
-        *,
+        noise: ArrayLike = 0.0,
         sign: ArrayLike = 1,
-        dead_band: ArrayLike = 1,
-        step_counts: float = 0.0,
-        limit: int = 0,
     ) -> None:
         """Start from a calibration.
 
         Args:
+            signal: its dead band, and the rate and the limit of its drift apply.
+            rate_hz: steps a second; a step is rounded up to 1/4096 count.
             rest: (n,) raw counts with nothing touching.
+            noise: (n,) or a scalar, standard deviations of the values.
             sign: (n,) or a scalar, 1 where a touch raises the raw value, -1 where it
                 lowers it.
-            dead_band: (n,) or a scalar, counts under which a taxel reads 0.
-            step_counts: length of a step; rounded up to 1/4096 count.
-            limit: greatest distance from `rest`, in counts.
         """
-        self._rest = np.array(rest, dtype=np.int32) << SCALE_BITS
-        self._now = self._rest.copy()
+        self._now = np.array(rest, dtype=np.int32) << SCALE_BITS
         self._sign = np.asarray(sign, dtype=np.int32)
-        self._dead = np.asarray(dead_band, dtype=np.int32)
+        self._dead = dead_band(signal, noise)
+        step_counts = signal.drift_counts_per_s / rate_hz
         self._step = int(np.ceil(step_counts * (1 << SCALE_BITS)))
-        self._low = self._rest - (limit << SCALE_BITS)
-        self._high = self._rest + (limit << SCALE_BITS)
-
-    @classmethod
-    def of(
-        cls,
-        file: SkinFile,
-        rest: ArrayLike,
-        noise: ArrayLike,
-        sign: ArrayLike = 1,
-    ) -> Self:
-        """The baseline of a skin's values, from their rest values and noise."""
-        signal = file.signal
-        return cls(
-            rest,
-            sign=sign,
-            dead_band=dead_band(signal, noise),
-            step_counts=signal.drift_counts_per_s / file.reading.rate_hz,
-            limit=signal.drift_limit_counts,
-        )
+        limit = signal.drift_limit_counts << SCALE_BITS
+        self._low = self._now - limit
+        self._high = self._now + limit
 
     @property
     def counts(self) -> NDArray[np.int32]:

@@ -90,8 +90,8 @@ class SkinFile:
     name: str
     layout: SkinLayout
     buses: tuple[BusSpec, ...]
-    signal: Signal = field(default_factory=Signal)
-    reading: Reading = field(default_factory=Reading)
+    signal: Signal = Signal()
+    reading: Reading = Reading()
     calibration: TaxelCalibration | None = None
     path: str = "skin"
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
@@ -106,11 +106,6 @@ class SkinFile:
     def served(self) -> list[int]:
         """The flat indices of the taxels that have a chip."""
         return [taxel for chip in self.chips for taxel in chip.served]
-
-    @property
-    def uncovered(self) -> int:
-        """Number of taxels that no chip serves."""
-        return self.layout.rows * self.layout.cols - len(self.served)
 
 
 def load(path: str | os.PathLike[str]) -> SkinFile:

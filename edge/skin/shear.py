@@ -46,7 +46,8 @@ class ShearReader:
             rest = calibration.shear_baseline
         if calibration is not None and calibration.shear_noise is not None:
             noise = calibration.shear_noise.ravel()
-        self._baseline = SignedBaseline.of(file, rest.ravel(), noise)
+        rate_hz = file.reading.rate_hz
+        self._baseline = SignedBaseline(file.signal, rate_hz, rest.ravel(), noise)
 
     def read(self, valid: NDArray[np.bool_], *, settled: bool) -> NDArray[np.int16]:
         """The frame's shear (rows, cols, 2); 0 of taxels that are not valid.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
@@ -17,7 +17,7 @@ from edge.clock import Clock, SystemClock
 from edge.errors import EdgeError, InputError
 from edge.skin.bus_reader import LONGEST_STEP_S, OLDEST_FRAMES, BusReader, State
 from edge.skin.decoder import Baseline, Decoder
-from edge.skin.file import SkinFile, load
+from edge.skin.file import SkinFile, TaxelCalibration, load
 from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 
@@ -84,20 +84,25 @@ class Skin:
             for bus, spec in zip(buses, file.buses, strict=True)
         ]
         self._slots = [slot for reader in self.readers for slot in reader.slots]
-        taxels = file.layout.rows * file.layout.cols
-        rest: ArrayLike = np.zeros(taxels)
-        noise: ArrayLike = 0.0
-        if file.calibration is not None:
-            rest = file.calibration.baseline.ravel()
-            noise = file.calibration.noise.ravel()
-        self.baseline = Baseline.of(file, rest, noise, self._decoder.taxels.sign)
+        shape = file.layout.shape
+        zeros = np.zeros(shape)
+        calibration = file.calibration or TaxelCalibration(
+            zeros.astype(np.uint16), zeros
+        )
+        self.baseline = Baseline(
+            file.signal,
+            file.reading.rate_hz,
+            calibration.baseline.ravel(),
+            calibration.noise.ravel(),
+            self._decoder.taxels.sign,
+        )
         self._shear = None
         if file.layout.axes:
             from edge.skin.shear import ShearReader  # few skins have three axes
 
             self._shear = ShearReader(file, self._decoder.rows)
-        self._valid = np.zeros(file.layout.shape, dtype=np.bool_)
-        self.invalid_for = np.zeros(file.layout.shape, dtype=np.int64)
+        self._valid = np.zeros(shape, dtype=np.bool_)
+        self.invalid_for = np.zeros(shape, dtype=np.int64)
         """(rows, cols) number of frames in a row for which a taxel has had no valid
         value; 0 for a taxel that is dead or has no chip."""
         self._silent = 0

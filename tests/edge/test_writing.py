@@ -54,8 +54,12 @@ def test_a_folder_that_is_missing_is_not_made(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_is_whole_or_as_it_was(tmp_path):
-    path = tmp_path / "a"
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "a"
+
+
+def test_a_file_is_whole_or_as_it_was(path, tmp_path):
     path.write_text("before")
     with pytest.raises(ZeroDivisionError), write_whole(path) as file:  # noqa: PT012
         file.write(b"half")
@@ -68,8 +72,7 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
     assert os.listdir(tmp_path) == ["a"]
 
 
-def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
-    path = tmp_path / "a"
+def test_a_name_that_another_process_takes_first_stays_as_it_is(path, tmp_path):
     with (  # noqa: PT012 - the file is taken while it is being written
         pytest.raises(NameTaken, match="exists already"),
         write_whole(path, overwrite=False) as f,
@@ -81,38 +84,34 @@ def test_a_name_that_another_process_takes_first_stays_as_it_is(tmp_path):
 
 
 def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none(
-    tmp_path, monkeypatch
+    path, tmp_path, monkeypatch
 ):
     def refused(*_):
         raise PermissionError(1, "Operation not permitted")  # what FAT answers
 
     monkeypatch.setattr(os, "link", refused)
-    with write_whole(tmp_path / "a", overwrite=False) as file:
+    with write_whole(path, overwrite=False) as file:
         file.write(b"first")
-    with pytest.raises(NameTaken), write_whole(tmp_path / "a", overwrite=False) as file:
+    with pytest.raises(NameTaken), write_whole(path, overwrite=False) as file:
         file.write(b"second")
-    assert (tmp_path / "a").read_bytes() == b"first"
+    assert path.read_bytes() == b"first"
     assert os.listdir(tmp_path) == ["a"]
 
 
-def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+def test_what_is_written_is_on_the_disk_before_it_has_its_name(path, monkeypatch):
     order = []
     fsync = os.fsync
     replace = os.replace
     monkeypatch.setattr(os, "fsync", lambda fd: order.append("fsync") or fsync(fd))
-    monkeypatch.setattr(
-        os,
-        "replace",
-        lambda *names: order.append("name") or replace(*names),
-    )
-    with write_whole(tmp_path / "a") as file:
+    monkeypatch.setattr(os, "replace", lambda *a: order.append("name") or replace(*a))
+    with write_whole(path) as file:
         file.write(b"x")
     assert order == ["fsync", "name", "fsync"]
     order.clear()
-    with write_whole(tmp_path / "a", lasting=False) as file:
+    with write_whole(path, lasting=False) as file:
         file.write(b"y")
     assert order == ["name"]
-    assert (tmp_path / "a").read_bytes() == b"y"
+    assert path.read_bytes() == b"y"
 
 
 def test_the_longest_name_can_be_written(tmp_path):

@@ -120,7 +120,7 @@ def test_check_says_where_the_wires_are_too_slow(edge, skin, more, rate, sentenc
     assert sentence in " ".join(event["remarks"])
 
 
-@pytest.mark.parametrize("name", ["cody", "mpr121", "matrix"])
+@pytest.mark.parametrize("name", ["mpr121", "matrix"])
 def test_a_skin_file_that_comes_with_the_program_works(edge, name):
     status, (event,), _ = edge("check", skinfile.shipped(name))
     assert status == 0

@@ -8,7 +8,7 @@ from edge.errors import InputError
 from edge.fake.player import play, skin_file
 from edge.recording import Recording
 from edge.skin.calibration import with_calibration
-from edge.skin.file import parse
+from edge.skin.file import Signal, parse
 from edge.skin.shear import SignedBaseline
 from edge.touch.layout import SkinLayout, differences, for_device
 
@@ -50,13 +50,15 @@ def test_a_recording_played_over_the_wire_arrives_bit_for_bit():
 
 
 def test_an_axis_keeps_its_sign_its_dead_band_and_its_limits():
-    baseline = SignedBaseline([1000, 1000, 0, 65535], dead_band=5)
+    signal = Signal(dead_band_counts=5)
+    baseline = SignedBaseline(signal, 100.0, [1000, 1000, 0, 65535])
     raw = np.array([1004, 995, 65535, 0], dtype=np.uint16)
     assert baseline.away(raw).tolist() == [0, -5, 32767, -32767]
 
 
 def test_an_axis_follows_its_drift_in_both_directions():
-    baseline = SignedBaseline([1000, 1000], dead_band=3, step_counts=1.0, limit=10)
+    signal = Signal(6.0, 3, drift_counts_per_s=100.0, drift_limit_counts=10)
+    baseline = SignedBaseline(signal, 100.0, [1000, 1000])
     raw = np.array([1008, 992], dtype=np.uint16)
     valid = np.ones(2, dtype=bool)
     for _ in range(40):

@@ -26,7 +26,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
     )
     file = skinfile.parse(text)
     assert file.chips[0].taxels == (0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, UNUSED)
-    assert file.uncovered == 1
+    assert len(file.served) == 23
 
 
 @pytest.mark.parametrize(
