@@ -13,7 +13,6 @@ from edge.touch.feature import KERNELS
 from edge.touch.layout import SkinLayout
 
 if TYPE_CHECKING:
-    from edge.touch.arm import Chain
     from edge.touch.kernels import KernelTable
 
 
@@ -57,6 +56,19 @@ def _read(meta: ConfigTable) -> ModelInfo:
     units = meta.table("units")
     layout = SkinLayout.from_dict(meta.get("skin"), where=meta.where)
     versions = meta.table("versions", {}).raw
+    arm = meta.get("arm", None)
+    chain = None
+    if arm is not None:
+        from edge.touch.arm import Chain  # few sensors are on an arm
+
+        chain = Chain.from_dict(arm, where=f"{meta.where}: arm")
+    stopping = {}
+    novelty = None
+    if points:
+        rules = meta.table("stopping")
+        for task in rules.raw:
+            stopping[task] = read_stopping(rules.table(task), len(points))
+        novelty = read_novelty(meta.table("novelty"), len(points))
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
@@ -66,13 +78,13 @@ def _read(meta: ConfigTable) -> ModelInfo:
         features=names,
         units={name: units.text(name) for name in names},
         motion_frame=meta.choice("motion_frame", ("world", "skin")),
-        chain=_chain(meta),
+        chain=chain,
         rows=meta.whole("rows"),
         data_digest=meta.text("data_digest", empty=True),
         versions={str(key): str(version) for key, version in versions.items()},
         decision_points_s=points,
-        stopping=_stopping(meta, len(points)),
-        novelty=read_novelty(meta.table("novelty"), len(points)) if points else None,
+        stopping=stopping,
+        novelty=novelty,
         joints=meta.whole("joints", 0, allowed=range(0, 1001)),
         kernels=_kernels(meta, names, layout),
         name=meta.text("name", "", empty=True),
@@ -105,24 +117,6 @@ def _task(table: ConfigTable) -> Task:
     )
     table.done()
     return task
-
-
-def _chain(meta: ConfigTable) -> Chain | None:
-    """The arm, where the model has one."""
-    arm = meta.get("arm", None)
-    if arm is None:
-        return None
-    from edge.touch.arm import Chain
-
-    return Chain.from_dict(arm, where=f"{meta.where}: arm")
-
-
-def _stopping(meta: ConfigTable, points: int) -> dict[str, Stopping]:
-    """The stopping rules of each task, where the model has decision points."""
-    if not points:
-        return {}
-    rules = meta.table("stopping")
-    return {task: read_stopping(rules.table(task), points) for task in rules.raw}
 
 
 def read_stopping(table: ConfigTable, points: int) -> Stopping:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -131,25 +132,23 @@ def _kind(feature: Feature) -> tuple[str, int, tuple[str, ...], str]:
     return name, feature.samples, feature.transforms, feature.summary
 
 
+@dataclass
 class _Course:
     """The measurements of a contact, sampled at times of its window."""
 
-    def __init__(
-        self,
-        series: FeatureSeries,
-        window_s: float,
-        tables: Mapping[str, KernelTable],
-    ) -> None:
-        self._series = series
-        self._window_s = window_s
-        self._tables = tables
-        self._scale = series.layout.counts_per_newton or 1.0
+    series: FeatureSeries
+    window_s: float
+    tables: Mapping[str, KernelTable]
+
+    @property
+    def _scale(self) -> float:
+        return self.series.layout.counts_per_newton or 1.0
 
     @cached_property
     def _zones(self) -> dict[str, dict[str, NDArray[Any]]]:
         from edge.touch import zones  # the paper's features need none
 
-        series = self._series
+        series = self.series
         return zones.quantities_of(series.zones, series.force_motion, series.layout)
 
     def block(self, group: tuple[Feature, ...], samples: int) -> NDArray[np.float64]:
@@ -159,18 +158,18 @@ class _Course:
             from edge.touch import kernels  # few models have convolution features
 
             return kernels.shares_of(
-                self._series,
-                self._window_s,
+                self.series,
+                self.window_s,
                 first.name,
-                self._tables,
+                self.tables,
             )
         samples = first.samples or samples
-        step = self._window_s / (samples - 1)
+        step = self.window_s / (samples - 1)
         values = self._sampled(group, np.arange(samples, dtype=np.float64) * step)
         if first.transforms or first.summary:
             from edge.touch import transforms  # the paper's features have none
 
-            values = transforms.transformed(values, group, self._series.layout)
+            values = transforms.transformed(values, group, self.series.layout)
             values = transforms.summarised(values, first.summary, step)
         return values.reshape(-1)
 
@@ -181,7 +180,7 @@ class _Course:
     ) -> NDArray[np.float64]:
         """(rows, times) features of one value a frame, or of one wide feature."""
         first = group[0]
-        t = self._series.t
+        t = self.series.t
         if first.wide:
             values = self._measured(first).T
         else:
@@ -205,7 +204,7 @@ class _Course:
     def _measured(self, feature: Feature) -> NDArray[Any]:
         """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
         known."""
-        series = self._series
+        series = self.series
         of_region = {
             ("contact", "max_force"): series.peak / self._scale,
             ("contact", "motion"): series.motion,

@@ -19,7 +19,7 @@ import time
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from operator import itemgetter
 from typing import Any
 
@@ -211,32 +211,22 @@ def open_joints(
     """The joint angles that `--joints` names, closed at the end of the block.
 
     Raises:
-        InputError: nothing needs them, or as `joint_source`.
+        InputError: nothing needs them, the option names none, or the address cannot be
+            bound.
     """
     if dof is None:
         raise InputError("the model uses no joint angles; leave --joints out")
-    with (
-        joint_source(option) as source,
-        closing(Joints(source, dof=dof, names=names, now=now)) as joints,
-    ):
-        yield joints
-
-
-@contextmanager
-def joint_source(option: str) -> Iterator[Source]:
-    """The source that `--joints` names, closed at the end of the block.
-
-    Raises:
-        InputError: the option names none, or the address cannot be bound.
-    """
     kind, _, address = option.partition(":")
-    if kind == "udp":
-        with closing(Datagrams(address)) as source:
-            yield source
-    elif option == "stdin":
-        yield from_file(sys.stdin.fileno())
-    else:
-        raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {option!r}")
+    with ExitStack() as stack:
+        source: Source
+        if kind == "udp":
+            source = stack.enter_context(closing(Datagrams(address)))
+        elif option == "stdin":
+            source = from_file(sys.stdin.fileno())
+        else:
+            raise InputError(f"--joints: give stdin or udp:[HOST:]PORT, not {option!r}")
+        joints = Joints(source, dof=dof, names=names, now=now)
+        yield stack.enter_context(closing(joints))
 
 
 def from_file(fd: int) -> Source:
