@@ -161,10 +161,13 @@ def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
         if is_used and array.dtype.kind in "iufb" and array.size:
             numbers[name] = array.ravel() if _is_vector(array) else array
     if not numbers:
-        if any(array.dtype.hasobject for array in arrays.values()):
-            raise InputError("holds cells or structures; give --trials")
-        raise InputError(EMPTY)
+        raise _without_numbers(arrays)
     return numbers
+
+
+def _without_numbers(arrays: Arrays) -> InputError:
+    has_cells = any(array.dtype.hasobject for array in arrays.values())
+    return InputError("holds cells or structures; give --trials" * has_cells or EMPTY)
 
 
 def _is_vector(array: NDArray[Any]) -> bool:

@@ -132,12 +132,16 @@ class Measured:
     """A trial whose columns are understood.
 
     Attributes:
-        source: of the trial.
+        name, labels, label: as those of its source.
+        form: of its table.
         meaning: of the columns.
         numbers: of the trial.
     """
 
-    source: Source
+    name: str
+    labels: dict[str, str]
+    label: str
+    form: tuple[str, ...]
     meaning: Meaning
     numbers: Trial
 
@@ -170,16 +174,16 @@ def trials(
     for trial in measured:
         meta: dict[str, Any] = {
             "skin": skin.raw,
-            "labels": trial.source.labels,
+            "labels": trial.labels,
             "source": path.name,
-            "trial": trial.source.name,
+            "trial": trial.name,
         }
         if trial.numbers.joints is not None:
             meta["arm"] = arm and arm.to_dict()
         with _skipping(options):
             recording = rest.recording(trial.numbers, shape, meta)
             written += 1
-            yield trial.source.name, recording
+            yield trial.name, recording
     if not written:
         raise _nothing(path, options)
 
@@ -216,8 +220,8 @@ def _announced(
     shape_in_file = first.meaning.shape
     shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
     shape = skin_shape(first.numbers, shape_in_file, options)
-    text = first.meaning.text(first.source.label, shape)
-    say("; ".join([text, *first.source.table.form]))
+    text = first.meaning.text(first.label, shape)
+    say("; ".join([text, *first.form]))
     if axes is not None:
         say(axes.text)
     return shape
@@ -637,10 +641,12 @@ def _understood(
     if np.isnan(numbers.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
-    # The values stand in the numbers now; a long table would fill the memory twice.
-    emptied = replace(source.table, data=source.table.data.iloc[:0])
+    # Without the table, which would fill the memory a second time where it is long.
     return Measured(
-        replace(source, table=emptied),
+        source.name,
+        source.labels,
+        source.label,
+        source.table.form,
         sense,
         numbers.in_order(str(rows.name), rows),
     )

@@ -32,7 +32,7 @@ def trials(
         from mcap.reader import make_reader
     with needs("rosbags", "this"):
         from rosbags.typesys import Stores, get_typestore
-    log = Log.of(path, arm, options)
+    log = Log(path, arm, options)
     unread: dict[str, set[str]] = defaultdict(set)
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (

@@ -255,21 +255,26 @@ def _text(data: bytes) -> _Text:
         raise InputError(EMPTY)
     mark = _mark(lines[len(above)])
     skipped = re.compile(rf"(?a)[#%]|[^\S{mark}]*\Z")
+    below = enumerate(lines[len(above) :], len(above) + 1)
     # An array takes a quarter of a list's memory.
-    numbers: Sequence[int] = array("q")
-    for number in range(len(above), len(lines)):
-        if not skipped.match(lines[number]):
-            numbers.append(number + 1)
+    numbers: Sequence[int] = array(
+        "q", (n for n, line in below if not skipped.match(line))
+    )
     kept = [lines[number - 1] for number in numbers]
     del lines
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(kept)
-    marks = {line.count(mark) for line in kept}
-    is_plain = mark and '"' not in body and len(marks) == 1
-    if not is_plain:
+    if not _is_plain(kept, mark):
         numbers = _lines_of_rows(kept, numbers, mark)
     rows = [row for _, row in islice(_rows(kept, mark), 2)]
     return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
+
+
+def _is_plain(kept: Sequence[str], mark: str) -> bool:
+    """Whether each line is a row of as many cells, none of which is quoted."""
+    if not mark or any('"' in line for line in kept):
+        return False
+    return len({line.count(mark) for line in kept}) == 1
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:

@@ -30,7 +30,7 @@ def trials(
     if not path.is_dir():
         with open_regular(path, sys.maxsize):  # a FIFO would be waited for
             pass
-    log = Log.of(path, arm, options)
+    log = Log(path, arm, options)
     # ROS 2 bags from before 2024 do not contain the definitions of their types.
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (

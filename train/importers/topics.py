@@ -18,15 +18,13 @@ A JSON file beside the log, `NAME.json`, may complete it: `labels` {task: label}
 the ones to use: `frames_topic` and `joints_topic`. Other topics are not read.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import logging
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +76,6 @@ class Unusable(ValueError):
     """A message from which no frame can be read."""
 
 
-@dataclass
 class Log:
     """The messages of one log, collected by topic.
 
@@ -90,33 +87,35 @@ class Log:
         axes: of the taxels; None for one.
     """
 
-    path: Path
-    beside: ConfigTable
-    arm: Chain | None
-    options: argparse.Namespace
-    axes: Axes | None
-    _frames: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
-    """{topic: (stamp, time of logging, values) of each message}; the stamp is the time
-    of logging where a message has none."""
-    _joints: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
-    """{topic: (stamp, time of logging, name of a joint or else its place, its angle)}"""
-    _left_out: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
-    """{topic: why no frame can be read from each of some messages}."""
-    _topics: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-    """{`frames` or `joints`: all topics of such a kind}."""
-
-    @classmethod
-    def of(cls, path: Path, arm: Chain | None, options: argparse.Namespace) -> Log:
-        """A log with its JSON file; `arm` has precedence over the file's.
+    def __init__(
+        self,
+        path: Path,
+        arm: Chain | None,
+        options: argparse.Namespace,
+    ) -> None:
+        """Read the JSON file beside a log; `arm` has precedence over the file's.
 
         Raises:
             InputError: the file is not a JSON object.
         """
         file = path.with_name(path.stem + ".json")
-        beside = json_table(file)
-        if arm is None and beside.has("arm"):
-            arm = Chain.from_dict(beside.get("arm"), where=f"{file}: arm")
-        return cls(path, beside, arm, options, Axes.of(options))
+        self.path = path
+        self.beside = json_table(file)
+        if arm is None and self.beside.has("arm"):
+            arm = Chain.from_dict(self.beside.get("arm"), where=f"{file}: arm")
+        self.arm = arm
+        self.options = options
+        self.axes = Axes.of(options)
+        self._frames: dict[str, list[Any]] = defaultdict(list)
+        """{topic: (stamp, time of logging, values) of each message}; the stamp is the
+        time of logging where a message has none."""
+        self._joints: dict[str, list[Any]] = defaultdict(list)
+        """{topic: (stamp, time of logging, name of a joint or else its place, its
+        angle)}"""
+        self._left_out: dict[str, list[str]] = defaultdict(list)
+        """{topic: why no frame can be read from each of some messages}."""
+        self._topics: dict[str, set[str]] = defaultdict(set)
+        """{`frames` or `joints`: all topics of such a kind}."""
 
     def takes(self, topic: str, kind: str) -> bool:
         """Whether messages of a kind on a topic are wanted; others are never read."""

@@ -88,15 +88,6 @@ def stacked(path):
     savemat(path, {"frames": frames, "label": np.array(["cup", "pen"], dtype=object)})
 
 
-@pytest.mark.parametrize("write", [of_structures, of_cells, stacked])
-def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
-    write(tmp_path / "a.mat")
-    trials = list(trials_of(read_arrays(tmp_path / "a.mat"), "object"))
-    assert [labels for labels, _ in trials] == [{"object": "cup"}, {"object": "pen"}]
-    frames = [arrays["frames"].tolist() for _, arrays in trials]
-    assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
-
-
 def several_structures(path):
     trials = {"frames": FRAMES, "label": "cup"}, {"frames": FRAMES + 1, "label": "pen"}
     savemat(path, {"trial_1": trials[0], "trial_2": trials[1]})
@@ -127,20 +118,27 @@ def of_cells_in_matlab_7_3(path):
             shape.attrs["MATLAB_class"] = np.bytes_("cell")
 
 
-@pytest.mark.parametrize(
-    ("name", "write"),
-    [
-        ("a.mat", several_structures),
-        ("a.h5", of_groups),
-        ("a.h5", of_cells_in_matlab_7_3),
-    ],
-)
-def test_trials_are_structures_groups_or_cells(tmp_path, name, write):
-    write(tmp_path / name)
-    trials = list(trials_of(read_arrays(tmp_path / name), "object"))
-    assert [list(labels) for labels, _ in trials] == [["object"], ["object"]]
+def trials_in(path):
+    """The labels and the frames of the trials of a file."""
+    trials = list(trials_of(read_arrays(path), "object"))
     frames = [arrays["frames"].tolist() for _, arrays in trials]
     assert frames == [FRAMES.tolist(), (FRAMES + 1).tolist()]
+    return [labels for labels, _ in trials]
+
+
+@pytest.mark.parametrize(
+    "write",
+    [of_structures, several_structures, of_cells, of_cells_in_matlab_7_3, stacked],
+)
+def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
+    path = tmp_path / ("a.h5" if write is of_cells_in_matlab_7_3 else "a.mat")
+    write(path)
+    assert trials_in(path) == [{"object": "cup"}, {"object": "pen"}]
+
+
+def test_trials_are_groups(tmp_path):
+    of_groups(tmp_path / "a.h5")
+    assert list(map(list, trials_in(tmp_path / "a.h5"))) == [["object"], ["object"]]
 
 
 def test_a_grid_in_matlab_7_3_keeps_its_rows_and_columns(tmp_path):
@@ -179,20 +177,24 @@ def test_arrays_with_other_numbers_of_trials_are_named():
         list(trials_of(stored, "object"))
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
-def test_arrays_are_read_from_every_format(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    if suffix == ".npy":
-        np.save(path, FRAMES)
-    elif suffix == ".npz":
-        np.savez_compressed(path, skin=FRAMES)
-    elif suffix == ".mat":
-        savemat(path, {"skin": FRAMES})
+def written(path, array):
+    """A file of one array, packed where its format packs."""
+    if path.suffix == ".npy":
+        np.save(path, array)
+    elif path.suffix == ".npz":
+        np.savez_compressed(path, skin=array)
+    elif path.suffix == ".mat":
+        savemat(path, {"skin": array}, do_compression=True)
     else:
         h5py = pytest.importorskip("h5py")
         with h5py.File(path, "w") as file:
-            file["skin"] = FRAMES
-    (array,) = read_arrays(path).values()
+            file["skin"] = array
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
+def test_arrays_are_read_from_every_format(tmp_path, suffix):
+    (array,) = read_arrays(written(tmp_path / f"a{suffix}", FRAMES)).values()
     assert array.tolist() == FRAMES.tolist()
 
 
@@ -204,16 +206,9 @@ def test_an_empty_data_set_of_hdf5_is_left_out(tmp_path):
     assert list(read_arrays(tmp_path / "a.h5")) == ["hand.skin"]
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat"])
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".h5"])
 def test_what_would_fill_the_memory_is_refused_before(tmp_path, suffix, monkeypatch):
-    path = tmp_path / f"a{suffix}"
-    large = np.zeros((100, 100), np.uint8)
-    if suffix == ".npy":
-        np.save(path, large)
-    elif suffix == ".npz":
-        np.savez_compressed(path, a=large)
-    else:
-        savemat(path, {"a": large}, do_compression=True)
+    path = written(tmp_path / f"a{suffix}", np.zeros((100, 100), np.uint8))
     monkeypatch.setattr(arrays, "MOST_VALUES", 1000)
     with pytest.raises(InputError, match="values, more than the 1000 that are read"):
         read_arrays(path)

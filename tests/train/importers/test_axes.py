@@ -47,12 +47,6 @@ def an_array_whose_last_axis_is_three(folder):
 
 
 @pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
-@pytest.fixture
 def imported(folder):
     """The function that imports the folder with some options."""
 
@@ -113,14 +107,6 @@ def test_the_letters_say_which_axis_is_which_and_signs_are_turned(folder, import
     assert recording.shear[:, 0].tolist() == (-THREE[..., :2]).tolist()
 
 
-def test_signed_values_lose_their_rest_on_each_axis(folder, imported):
-    write_table(folder, named(), THREE + np.array([40, -70, -500]))
-    recording = imported("--axes", "xyz", "--signed")
-    counts = recording.meta["values"]["counts_per_unit"]
-    assert recording.frames[:, 0].tolist() == (counts * THREE[..., 2]).tolist()
-    assert recording.shear[:, 0].tolist() == (counts * THREE[..., :2]).tolist()
-
-
 @pytest.mark.parametrize(
     ("names", "options", "sentence"),
     [
@@ -156,5 +142,5 @@ def test_shear_beyond_its_range_is_refused(folder, refusal):
     large = THREE.copy()
     large[30, 0, 0] = 40000
     write_table(folder, named(), large)
-    said = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
-    assert "shear reaches 40000 counts, and at most 32767" in said
+    message = refusal("import", "csv", folder, "--out", folder / "out", "--axes", "xyz")
+    assert "shear reaches 40000 counts, and at most 32767" in message

@@ -8,15 +8,15 @@ from train.importers.clock import angles_at, order
 
 
 def test_times_that_increase_are_left_alone():
-    found = order(np.array([0.0, 0.1, 0.2]), "a.csv")
-    assert found.kept.tolist() == [0, 1, 2]
-    assert found.text == ""
+    result = order(np.array([0.0, 0.1, 0.2]), "a.csv")
+    assert result.kept.tolist() == [0, 1, 2]
+    assert result.text == ""
 
 
 def test_a_time_within_the_jitter_puts_its_frame_in_its_place():
-    found = order(np.array([0.0, 0.1, 0.2, 0.16, 0.3]), "a.csv")
-    assert found.kept.tolist() == [0, 1, 3, 2, 4]
-    assert found.text == "1 time went back within the jitter"
+    result = order(np.array([0.0, 0.1, 0.2, 0.16, 0.3]), "a.csv")
+    assert result.kept.tolist() == [0, 1, 3, 2, 4]
+    assert result.text == "1 time went back within the jitter"
 
 
 @pytest.mark.parametrize(
@@ -38,10 +38,10 @@ def test_other_times_are_refused(times, sentence):
 def test_of_few_frames_at_one_time_the_later_counts():
     t = 0.01 * np.arange(200)
     t[50] = t[49]
-    found = order(t, "a.bag")
-    assert 49 not in found.kept.tolist()
-    assert len(found.kept) == 199
-    assert found.text == "1 frame left out, as later ones have their times"
+    result = order(t, "a.bag")
+    assert 49 not in result.kept.tolist()
+    assert len(result.kept) == 199
+    assert result.text == "1 frame left out, as later ones have their times"
 
 
 def test_two_frames_in_a_hundred_at_one_time_stand_still():
@@ -54,18 +54,18 @@ def test_two_frames_in_a_hundred_at_one_time_stand_still():
 def test_angles_are_linear_between_messages():
     joints_t = np.array([0.0, 0.1, 0.2])
     angles = np.array([[0.0, 1.0], [0.2, 0.0], [0.4, 1.0]])
-    found = angles_at(np.array([0.05, 0.1, 0.15]), joints_t, angles, 0.3)
-    assert found == pytest.approx(np.array([[0.1, 0.5], [0.2, 0.0], [0.3, 0.5]]))
+    result = angles_at(np.array([0.05, 0.1, 0.15]), joints_t, angles, 0.3)
+    assert result == pytest.approx(np.array([[0.1, 0.5], [0.2, 0.0], [0.3, 0.5]]))
 
 
 def test_an_angle_that_wraps_goes_the_shorter_way():
     angles = np.array([[3.1], [-3.1]])
-    (found,) = angles_at(np.array([0.05]), np.array([0.0, 0.1]), angles, 0.3)
-    assert found[0] == pytest.approx(np.pi)
+    (result,) = angles_at(np.array([0.05]), np.array([0.0, 0.1]), angles, 0.3)
+    assert result[0] == pytest.approx(np.pi)
 
 
 @pytest.mark.parametrize(
-    ("gap_s", "step_s", "release_s", "known"),
+    ("gap_s", "step_s", "release_s", "is_known"),
     [
         (0.29, 0.01, 0.3, True),
         (0.31, 0.01, 0.3, False),  # more than release_s
@@ -73,18 +73,18 @@ def test_an_angle_that_wraps_goes_the_shorter_way():
         (1.01, 0.2, 0.3, False),  # more than five steps
     ],
 )
-def test_across_a_gap_no_angle_is_known(gap_s, step_s, release_s, known):
+def test_across_a_gap_no_angle_is_known(gap_s, step_s, release_s, is_known):
     before = step_s * np.arange(6)
     joints_t = np.concatenate([before, before + before[-1] + gap_s])
     middle = np.array([before[-1] + 0.5 * gap_s])
-    found = angles_at(middle, joints_t, joints_t[:, None], release_s)
-    assert np.isfinite(found).all() == known
+    result = angles_at(middle, joints_t, joints_t[:, None], release_s)
+    assert np.isfinite(result).all() == is_known
 
 
 def test_angles_hold_for_a_moment_beyond_the_messages():
     joints_t = 0.01 * np.arange(11)
     angles = joints_t[:, None]
     t = np.array([-0.101, -0.099, 0.199, 0.201])
-    found = angles_at(t, joints_t, angles, 0.3)[:, 0]
-    assert np.isnan(found).tolist() == [True, False, False, True]
-    assert found[1:3].tolist() == [0.0, 0.1]
+    result = angles_at(t, joints_t, angles, 0.3)[:, 0]
+    assert np.isnan(result).tolist() == [True, False, False, True]
+    assert result[1:3].tolist() == [0.0, 0.1]

@@ -23,13 +23,15 @@ def options(**words):
     return argparse.Namespace(**{**usual, **words})
 
 
-def taken(given, **words):
-    return meaning(given, options(**words))
+def sense_of(source, **words):
+    return meaning(source, options(**words))
 
 
 def test_taxels_are_those_of_a_stem_with_running_numbers():
-    found = taken(table("s2", "s1", "s10", *(f"s{i}" for i in range(3, 10))), rate=10)
-    assert found.taxels == [f"s{i}" for i in range(1, 11)]
+    sense = sense_of(
+        table("s2", "s1", "s10", *(f"s{i}" for i in range(3, 10))), rate=10
+    )
+    assert sense.taxels == [f"s{i}" for i in range(1, 11)]
 
 
 @pytest.mark.parametrize(
@@ -37,23 +39,23 @@ def test_taxels_are_those_of_a_stem_with_running_numbers():
 )
 def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
     names = [form.format(row, col) for col in range(3) for row in range(2)]
-    found = taken(table(*names), rate=10)
-    assert found.shape == (2, 3)
-    assert found.taxels[:3] == [form.format(0, col) for col in range(3)]
+    sense = sense_of(table(*names), rate=10)
+    assert sense.shape == (2, 3)
+    assert sense.taxels[:3] == [form.format(0, col) for col in range(3)]
 
 
 def test_numbers_of_taxels_may_stand_in_brackets():
     names = [f"tactile[{i}]" for i in (10, *range(10))]
-    assert taken(table(*names), rate=10).taxels == [*names[1:], names[0]]
+    assert sense_of(table(*names), rate=10).taxels == [*names[1:], names[0]]
 
 
 @pytest.mark.parametrize(
     "name", ["label", "object_id", "slipped", "temperature", "frame", "sample", ""]
 )
 def test_any_further_column_is_left_out_and_named(name):
-    found = taken(table("p1", "p2", name), rate=10)
-    assert found.taxels == ["p1", "p2"]
-    assert found.left_out == [name]
+    sense = sense_of(table("p1", "p2", name), rate=10)
+    assert sense.taxels == ["p1", "p2"]
+    assert sense.left_out == [name]
 
 
 @pytest.mark.parametrize(
@@ -67,19 +69,19 @@ def test_any_further_column_is_left_out_and_named(name):
 )
 def test_what_would_be_guessed_is_asked(names, sentence):
     with pytest.raises(InputError, match=sentence):
-        taken(table(*names), rate=10)
+        sense_of(table(*names), rate=10)
 
 
 @pytest.mark.parametrize("names", [["taxel_0_0"], ["tactile1", "tactile2"]])
 def test_columns_that_are_called_taxels_are_taken_beside_other_running_numbers(names):
     joints = ["joint_1", "joint_2"]
-    found = taken(table(*joints, *names), rate=10)
-    assert found.taxels == names
-    assert found.left_out == joints
+    sense = sense_of(table(*joints, *names), rate=10)
+    assert sense.taxels == names
+    assert sense.left_out == joints
 
 
 @pytest.mark.parametrize(
-    ("wanted", "names"),
+    ("terms", "names"),
     [
         ("b,a", ["b", "a"]),
         ("a-c", ["a", "b", "c"]),
@@ -89,16 +91,17 @@ def test_columns_that_are_called_taxels_are_taken_beside_other_running_numbers(n
         ("hand.skin", ["hand.skin.1", "hand.skin.2"]),
     ],
 )
-def test_columns_are_named_by_names_ranges_and_places(wanted, names):
-    given = table("a", "b", "c", "d", "q.1", "q.2", "hand.skin.1", "hand.skin.2")
-    assert taken(given, taxels=wanted, rate=10).taxels == names
+def test_columns_are_named_by_names_ranges_and_places(terms, names):
+    source = table("a", "b", "c", "d", "q.1", "q.2", "hand.skin.1", "hand.skin.2")
+    assert sense_of(source, taxels=terms, rate=10).taxels == names
 
 
 @pytest.mark.parametrize(
     ("wishes", "sentence"),
     [
         ({"taxels": "5-9"}, "has no column 5-9"),
-        ({"taxels": "s3"}, "has no column s3"),
+        ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
+        ({"taxels": "s2-s1"}, "has no column s2-s1"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
         ({"joints": "s1,s2"}, "no column is left for taxels"),
@@ -107,14 +110,14 @@ def test_columns_are_named_by_names_ranges_and_places(wanted, names):
 )
 def test_contradictions_are_refused(wishes, sentence):
     with pytest.raises(InputError, match=sentence):
-        taken(table("s1", "s2"), rate=10, **wishes)
+        sense_of(table("s1", "s2"), rate=10, **wishes)
 
 
 def test_a_rate_beside_a_time_is_refused_and_neither_too():
     with pytest.raises(InputError, match="beside --rate"):
-        taken(table("t", "s1"), rate=10)
+        sense_of(table("t", "s1"), rate=10)
     with pytest.raises(InputError, match="no column is a time; give --rate"):
-        taken(table("s1"))
+        sense_of(table("s1"))
 
 
 @pytest.mark.parametrize(
@@ -130,10 +133,10 @@ def test_a_rate_beside_a_time_is_refused_and_neither_too():
     ],
 )
 def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit):
-    found = taken(table("s1", **{name: COUNTS * step}))
-    assert found.unit == unit
+    sense = sense_of(table("s1", **{name: COUNTS * step}))
+    assert sense.unit == unit
     seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
-    times = times_of(table("s1", **{name: COUNTS * step}), found, options())
+    times = times_of(table("s1", **{name: COUNTS * step}), sense, options())
     assert times == pytest.approx(COUNTS * step * seconds)
 
 
@@ -141,15 +144,15 @@ def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit
     ("start", "unit"), [(1.7e9, "s"), (1.7e12, "ms"), (1.7e15, "us"), (1.7e18, "ns")]
 )
 def test_times_since_1970_tell_their_unit(start, unit):
-    assert taken(table("s1", t=start + COUNTS * 1e6)).unit == unit
+    assert sense_of(table("s1", t=start + COUNTS * 1e6)).unit == unit
 
 
 def test_iso_dates_are_times_whatever_their_column_is_called():
     dates = [f"2024-03-01T10:00:00.{i}00" for i in range(5)]
-    given = table("s1", zeit=dates)
-    found = taken(given)
-    assert found.unit == "iso"
-    assert times_of(given, found, options()) == pytest.approx(0.1 * COUNTS)
+    source = table("s1", zeit=dates)
+    sense = sense_of(source)
+    assert sense.unit == "iso"
+    assert times_of(source, sense, options()) == pytest.approx(0.1 * COUNTS)
 
 
 @pytest.mark.parametrize(
@@ -158,23 +161,23 @@ def test_iso_dates_are_times_whatever_their_column_is_called():
 )
 def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
     with pytest.raises(InputError, match=f"give --time-unit {units}"):
-        taken(table("s1", t=COUNTS * step))
+        sense_of(table("s1", t=COUNTS * step))
 
 
 def test_a_unit_that_is_named_is_taken():
-    assert taken(table("t", "s1"), time_unit="ms").unit == "ms"
+    assert sense_of(table("t", "s1"), time_unit="ms").unit == "ms"
 
 
 def test_what_is_no_date_is_named():
-    given = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
+    source = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
     with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):
-        times_of(given, taken(given, time_unit="iso"), options())
+        times_of(source, sense_of(source, time_unit="iso"), options())
 
 
 def test_a_line_says_what_was_taken():
-    given = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
-    found = taken(given, time_unit="ms")
-    assert found.text("folder", (4, 4)) == (
+    source = table("t", *(f"p{i}" for i in range(1, 17)), "label", "")
+    sense = sense_of(source, time_unit="ms")
+    assert sense.text("folder", (4, 4)) == (
         'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
         'left out: "label", a column without a name'
     )

@@ -54,8 +54,8 @@ def test_values_that_fall_are_subtracted_from_the_quietest_start():
 
 def test_values_that_rise_where_they_should_fall_are_said(capsys):
     rest_of([trial([100], [100], [100], [140])], options(falls=True))
-    said = "values above those at rest, by up to 40, count as 0; see --signed"
-    assert said in capsys.readouterr().out
+    sentence = "values above those at rest, by up to 40, count as 0; see --signed"
+    assert sentence in capsys.readouterr().out
 
 
 def test_missing_values_are_counted_and_said(capsys):
@@ -74,8 +74,8 @@ def test_a_start_with_a_missing_value_is_not_the_quietest(kind, capsys):
 
 def test_taxels_without_a_value_at_rest_are_said(capsys):
     rest_of([trial([100, NAN], [100, 90], [100, 90])], options(falls=True))
-    said = "1 taxel without a value at rest, which is never valid"
-    assert said in capsys.readouterr().out
+    sentence = "1 taxel without a value at rest, which is never valid"
+    assert sentence in capsys.readouterr().out
 
 
 def test_signed_values_count_their_distance_with_all_their_digits():

