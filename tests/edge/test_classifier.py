@@ -25,40 +25,44 @@ def decisions(events):
     return [event for event in events if isinstance(event, Decided)]
 
 
+def decided(model, recording):
+    """The decisions on a recording."""
+    return decisions(Classifier(model).classify(recording))
+
+
 def test_the_latency_is_what_the_frame_took(model, make_touch):
     recording = make_touch()
     classifier = Classifier(model, recording.layout)
+    shares = []
     for frame in recording:
         began = time.perf_counter()
-        events = classifier.push(frame)
+        events = decisions(classifier.push(frame))
         took_ms = (time.perf_counter() - began) * 1e3
-        if events and isinstance(events[0], Decided):
-            assert all(0.0 < event.latency_ms <= took_ms + 0.001 for event in events)
-            return
+        shares += [event.latency_ms / (took_ms + 0.001) for event in events]
+    assert len(shares) == 2
+    assert 0.0 < min(shares) <= max(shares) <= 1.0
 
 
 def test_classify_and_watch_give_what_pushing_the_frames_gives(model, make_touch):
     recording = make_touch(seed=99)
 
-    def said(events):
+    def lines(events):
         return [{**event.to_dict(), "latency_ms": 0.0} for event in events]
 
-    pushed = said(event for _, event in watch(model, recording))
+    pushed = lines(event for _, event in watch(model, recording))
     classifier = Classifier(model)
-    assert said(classifier.classify(recording)) == pushed
-    assert said(classifier.classify(recording)) == pushed
+    assert lines(classifier.classify(recording)) == pushed
+    assert lines(classifier.classify(recording)) == pushed
     skin, playback = play(skin_file(recording.layout), recording)
     with skin:
         live = list(classifier.watch(skin, joints=playback, lasts_s=playback.ends))
-    assert [(type(e), e.to_dict().get("label")) for e in live] == [
-        (type(e), e.to_dict().get("label")) for _, e in watch(model, recording)
-    ]
+    expected = [(line["event"], line.get("label")) for line in pushed]
+    assert [(line["event"], line.get("label")) for line in lines(live)] == expected
 
 
 def test_a_recordings_joints_may_stand_in_another_order(model, make_touch):
     def distances(recording):
-        events = Classifier(model).classify(recording)
-        return [e.decision.distances.tolist() for e in decisions(events)]
+        return [e.decision.distances.tolist() for e in decided(model, recording)]
 
     recording = make_touch(seed=99)
     named = {**recording.meta, "joint_names": list(model.info.chain.names[::-1])}
@@ -72,8 +76,8 @@ def test_joint_angles_are_asked_for_before_anything_is_read(model, make_touch):
         next(Classifier(model).classify(bare))
     with pytest.raises(InputError, match="the skin: has no joint angles"):
         next(Classifier(model).watch(None))
-    _, *decided = Classifier(model, motion_on_skin=True).classify(bare)
-    assert [event.flags for event in decided] == [("skin_motion",)] * 2
+    _, *events = Classifier(model, motion_on_skin=True).classify(bare)
+    assert [event.flags for event in events] == [("skin_motion",)] * 2
 
 
 def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(
@@ -85,14 +89,14 @@ def test_a_decision_comes_with_the_first_frame_at_the_end_of_the_window(
         (1.4, Decided),
         (1.4, Decided),
     ]
-    decided = events[1][1]
-    assert decided.task == "category"
-    assert decided.label == "soft-fixed"
-    assert decided.onset_s == 0.2
-    assert decided.window_s == 1.2
-    assert decided.confidence is None  # not calibrated
-    assert decided.flags == ("as_trained",)
-    assert decided.decision.label == decided.label
+    category = events[1][1]
+    assert category.task == "category"
+    assert category.label == "soft-fixed"
+    assert category.onset_s == 0.2
+    assert category.window_s == 1.2
+    assert category.confidence is None  # not calibrated
+    assert category.flags == ("as_trained",)
+    assert category.decision.label == category.label
 
 
 def without_a_pose(touch):
@@ -118,8 +122,8 @@ def test_a_new_touch_is_flagged_only_where_something_is_missing(
     change,
     flags,
 ):
-    events = [e for _, e in watch(model, change(make_touch(kind="soft", seed=99)))]
-    assert [e.flags for e in events if isinstance(e, Decided)] == [flags] * 2
+    touch = change(make_touch(kind="soft", seed=99))
+    assert [event.flags for event in decided(model, touch)] == [flags] * 2
 
 
 @pytest.mark.parametrize(("scale", "labelled"), [(0.01, True), (1e-300, False)])
@@ -132,11 +136,10 @@ def test_features_far_outside_of_training_flag_the_decision_or_give_no_label(
     recording = make_touch(kind="soft", seed=99)
     skin = {**recording.meta["skin"], "counts_per_newton": scale}
     strong = replace(recording, meta={**recording.meta, "skin": skin})
-    decided = decisions(Classifier(model).classify(strong))
-    assert [e.flags for e in decided] == [("out_of_range",)] * 2
-    assert [(bool(e.label), bool(e.decision)) for e in decided] == [
-        (labelled, labelled)
-    ] * 2
+    events = decided(model, strong)
+    assert [e.flags for e in events] == [("out_of_range",)] * 2
+    assert [bool(e.label) for e in events] == [labelled] * 2
+    assert [bool(e.decision) for e in events] == [labelled] * 2
 
 
 def test_a_model_that_cannot_be_run_is_an_error_and_no_flag(
@@ -191,10 +194,8 @@ def test_each_contact_gets_its_own_decisions_even_where_their_windows_overlap(
 )
 def test_a_gap_in_the_window_flags_the_decision(model, make_touch, damage, flagged):
     recording = make_touch()
-    decided = decisions(
-        Classifier(model).classify(replace(recording, t=damage(recording.t)))
-    )
-    assert ["gap" in event.flags for event in decided] == [flagged] * 2
+    events = decided(model, replace(recording, t=damage(recording.t)))
+    assert ["gap" in event.flags for event in events] == [flagged] * 2
 
 
 def test_another_skin_and_missing_joints_are_refused(model, make_touch, forearm):
@@ -218,9 +219,7 @@ def test_a_stuck_taxel_is_named_and_hides_no_touch(model, make_touch):
     assert aside.taxels == ((0, 23),)
     (onset,) = (event for event in events if isinstance(event, Onset))
     assert onset.onset_s == 0.2
-    decided = decisions(events)
-    assert len(decided) == 2
-    assert not any("late" in event.flags for event in decided)
+    assert ["late" in event.flags for event in decisions(events)] == [False] * 2
 
 
 def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_touch):
@@ -232,11 +231,9 @@ def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_tou
         frames=recording.frames[first:],
         joints=recording.joints[first:],
     )
-    decided = decisions(Classifier(model).classify(cut))
-    assert len(decided) == 2
-    for event in decided:
-        assert event.onset_s == cut.t[0]
-        assert "late" in event.flags
+    events = decided(model, cut)
+    assert [event.onset_s for event in events] == [cut.t[0]] * 2
+    assert ["late" in event.flags for event in events] == [True] * 2
 
 
 def test_only_doubts_that_hold_become_flags_in_their_order():

@@ -19,21 +19,19 @@ def test_an_event_is_what_a_line_of_json_says():
         stopped_by="window",
         contact=2,
     )
-    said = {
+    assert decided.to_dict() == {
+        "event": "decision",
+        "contact": 2,
         "task": "t",
         "label": "a",
         "confidence": 0.5,
         "flags": ["unsure"],
         "place": None,
-    }
-    times = {"onset_s": 0.25, "window_s": 1.2, "latency_ms": 0.3}
-    early = {"error": 0.1, "stopped_by": "window"}
-    assert decided.to_dict() == {
-        "event": "decision",
-        "contact": 2,
-        **said,
-        **times,
-        **early,
+        "onset_s": 0.25,
+        "window_s": 1.2,
+        "latency_ms": 0.3,
+        "error": 0.1,
+        "stopped_by": "window",
     }
     release = {"event": "release", "contact": 2, "onset_s": 0.25, "release_s": 2.5}
     assert Release(0.25, 2.5, contact=2).to_dict() == release

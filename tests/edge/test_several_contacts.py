@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -23,96 +24,88 @@ AT_ONCE = 1e9
 def early(tmp_path_factory):
     """A model that decides at several points of time."""
     folder = tmp_path_factory.mktemp("early")
-    touches = save_touches(folder / "touches", 24)
+    touches = save_touches(folder / "touches", 16)
     fixed = ["--decision-points", "0.4:1.2:0.4", "--features", "paper"]
     fixed += ["--projection", "pca", "--components", "4", "-k", "1", "--jobs", "1"]
     return Model(export(folder / "model", "--data", touches, *fixed) / "model.onnx")
 
 
-def frames(places, dof):
+def frames(dof):
     """Touches of two by two taxels that all begin at once."""
     for i in range(190):
         counts = np.zeros((16, 24), np.uint16)
-        for number, (row, col) in enumerate(places):
+        for number, (row, col) in enumerate(PLACES):
             if i >= 20:
                 strength = 400 + (8 + 3 * number) * (i - 20)
                 counts[row : row + 2, col : col + 2] = strength
         yield Frame(0.01 * i, counts, joints=np.full(dof, 0.001 * i))
 
 
-def decided(model, places, error):
-    """The classifier's answers, and the questions that each frame asked."""
-    asked = [0]
+def decided(model, error, stop=None, step=1):
+    """The classifier's events, each with the time of its frame, and the questions that
+    each frame asked."""
+    questions = [0]
     decide = model.decide
 
     def counted(*arguments):
-        asked[-1] += 1
+        questions[-1] += 1
         return decide(*arguments)
 
-    model.decide = counted
     classifier = Classifier(model, error=error, max_contacts=len(PLACES))
     events = []
-    try:
-        for frame in frames(places, model.info.dof or 0):
-            events += classifier.push(frame)
-            asked.append(0)
-        events += classifier.finish()
-    finally:
-        del model.decide
-    return events, asked[:-1]
-
-
-@pytest.mark.parametrize("error", [None, ERROR])
-def test_no_frame_asks_more_than_a_few_questions(early, error):
-    events, asked = decided(early, PLACES, error)
-    assert sum(isinstance(event, Onset) for event in events) == len(PLACES)
-    assert max(asked) == FEWEST_ASKED
-    tasks = len(early.info.tasks)
-    assert sum(isinstance(event, Decided) for event in events) == tasks * len(PLACES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model, "decide", counted)
+        for frame in islice(frames(model.info.dof or 0), 0, stop, step):
+            events += [(frame.t, event) for event in classifier.push(frame)]
+            questions.append(0)
+        events += [(frame.t, event) for event in classifier.finish()]
+    return events, questions[:-1]
 
 
 def answers_of(events):
     """{contact and task: what was answered}."""
     return {
         (event.contact, event.task): (event.label, event.window_s, event.confidence)
-        for event in events
+        for _, event in events
         if isinstance(event, Decided)
     }
 
 
+@pytest.mark.parametrize("error", [None, ERROR])
+def test_no_frame_asks_more_than_a_few_questions_and_the_answers_are_the_same(
+    early, error, monkeypatch
+):
+    spread, questions = decided(early, error)
+    assert sum(isinstance(event, Onset) for _, event in spread) == len(PLACES)
+    assert max(questions) == FEWEST_ASKED
+    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
+    at_once, questions = decided(early, error)
+    assert max(questions) == len(PLACES)
+    assert len(answers_of(at_once)) == len(PLACES) * len(early.info.tasks)
+    assert answers_of(spread) == answers_of(at_once)
+    assert sum(isinstance(event, Decided) for _, event in spread) == len(
+        answers_of(at_once)
+    )
+
+
 def test_a_slow_skin_asks_more_a_frame_so_that_no_answer_comes_late(early):
     """At 20 Hz a frame has five times as long as at 100 Hz."""
-    slow = list(frames(PLACES, early.info.dof or 0))[::5]
-    classifier = Classifier(early, error=ERROR, max_contacts=len(PLACES))
-    seen = [(frame.t, event) for frame in slow for event in classifier.push(frame)]
+    events, _ = decided(early, ERROR, step=5)
     late_s = [
         t - event.onset_s - event.window_s
-        for t, event in seen
+        for t, event in events
         if isinstance(event, Decided)
     ]
     assert late_s
-    needed_s = len(PLACES) / ASKED_A_SECOND
-    assert max(late_s) <= needed_s + 0.05
-
-
-@pytest.mark.parametrize("error", [None, ERROR])
-def test_the_answers_are_those_of_asking_at_once(early, error, monkeypatch):
-    spread, _ = decided(early, PLACES, error)
-    monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
-    at_once, asked = decided(early, PLACES, error)
-    assert max(asked) == len(PLACES)
-    assert len(answers_of(at_once)) == len(PLACES) * len(early.info.tasks)
-    assert answers_of(spread) == answers_of(at_once)
+    assert max(late_s) <= len(PLACES) / ASKED_A_SECOND + 0.05
 
 
 def test_a_stream_that_ends_is_asked_about_all_that_is_due(early, monkeypatch):
     """Decision points that have come are not passed over for the full window."""
-    short = list(frames(PLACES, early.info.dof or 0))[:83]
-    limited = Classifier(early, error=ERROR, max_contacts=len(PLACES))
-    spread = [e for frame in short for e in limited.push(frame)] + limited.finish()
+    spread, _ = decided(early, ERROR, stop=83)
     monkeypatch.setattr("edge.classifier.ASKED_A_SECOND", AT_ONCE)
-    free = Classifier(early, error=ERROR, max_contacts=len(PLACES))
-    at_once = [e for frame in short for e in free.push(frame)] + free.finish()
+    at_once, _ = decided(early, ERROR, stop=83)
+    assert answers_of(at_once)
     assert answers_of(spread) == answers_of(at_once)
 
 

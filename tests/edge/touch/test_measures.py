@@ -24,50 +24,36 @@ from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
 ROUND = replace(FLAT, wraps=True)
 ALL = names()
+TWO_FRAMES = [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)]
 
 
-def weighted_sums(taxels: dict[tuple[int, int], int], turn: int | None) -> list[int]:
+def weighted_sums(counts, mask, turn: int | None) -> list[int]:
     """The measures of a zone, by plain sums; the best of all cuts of a turn."""
+    rows, cols = mask.nonzero()
+    forces = counts[mask].astype(int)
     candidates = []
     for cut in range(turn or 1):
-        moved = {
-            (r, c + turn if turn and c < cut else c): f for (r, c), f in taxels.items()
-        }
-
-        def total(of, moved=moved):
-            return sum(f * of(r, c) for (r, c), f in moved.items())
-
-        force, cols, cols_cols = (total(lambda _, c, n=n: c**n) for n in range(3))
-        sums = [
-            *(force, total(lambda r, _: r), cols, total(lambda r, _: r * r)),
-            *(total(lambda r, c: r * c), cols_cols),
-        ]
-        largest = max(moved.values(), default=0)
-        candidates.append(
-            (force * cols_cols - cols * cols, cut, [largest, len(moved), *sums])
-        )
+        c = np.where(cols < cut, cols + (turn or 0), cols)
+        weights = (1, rows, c, rows**2, rows * c, c**2)
+        sums = [int((forces * weight).sum()) for weight in weights]
+        variance = sums[0] * sums[5] - sums[2] ** 2
+        largest = int(forces.max(initial=0))
+        candidates.append((variance, cut, [largest, len(forces), *sums]))
     return min(candidates)[2]
 
 
-def taxels_of(counts, mask) -> dict[tuple[int, int], int]:
-    return {(int(r), int(c)): int(counts[r, c]) for r, c in np.argwhere(mask)}
-
-
 def expected(layout: SkinLayout, frame: Frame) -> dict[str, list[int]]:
-    counts = frame.counts
-    active = (counts > layout.threshold_counts) & (
-        True if frame.valid is None else frame.valid
-    )
-    largest = active_of(layout, frame).largest()
-    if largest is None:
+    active = active_of(layout, frame)
+    contact = active.largest()
+    if contact is None:
         return dict.fromkeys(ZONES, [0] * 8)
     left_half = np.arange(layout.cols) < layout.cols // 2
     turn = layout.cols if layout.wraps else None
     return {
-        "contact": weighted_sums(taxels_of(counts, largest.mask), turn),
-        "skin": weighted_sums(taxels_of(counts, active), turn),
-        "left": weighted_sums(taxels_of(counts, active & left_half), None),
-        "right": weighted_sums(taxels_of(counts, active & ~left_half), None),
+        "contact": weighted_sums(frame.counts, contact.mask, turn),
+        "skin": weighted_sums(frame.counts, active.mask, turn),
+        "left": weighted_sums(frame.counts, active.mask & left_half, None),
+        "right": weighted_sums(frame.counts, active.mask & ~left_half, None),
     }
 
 
@@ -94,31 +80,23 @@ def test_whole_numbers_of_every_place_are_those_of_plain_sums(
 ):
     layout = SkinLayout(*shape, wraps=wraps, threshold_counts=10)
     frame = frame_of(seed, shape, density, high)
-    sums = zones_of(layout, frame, ALL)
-    assert sums == expected(layout, frame)
+    assert zones_of(layout, frame, ALL) == expected(layout, frame)
 
 
 @pytest.mark.parametrize("wraps", [False, True])
 def test_the_largest_skin_full_of_the_largest_counts_does_not_overflow(wraps):
-    rows = 1024
-    cols = 1024
-    layout = SkinLayout(rows, cols, wraps=wraps)
-    frame = Frame(0.0, np.full((rows, cols), 65535, dtype=np.uint16))
-    line = sum(range(cols))
-    squares = sum(c * c for c in range(cols))
-    sums = (
-        rows * cols,
-        rows * line,
-        rows * line,
-        rows * squares,
-        line * line,
-        rows * squares,
-    )
+    side = 1024
+    layout = SkinLayout(side, side, wraps=wraps)
+    frame = Frame(0.0, np.full((side, side), 65535, dtype=np.uint16))
+    line = sum(range(side))
+    row = side * line
+    squares = side * sum(c * c for c in range(side))
+    sums = (side * side, row, row, squares, line * line, squares)
     zones = zones_of(layout, frame, ["skin_length"])
     assert zones["skin"][2:] == [65535 * v for v in sums]
     features = ["skin_spread_along", "skin_slant"]
     vector = vector_of(layout, [frame, replace(frame, t=1.0)], features, 2)
-    assert vector[0] == pytest.approx(np.sqrt((rows**2 - 1) / 12), rel=1e-15)
+    assert vector[0] == pytest.approx(np.sqrt((side**2 - 1) / 12), rel=1e-15)
     assert vector[2] == 0.0
 
 
@@ -144,11 +122,13 @@ def value(layout: SkinLayout, counts, name: str) -> float:
 def test_moments_are_those_of_exact_arithmetic(seed, density):
     counts = frame_of(seed, FLAT.shape, density).counts.astype(int)
     counts[2, 3] = 40000
-    taxels = taxels_of(counts, counts > 10)
-    force = sum(taxels.values())
+    taxels = [
+        (*taxel, counts[*taxel].item()) for taxel in np.argwhere(counts > 10).tolist()
+    ]
+    force = sum(f for _, _, f in taxels)
 
     def mean(of) -> Fraction:
-        return Fraction(sum(f * of(r, c) for (r, c), f in taxels.items()), force)
+        return Fraction(sum(f * of(r, c) for r, c, f in taxels), force)
 
     row = mean(lambda r, c: r)
     col = mean(lambda r, c: c)
@@ -253,9 +233,8 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
 
 
 def test_zones_that_no_feature_calls_for_are_not_measured():
-    frames = [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)]
-    assert list(series_of(FLAT, frames, ["skin_force"]).zones) == ["skin"]
-    assert series_of(FLAT, frames, ["max_force", "contact_area"]).zones == {}
+    assert list(series_of(FLAT, TWO_FRAMES, ["skin_force"]).zones) == ["skin"]
+    assert series_of(FLAT, TWO_FRAMES, ["max_force", "contact_area"]).zones == {}
 
 
 def test_the_papers_three_are_the_default_and_come_first():
@@ -288,18 +267,8 @@ def test_a_wrong_name_is_one_sentence(features, sentence):
 
 
 def test_a_feature_that_was_not_measured_is_one_sentence():
-    series = series_of(
-        FLAT,
-        [pressed(FLAT, t, {(1, 1): 50}) for t in (0.0, 0.5)],
-        ["max_force"],
-    )
-    for name in (
-        "skin_force",
-        "force_motion",
-        "stiffness",
-        "taxel_force",
-        "joint_angle",
-    ):
+    series = series_of(FLAT, TWO_FRAMES, ["max_force"])
+    for name in "skin_force force_motion stiffness taxel_force joint_angle".split():
         with pytest.raises(InputError, match=f"{name} was not measured"):
             feature_vector(series, 1.0, 2, [name])
 
@@ -315,8 +284,7 @@ def test_a_large_skin_is_pooled_in_squares_until_few_enough_are_left(
 ):
     cells = Cells(SkinLayout(*shape))
     assert cells.side == side
-    assert cells.count == count
-    assert count <= MOST_CELLS
+    assert cells.count == count <= MOST_CELLS
 
 
 @settings(max_examples=40)

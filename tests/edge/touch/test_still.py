@@ -4,10 +4,9 @@ touched."""
 import numpy as np
 import pytest
 
-from edge.touch.active import ActiveTaxels
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.track import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
+from tests.edge.touch.pressed import active_of, pressed
 
 LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
 PERIOD_S = 0.01
@@ -19,14 +18,14 @@ def frames(seconds, touches=(), stuck=None):
     stuck = stuck or {}
     for i in range(round(seconds / PERIOD_S)):
         t = i * PERIOD_S
-        counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
+        frame = pressed(LAYOUT, t, {})
         for begin, end in touches:
             if begin <= t < end:
-                counts[3:5, 3:5] = 100 + round(200 * min(t - begin, 1.0))
+                frame.counts[3:5, 3:5] = 100 + round(200 * min(t - begin, 1.0))
         for place, (since, count) in stuck.items():
             if t >= since:
-                counts[place] += count
-        yield Frame(t, counts)
+                frame.counts[place] += count
+        yield frame
 
 
 def onsets(stream, horizon_s=1.0):
@@ -68,13 +67,11 @@ def test_a_touch_under_way_is_late_and_followed_from_the_first_frame():
 
 
 def test_a_touch_under_way_that_grows_is_followed_from_the_first_frame():
-    def growing():
-        for i in range(100):
-            counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-            counts[3, : 1 + i // 10] = 100
-            yield Frame(i * PERIOD_S, counts)
-
-    assert onsets(growing()) == [(0.0, True)]
+    growing = (
+        pressed(LAYOUT, i * PERIOD_S, {(3, tuple(range(1 + i // 10))): 100})
+        for i in range(100)
+    )
+    assert onsets(growing) == [(0.0, True)]
 
 
 def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
@@ -91,15 +88,9 @@ def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
 
 
 def test_a_touch_held_for_the_whole_window_is_not_set_aside_before_its_end():
-    def held():
-        for i in range(600):
-            counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-            counts[3, 3] = 100 * (i >= 20)
-            yield Frame(i * PERIOD_S, counts)
-
     tracker = WatchfulTracker(LAYOUT, horizon_s=4.0)
     ended = None
-    for frame in held():
+    for frame in frames(6.0, stuck={(3, 3): (0.2, 100)}):
         for contact in tracker.push(frame):
             ended = frame.t if contact.ended else ended
     assert ended is not None
@@ -110,60 +101,49 @@ def test_gaps_are_no_stillness():
     tracker = WatchfulTracker(LAYOUT, horizon_s=1.0)
     contacts = []
     for t, count in ((0.0, 0), (1.0, 100), (11.0, 100), (21.0, 100)):
-        counts = np.full(LAYOUT.shape, count, dtype=np.uint16)
-        contacts = tracker.push(Frame(t, counts))
+        contacts = tracker.push(pressed(LAYOUT, t, {...: count}))
     assert [contact.onset_s for contact in contacts] == [1.0]
 
 
-def push(still, t, counts):
-    active = ActiveTaxels(counts, LAYOUT.threshold_counts, wraps=LAYOUT.wraps)
-    still.push(Frame(t, counts), active)
+@pytest.fixture
+def still():
+    return StillTaxels(LAYOUT, 1.0)
+
+
+def push(still, t, taxels):
+    frame = pressed(LAYOUT, t, taxels)
+    still.push(frame, active_of(LAYOUT, frame))
 
 
 @pytest.mark.parametrize(
     ("change", "touched"), [(40, False), (41, True), (-40, False), (-41, True)]
 )
-def test_a_change_above_the_threshold_is_a_touch(change, touched):
-    still = StillTaxels(LAYOUT, 1.0)
-    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-    counts[1, 1] = 120
-    push(still, 0.0, counts)
+def test_a_change_above_the_threshold_is_a_touch(still, change, touched):
+    push(still, 0.0, {(1, 1): 120})
     assert still.aside.any()
-    counts[1, 1] = 120 + change
-    push(still, 1.0, counts)
+    push(still, 1.0, {(1, 1): 120 + change})
     assert still.touched is touched
 
 
-def test_a_change_below_a_quarter_of_a_high_count_is_no_touch():
-    still = StillTaxels(LAYOUT, 1.0)
-    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-    counts[1, 1] = 4000
-    push(still, 0.0, counts)
-    counts[1, 1] = 4999
-    push(still, 1.0, counts)
+def test_a_change_below_a_quarter_of_a_high_count_is_no_touch(still):
+    push(still, 0.0, {(1, 1): 4000})
+    push(still, 1.0, {(1, 1): 4999})
     assert not still.touched
-    counts[1, 1] = 5001
-    push(still, 1.1, counts)
+    push(still, 1.1, {(1, 1): 5001})
     assert still.touched
 
 
-def test_noise_of_half_the_threshold_is_still():
+def test_noise_of_half_the_threshold_is_still(still):
     rng = np.random.default_rng(0)
-    still = StillTaxels(LAYOUT, 1.0)
-    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-    push(still, 0.0, counts)
+    push(still, 0.0, {})
     for i in range(1, round((STILL_S + 4 * CHECK_S) / PERIOD_S)):
-        counts[2, 2] = 200 + rng.integers(-10, 11)
-        push(still, i * PERIOD_S, counts)
+        push(still, i * PERIOD_S, {(2, 2): 200 + rng.integers(-10, 11)})
     assert np.argwhere(still.aside).tolist() == [[2, 2]]
 
 
-def test_a_quiet_taxel_is_taken_back():
-    still = StillTaxels(LAYOUT, 1.0)
-    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-    counts[1, 1] = 50
-    push(still, 0.0, counts)
-    counts[1, 1] = 30
-    push(still, EARLY_S, counts)
+def test_a_quiet_taxel_is_taken_back(still):
+    push(still, 0.0, {(1, 1): 50})
+    assert still.aside.any()
+    push(still, EARLY_S, {(1, 1): 30})
     assert not still.aside.any()
     assert not still.touched
