@@ -69,7 +69,7 @@ def test_a_touch_under_way_is_late_and_followed_from_the_first_frame():
 def test_a_touch_under_way_that_grows_is_followed_from_the_first_frame():
     growing = (
         pressed(LAYOUT, i * PERIOD_S, {(3, tuple(range(1 + i // 10))): 100})
-        for i in range(100)
+        for i in range(80)
     )
     assert onsets(growing) == [(0.0, True)]
 
