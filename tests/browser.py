@@ -45,13 +45,8 @@ def chromium(width, address):
         pytest.skip("needs Chromium and chromedriver")
     options = webdriver.ChromeOptions()
     options.binary_location = program
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        "--disable-gpu",
-    ):
-        options.add_argument(argument)
+    for argument in ("headless=new", "no-sandbox", "hide-scrollbars", "disable-gpu"):
+        options.add_argument(f"--{argument}")
     browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
     try:
         size = {
@@ -72,12 +67,12 @@ def violations(browser):
     package = pytest.importorskip("axe_core_python", reason="needs the group `browser`")
     script = (Path(package.__file__).parent / "axe.min.js").read_text()
     browser.execute_cdp_cmd("Runtime.evaluate", {"expression": script})
-    found = browser.execute_async_script(
+    report = browser.execute_async_script(
         "axe.run().then(arguments[arguments.length - 1])"
     )
     return [
         f"{rule['id']}: {node['html'][:80]}"
-        for rule in found["violations"]
+        for rule in report["violations"]
         for node in rule["nodes"]
     ]
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -50,14 +51,13 @@ def touch(
     seconds=1.6,
     lead_s=0.2,
     arm=True,
-    rate=100.0,
     labels=None,
 ):
     """A contact that grows: a hard one in force, a soft one in area. It imitates no
     physics."""
     rng = np.random.default_rng([seed, len(kind)])
-    n = round((lead_s + seconds) * rate)
-    t = np.arange(n) / rate
+    n = round((lead_s + seconds) * 100)
+    t = np.arange(n) / 100.0
     rows, cols = FOREARM.shape
     row = rng.integers(4, 10)
     col = rng.integers(0, cols)
@@ -71,15 +71,17 @@ def touch(
         reach = 1 if kind == "hard" else 1 + int(3 * age)
         pressed = np.maximum(down, round_it) <= reach
         frames[i] = pressed * force / (1 + down + round_it)
-    joints = None
-    if arm:
-        joints = np.tile([0.2, 0.1, 0.0, 1.2, 0.0], (n, 1))
-        joints[:, 0] += 0.3 * t * slope
+    joints = np.tile([0.2, 0.1, 0.0, 1.2, 0.0], (n, 1))
+    joints[:, 0] += 0.3 * t * slope
     softness = "rigid" if kind == "hard" else "soft"
     usual = {"category": f"{softness}-fixed", "object": f"{kind} {seed % 2}"}
-    meta = {"labels": labels or usual, "skin": FOREARM.to_dict()}
-    meta |= {"source": "test", "trial": seed}
-    return Recording(t=t, frames=frames, joints=joints, meta=meta)
+    meta = {
+        "labels": labels or usual,
+        "skin": FOREARM.to_dict(),
+        "source": "test",
+        "trial": seed,
+    }
+    return Recording(t, frames, joints=joints if arm else None, meta=meta)
 
 
 @pytest.fixture(scope="session")
@@ -92,10 +94,9 @@ def save_touches(folder, count, **more):
     """The folder, with so many hard and so many soft touches, in the order of their
     seeds."""
     digits = len(str(count - 1))
-    for kind in ("hard", "soft"):
-        for seed in range(count):
-            path = folder / f"{kind}_{seed:0{digits}}.npz"
-            save(path, touch(kind=kind, seed=seed, **more))
+    for kind, seed in product(("hard", "soft"), range(count)):
+        path = folder / f"{kind}_{seed:0{digits}}.npz"
+        save(path, touch(kind=kind, seed=seed, **more))
     return folder
 
 
@@ -118,8 +119,12 @@ def in_a_row(*touches, rest=50):
     frames = [np.pad(one.frames, ((0, rest), (0, 0), (0, 0))) for one in touches]
     joints = [np.pad(one.joints, ((0, rest), (0, 0)), "edge") for one in touches]
     t = np.arange(sum(map(len, frames))) / 100.0
-    whole = {"frames": np.concatenate(frames), "joints": np.concatenate(joints)}
-    return replace(touches[0], t=t, **whole)
+    return replace(
+        touches[0],
+        t=t,
+        frames=np.concatenate(frames),
+        joints=np.concatenate(joints),
+    )
 
 
 def full_pipe():
@@ -155,9 +160,9 @@ def edge(capsys):
     """Run `edge-classify`; returns status, stdout's lines as JSON, and stderr."""
 
     def run(*arguments, text=False):
-        status = edge_classify([str(a) for a in arguments])
-        out = capsys.readouterr()
-        return status, out.out if text else lines(out.out), out.err
+        status = edge_classify(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return status, out if text else lines(out), err
 
     return run
 
@@ -165,7 +170,7 @@ def edge(capsys):
 def ended(*words, **options):
     """A command that ran in the project's folder, or in `cwd`, with its output as
     text."""
-    pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     options = {"cwd": ROOT, **pipes, **options}
     return subprocess.run(list(map(str, words)), text=True, **options)
 

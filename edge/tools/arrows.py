@@ -28,7 +28,7 @@ def region_shear(frame: Frame, regions: Sequence[Region]) -> NDArray[np.int64] |
 def characters(shear: NDArray[np.int64]) -> list[list[str]]:
     """An arrow, or an empty text, for each column of each two rows of taxels."""
     lines = []
-    longest = np.hypot(shear[..., 0], shear[..., 1]).max(initial=0.0)
+    longest = np.hypot(shear[..., 0], shear[..., 1]).max()
     for top in range(0, len(shear), 2):
         along, around = shear[top : top + 2].sum(axis=0).T
         sizes = np.hypot(along, around)

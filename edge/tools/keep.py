@@ -72,8 +72,7 @@ class Keeper:
         self._complete: deque[list[Frame]] = deque()
         """The frames of touches that wait for their decisions."""
         self._decided: list[Decided] = []
-        self._queue: queue.Queue[tuple[list[Frame], list[Decided]] | None]
-        self._queue = queue.Queue(WAITING)
+        self._queue = queue.Queue[tuple[list[Frame], list[Decided]] | None](WAITING)
         self._thread = threading.Thread(target=self._write_all, daemon=True)
         self._thread.start()
 

@@ -43,13 +43,6 @@ def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
     assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
 
 
-def test_the_feature_that_has_to_change_least_comes_first():
-    # The label turns with z . (2, 1) = 3.5: by 0.875 units in each of force's samples,
-    # or 3.5.
-    why = by_hand(BY_HAND._replace(rows=np.array([[2.0, 1.0], [-2.0, -1.0]])))
-    assert [change.feature for change in why.changes] == ["force", "area"]
-
-
 def unscaled(features, **more):
     """A space of features with a sample each, which stand as they are."""
     columns = np.arange(features)

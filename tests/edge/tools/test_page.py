@@ -197,9 +197,8 @@ def test_trials_of_the_folder_are_relabelled_and_deleted(folder_page, tmp_path):
     folder_page._act(RELABEL)
     folder_page._act({"do": "delete", "file": "b.npz"})
     assert not (tmp_path / "b.npz").exists()
-    changed = edge.load(tmp_path / "a.npz")
-    assert changed.labels == {**TOUCH.labels, "object": "sponge"}
-    assert np.array_equal(changed.frames, TOUCH.frames)
+    labels = edge.load(tmp_path / "a.npz").labels
+    assert labels == {**TOUCH.labels, "object": "sponge"}
 
 
 def test_a_damaged_recording_is_named_and_left_out(folder_page):
@@ -232,15 +231,6 @@ def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path)
     assert "b.npz" in folder_page._trials
     folder_page._act({"do": "undo"})
     assert (tmp_path / "a.npz").read_bytes() == before
-
-
-def test_a_recording_of_several_contacts_is_relabelled_no_more_than_by_label(
-    folder_page, tmp_path
-):
-    several = replace(TOUCH, meta={**TOUCH.meta, "contacts": "alike"})
-    edge.save(tmp_path / "a.npz", several)
-    with pytest.raises(InputError, match="its contacts have labels of their own"):
-        folder_page._act(RELABEL)
 
 
 @pytest.fixture
@@ -284,9 +274,7 @@ def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, kept):
 
 
 def test_a_touch_without_decisions_has_none_to_accept(folder_page):
-    with pytest.raises(
-        InputError, match="no decision names a label that it does not have"
-    ):
+    with pytest.raises(InputError, match=r"a\.npz: no decision names a label that it"):
         folder_page._act({"do": "accept", "file": "a.npz"})
 
 
@@ -315,7 +303,7 @@ THEME = re.compile(r"--([\w-]+): (#[0-9a-f]{6});")
 
 def luminance(colour):
     """The relative luminance of WCAG 2, of #rrggbb."""
-    channels = np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)]) / 255
+    channels = np.array(list(bytes.fromhex(colour[1:]))) / 255
     linear = np.where(
         channels <= 0.04045,
         channels / 12.92,

@@ -5,60 +5,58 @@ import pytest
 from edge.tools.slips import counts_text, slips
 
 
-def trials(**counts):
+def trials(counts):
     """Trials with an object each, so many of each name."""
     return [{"object": name} for name, count in counts.items() for _ in range(count)]
 
 
 @pytest.mark.parametrize(
-    ("label", "meant"),
+    ("meant", "label", "counts"),
     [
-        ("Box", "box"),
-        ("box ", "box"),
-        ("card-board", "card board"),
-        ("pilow", "pillow"),
+        ("box", "Box", (8, 1)),
+        ("box", "box ", (8, 1)),
+        ("card board", "card-board", (8, 1)),
+        ("pillow", "pilow", (8, 1)),
+        # A short label is a slip of a far more frequent one.
+        ("pen", "pem", (20, 2)),
+        ("box", "bx", (20, 2)),
+        ("tin", "Tin", (20, 2)),
+        # Labels that differ in case alone are one, however frequent.
+        ("box", "Box", (4, 4)),
     ],
 )
-def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(label, meant):
-    labels = [{"object": meant}] * 8 + [{"object": label}]
-    assert slips(labels) == [f"object={label!r} on 1 of 9 recordings; is it {meant!r}?"]
+def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
+    meant, label, counts
+):
+    labels = trials(dict(zip((meant, label), counts, strict=True)))
+    sentence = (
+        f"object={label!r} on {counts[1]} of {sum(counts)} recordings; is it {meant!r}?"
+    )
+    assert slips(labels) == [sentence]
 
 
 @pytest.mark.parametrize(
-    ("label", "frequent"),
-    [("box 1", "box 2"), ("cup", "cap"), ("soft", "hard"), ("chair", "table")],
+    "counts",
+    [
+        {"box 2": 8, "box 1": 2},  # numbers
+        {"cap": 8, "cup": 2},  # short labels
+        {"a": 30, "b": 2},  # letters
+        {"hard": 8, "soft": 2},
+        {"table": 8, "chair": 2},
+        {
+            "box": 1,
+            "tree": 1,
+            "sofa": 1,
+        },  # where every label has one trial, none is odd
+    ],
 )
-def test_labels_that_differ_by_a_number_or_are_short_are_no_slips(label, frequent):
-    labels = [{"object": frequent}] * 8 + [{"object": label}] * 2
-    assert slips(labels) == []
-
-
-@pytest.mark.parametrize(
-    ("label", "meant"), [("pem", "pen"), ("bx", "box"), ("Tin", "tin")]
-)
-def test_a_short_label_is_a_slip_of_a_far_more_frequent_one(label, meant):
-    labels = [{"object": meant}] * 20 + [{"object": label}] * 2
-    assert slips(labels) == [
-        f"object={label!r} on 2 of 22 recordings; is it {meant!r}?"
-    ]
-
-
-def test_letters_are_no_slips_of_each_other():
-    assert slips(trials(a=30, b=2)) == []
-
-
-def test_labels_that_differ_in_case_alone_are_one_however_frequent():
-    assert slips(trials(box=4, Box=4)) == [
-        "object='Box' on 4 of 8 recordings; is it 'box'?"
-    ]
+def test_labels_that_are_meant_are_no_slips(counts):
+    assert slips(trials(counts)) == []
 
 
 def test_a_label_with_one_trial_is_named():
-    assert slips(trials(box=5, tree=1)) == ["object='tree' on a single recording"]
-
-
-def test_where_every_label_has_one_trial_none_is_odd():
-    assert slips(trials(box=1, tree=1, sofa=1)) == []
+    labels = trials({"box": 5, "tree": 1})
+    assert slips(labels) == ["object='tree' on a single recording"]
 
 
 def test_a_task_that_nearly_all_trials_lack_is_named_with_what_is_meant():
