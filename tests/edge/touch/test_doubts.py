@@ -4,32 +4,28 @@ import numpy as np
 import pytest
 
 from edge.touch.doubts import SELDOM, flags_of, frame_doubts, is_several
-from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.track import ContactTracker
+from tests.edge.touch.pressed import followed, pressed
 
 LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
 WINDOW_S = 1.2
 ANGLES = np.array([0.1, 0.2])
 
 
-def series(times, picture, joints=None):
-    """The series of a contact whose frame i is picture(i), with joint angles
-    joints(i)."""
-    count = 0 if joints is None else 2
-    names = ("max_force", "joint_change") if count else ("max_force",)
-    tracker = ContactTracker(LAYOUT, horizon_s=2.0, features=names, joints=count)
-    contacts = []
-    for i, t in enumerate(times):
-        angles = None if joints is None else joints(i)
-        contacts = tracker.push(Frame(t, picture(i), joints=angles)) or contacts
-    return contacts[0].series()
+def series(times, taxels, joints=None):
+    """The series of a contact whose frame i has the pressed taxels(i), and the joint
+    angles joints(i)."""
+    frames = [
+        pressed(LAYOUT, t, taxels(i), joints=joints and joints(i))
+        for i, t in enumerate(times)
+    ]
+    names = ["max_force", "joint_change"] if joints else ["max_force"]
+    contact = followed(LAYOUT, frames, horizon_s=2.0, features=names, joints=2)
+    return contact.series()
 
 
-def pressed(i):
-    counts = np.zeros(LAYOUT.shape, dtype=np.uint16)
-    counts[3, 3] = 100 + i
-    return counts
+def growing(i):
+    return {(3, 3): 100 + i}
 
 
 def doubts(felt, several_share=1.0, limits=()):
@@ -40,38 +36,36 @@ TIMES = np.arange(140) * 0.01
 
 
 def test_an_ordinary_contact_raises_no_doubt():
-    assert doubts(series(TIMES, pressed)) == set()
+    assert doubts(series(TIMES, growing)) == set()
 
 
 @pytest.mark.parametrize(("pause_s", "flags"), [(0.08, set()), (0.12, {"gap"})])
 def test_a_pause_of_a_tenth_of_a_second_is_a_gap(pause_s, flags):
     times = np.where(TIMES > 0.5, TIMES + pause_s, TIMES)
-    assert doubts(series(times, pressed)) == flags
+    assert doubts(series(times, growing)) == flags
 
 
 @pytest.mark.parametrize(("pause_s", "flags"), [(0.2, set()), (0.5, {"gap"})])
 def test_of_slow_frames_a_pause_is_compared_with_the_usual_one(pause_s, flags):
     times = np.arange(14) * 0.15
     late = np.where(times > 0.5, times + pause_s - 0.15, times)
-    assert doubts(series(late, pressed)) == flags
+    assert doubts(series(late, growing)) == flags
 
 
 @pytest.mark.parametrize(("frames", "flags"), [(9, set()), (12, {"frozen"})])
 def test_frames_that_repeat_for_a_tenth_of_a_second_are_frozen(frames, flags):
     def frozen(i):
-        return pressed(min(i, 50) if i <= 50 + frames else i)
+        return growing(min(i, 50) if i <= 50 + frames else i)
 
     assert doubts(series(TIMES, frozen)) == flags
 
 
 def beside(share):
-    def picture(i):
-        counts = pressed(i)
-        counts[3, 4] = 100
-        counts[7, 7] = 61 * (i % 100 < 100 * share)
-        return counts
+    def taxels(i):
+        second = 61 * (i % 100 < 100 * share)
+        return {**growing(i), (3, 4): 100, (7, 7): second}
 
-    return picture
+    return taxels
 
 
 @pytest.mark.parametrize(("share", "several"), [(0.1, False), (0.3, True)])
@@ -88,9 +82,9 @@ def test_a_second_region_is_a_doubt_where_training_seldom_had_one(seldom, flags)
 
 
 def test_joint_angles_that_never_change_are_still():
-    still = series(TIMES, pressed, lambda i: ANGLES.copy())
+    still = series(TIMES, growing, lambda i: ANGLES.copy())
     assert doubts(still, limits=(None, None)) == {"still_joints"}
-    moving = series(TIMES, pressed, lambda i: ANGLES + 1e-6 * i)
+    moving = series(TIMES, growing, lambda i: ANGLES + 1e-6 * i)
     assert doubts(moving, limits=(None, None)) == set()
 
 
@@ -103,5 +97,5 @@ def test_joint_angles_that_never_change_are_still():
     ],
 )
 def test_joint_angles_beyond_their_limits_are_named(limit, flags):
-    moving = series(TIMES, pressed, lambda i: ANGLES + 1e-6 * i)
+    moving = series(TIMES, growing, lambda i: ANGLES + 1e-6 * i)
     assert doubts(moving, limits=(limit, None)) == flags
