@@ -128,13 +128,17 @@ def test_a_decision_comes_with_the_nearest_training_trials_and_their_distances(
     assert distances == tuple(decided.decision.distances.round(3).tolist())
 
 
+def act(page, kind, **more):
+    return page._act({"do": kind, **more})
+
+
 def test_labels_and_recording_are_set_from_the_page(page):
     assert not page.recording
     with pytest.raises(InputError, match="give a label first"):
-        page._act({"do": "record", "on": True})
+        act(page, "record", on=True)
 
-    page._act({"do": "labels", "labels": {" object ": "box "}})
-    page._act({"do": "record", "on": True})
+    act(page, "labels", labels={" object ": "box "})
+    act(page, "record", on=True)
 
     assert page.labels == {"object": "box"}
     assert page.recording
@@ -161,26 +165,26 @@ def test_an_action_that_makes_no_sense_is_refused(page, action):
 
 def test_a_label_that_is_given_leaves_those_of_other_tasks(page):
     """A browser whose form is old changes no more than what is chosen there."""
-    page._act({"do": "labels", "labels": {"object": "box", "softness": "hard"}})
-    page._act({"do": "labels", "labels": {"softness": "soft"}})
+    act(page, "labels", labels={"object": "box", "softness": "hard"})
+    act(page, "labels", labels={"softness": "soft"})
     assert page.labels == {"object": "box", "softness": "soft"}
-    page._act({"do": "unlabel", "task": "object"})
+    act(page, "unlabel", task="object")
     assert page.labels == {"softness": "soft"}
 
 
 def test_without_any_label_nothing_is_recorded(serve):
     page = serve(labels={"object": "box"})
     assert page.recording
-    page._act({"do": "unlabel", "task": "object"})
+    act(page, "unlabel", task="object")
     assert not page.recording
 
 
 def test_a_page_without_a_folder_changes_nothing(serve):
     with pytest.raises(InputError, match="record --web"):
-        serve(folder=None)._act({"do": "trials"})
+        act(serve(folder=None), "trials")
 
 
-RELABEL = {"do": "relabel", "file": "a.npz", "labels": {"object": "sponge"}}
+SPONGE = {"file": "a.npz", "labels": {"object": "sponge"}}
 TOUCH = edge.load(demo.FOLDER / "foam-block-fixed.npz")
 
 
@@ -194,8 +198,8 @@ def folder_page(tmp_path, serve):
 
 
 def test_trials_of_the_folder_are_relabelled_and_deleted(folder_page, tmp_path):
-    folder_page._act(RELABEL)
-    folder_page._act({"do": "delete", "file": "b.npz"})
+    act(folder_page, "relabel", **SPONGE)
+    act(folder_page, "delete", file="b.npz")
     assert not (tmp_path / "b.npz").exists()
     labels = edge.load(tmp_path / "a.npz").labels
     assert labels == {**TOUCH.labels, "object": "sponge"}
@@ -213,23 +217,23 @@ def test_a_damaged_recording_is_named_and_left_out(folder_page):
 def test_the_last_action_is_undone(folder_page, tmp_path, action):
     path = tmp_path / "a.npz"
     before = path.read_bytes()
-    folder_page._act({**RELABEL, "do": action})
+    act(folder_page, action, **SPONGE)
     assert not path.exists() or path.read_bytes() != before
-    folder_page._act({"do": "undo"})
+    act(folder_page, "undo")
     assert path.read_bytes() == before
     assert "a.npz" in folder_page._trials
     with pytest.raises(InputError, match="nothing to undo"):
-        folder_page._act({"do": "undo"})
+        act(folder_page, "undo")
 
 
 def test_a_trial_that_is_gone_takes_no_former_change_away(folder_page, tmp_path):
     before = (tmp_path / "a.npz").read_bytes()
-    folder_page._act(RELABEL)
+    act(folder_page, "relabel", **SPONGE)
     (tmp_path / "b.npz").unlink()
     with pytest.raises(InputError, match="cannot be deleted: No such file"):
-        folder_page._act({"do": "delete", "file": "b.npz"})
+        act(folder_page, "delete", file="b.npz")
     assert "b.npz" in folder_page._trials
-    folder_page._act({"do": "undo"})
+    act(folder_page, "undo")
     assert (tmp_path / "a.npz").read_bytes() == before
 
 
@@ -253,7 +257,7 @@ def kept_page(kept, serve):
 
 
 def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_page):
-    (touch,) = kept_page._act({"do": "trials"})
+    (touch,) = act(kept_page, "trials")
     assert touch["file"] == "kept-1.npz"
     assert touch["decided"]["softness"]["label"] == "hard"
     assert touch["kinds"] == ["unsure", "unlabelled"]
@@ -262,24 +266,23 @@ def test_a_kept_touch_has_its_course_its_decision_and_what_asks_for_a_look(kept_
 
 
 def test_a_decision_is_accepted_and_corrected_with_undo(kept_page, kept):
-    kept_page._act({"do": "accept", "file": "kept-1.npz"})
+    act(kept_page, "accept", file="kept-1.npz")
     assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
-    correct = {"do": "relabel", "file": "kept-1.npz", "labels": {"softness": "soft"}}
-    kept_page._act(correct)
-    (touch,) = kept_page._act({"do": "trials"})
+    act(kept_page, "relabel", file="kept-1.npz", labels={"softness": "soft"})
+    (touch,) = act(kept_page, "trials")
     assert touch["labels"] == {"softness": "soft"}
     assert touch["kinds"] == ["unsure", "wrong"]
-    kept_page._act({"do": "undo"})
+    act(kept_page, "undo")
     assert edge.load(kept / "kept-1.npz").labels == {"softness": "hard"}
 
 
 def test_a_touch_without_decisions_has_none_to_accept(folder_page):
     with pytest.raises(InputError, match=r"a\.npz: no decision names a label that it"):
-        folder_page._act({"do": "accept", "file": "a.npz"})
+        act(folder_page, "accept", file="a.npz")
 
 
 def files(page):
-    return [touch["file"] for touch in page._act({"do": "trials"})]
+    return [touch["file"] for touch in act(page, "trials")]
 
 
 def test_touches_that_come_into_the_folder_are_shown(kept_page, kept, another):
@@ -292,7 +295,7 @@ def test_touches_that_come_into_the_folder_are_shown(kept_page, kept, another):
 def test_a_picture_tells_when_the_list_has_changed(folder_page, pictures):
     still = Frame(0.0, np.zeros(TOUCH.layout.shape, np.uint16))
     folder_page.push(still)
-    folder_page._act({"do": "delete", "file": "a.npz"})
+    act(folder_page, "delete", file="a.npz")
     folder_page.push(replace(still, t=1.0))
     before, after = (picture["trials"] for picture in pictures)
     assert after > before
