@@ -55,17 +55,16 @@ def parser() -> argparse.ArgumentParser:
         "others are chosen for each task: the smallest model within one standard error "
         "of the best in cross-validation.",
     )
-    _add_files(top)
     _add_settings(top)
     _add_choice(top)
-    _add_front(top)
     _add_results(top)
     top.set_defaults(run=run)
     return top
 
 
-def _add_files(top: argparse.ArgumentParser) -> None:
-    """The recordings, the model and its tasks."""
+def _add_settings(top: argparse.ArgumentParser) -> None:
+    """The recordings, the model and its tasks, and the settings that can be held
+    fixed."""
     option = top.add_argument
     option(
         "--data",
@@ -84,11 +83,6 @@ def _add_files(top: argparse.ArgumentParser) -> None:
         "--name", help="of the model (default: that of the folder of the recordings)"
     )
     option("--tasks", nargs="+", metavar="TASK", help="only these keys of the labels")
-
-
-def _add_settings(top: argparse.ArgumentParser) -> None:
-    """The settings that can be held fixed."""
-    option = top.add_argument
     option(
         "--features",
         nargs="+",
@@ -141,8 +135,9 @@ def _add_choice(top: argparse.ArgumentParser) -> None:
     option("--onset", type=counts, help="counts above which a contact begins")
 
 
-def _add_front(top: argparse.ArgumentParser) -> None:
-    """The point of `make tradeoff`, and the arm."""
+def _add_results(top: argparse.ArgumentParser) -> None:
+    """The point of `make tradeoff`, the arm, and the files that are written or
+    scored."""
     option = top.add_argument
     option(
         "--front",
@@ -158,11 +153,6 @@ def _add_front(top: argparse.ArgumentParser) -> None:
         help="the file with the points (default: %(default)s)",
     )
     add_arm(top, "for recordings whose joint angles name no arm (default: Cody's)")
-
-
-def _add_results(top: argparse.ArgumentParser) -> None:
-    """The options of files that are written or scored."""
-    option = top.add_argument
     text = "also write OUT/report.html, as `make export` does"
     option("--report", action="store_true", help=text)
     text = "recordings that are scored and never fitted, such as those of another day"

@@ -75,7 +75,13 @@ def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
     arrays["series_counts"] = np.concatenate([integers_of(course) for course in series])
     arrays["vectors"] = _vectors(model, series, X)
     if info.decision_points_s:
-        arrays["decision_point_vectors"] = _early_vectors(model, series)
+        # The trials, which were trained with, and points between them.
+        early = np.array(
+            [[info.vector(c, s) for c in series] for s in info.decision_points_s]
+        )
+        between = 0.5 * (early + np.roll(early, 1, axis=1))
+        vectors = np.concatenate([early, between], axis=1)
+        arrays["decision_point_vectors"] = vectors
     meta = {
         "skin": recordings[0].meta.get("skin", {}),
         "bounds": BOUNDS,
@@ -115,14 +121,3 @@ def _vectors(model: Model, series: Sequence[FeatureSeries], X: Floats) -> Floats
     wrong[0, min(5, X.shape[1] - 1)] = np.nan
     wrong[1, -1] = np.inf
     return np.concatenate([of_trials, rows, mixed, wrong])
-
-
-def _early_vectors(model: Model, series: Sequence[FeatureSeries]) -> Floats:
-    """(decision points, m, width): the trials, which were trained with, and points
-    between them."""
-    info = model.info
-    early = np.array(
-        [[info.vector(c, s) for c in series] for s in info.decision_points_s]
-    )
-    between = 0.5 * (early + np.roll(early, 1, axis=1))
-    return np.concatenate([early, between], axis=1)

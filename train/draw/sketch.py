@@ -80,7 +80,12 @@ def draw_side(
     motion = ""
     for moment in MOMENTS:
         k = int((recording.t[:-1] < onset + moment.after_s).sum())
-        _arm(axis, chain, joints[k], layout, moment)
+        x, _, z = link_positions(chain, joints[k]).T
+        line = {"color": moment.colour, "label": moment.name, "markersize": 4}
+        axis.plot(x, z, moment.line, marker="o", **line)
+        if layout.radius_m is not None:
+            corners = skin_outline(chain.pose(joints[k]), layout)
+            axis.fill(*corners.T, facecolor=moment.colour, alpha=0.35)
         last = _last_contact(recording, joints, chain, layout, k)
         if last is None:
             continue
@@ -99,22 +104,6 @@ def draw_side(
     axis.set(xlabel=f"x in the frame of {chain.base}, metres", ylabel="z, metres")
     axis.set_aspect("equal", adjustable="datalim")
     axis.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4)
-
-
-def _arm(
-    axis: Any,
-    chain: Chain,
-    q: Floats,
-    layout: SkinLayout,
-    moment: Moment,
-) -> None:
-    """Draw the arm at joint angles q, with the skin of a cylinder around it."""
-    style = {"color": moment.colour, "label": moment.name, "markersize": 4}
-    x, _, z = link_positions(chain, q).T
-    axis.plot(x, z, moment.line, marker="o", **style)
-    if layout.radius_m is not None:
-        corners = skin_outline(chain.pose(q), layout)
-        axis.fill(*corners.T, facecolor=moment.colour, alpha=0.35)
 
 
 def _title(simulation: Mapping[str, Any], motion: str) -> str:

@@ -79,10 +79,13 @@ def draw(
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     axes = figure.subplots(1, 2)
     unit = UNITS.get(contacts.head.unit, contacts.head.unit)
+    name, lines = ("", []) if info is None else outline(info)
     for axis, (across, up, view) in zip(axes, VIEWS, strict=True):
-        if info is not None:
-            _draw_outline(axis, info, [across, up])
-        _draw_touches(axis, touches, chosen, [across, up])
+        plane = [across, up]
+        for i, line in enumerate(lines):
+            label = None if i else name
+            axis.plot(*line[:, plane].T, color="0.6", lw=2.0, zorder=0, label=label)
+        _draw_touches(axis, touches, chosen, plane)
         axis.set(
             xlabel=f"{'xyz'[across]} ({unit})",
             ylabel=f"{'xyz'[up]} ({unit})",
@@ -101,14 +104,6 @@ def draw(
     figure.suptitle(f"{counted(len(touches), 'contact')} in the frame of {frame}")
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
-
-
-def _draw_outline(axis: Any, info: ModelInfo, plane: list[int]) -> None:
-    """Draw a model's arm or skin behind the contacts, in a plane of two axes."""
-    name, lines = outline(info)
-    for i, line in enumerate(lines):
-        label = None if i else name
-        axis.plot(*line[:, plane].T, color="0.6", lw=2.0, zorder=0, label=label)
 
 
 def _draw_touches(

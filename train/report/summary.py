@@ -198,7 +198,13 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
     choice = fitted.chosen[task].choice
     components = classifier.components_[task]
     if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
-        yield _posture(fitted.dataset, task)
+        share = posture_accuracy(fitted.dataset, task)
+        yield (
+            f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
+            f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
+            "recognise places instead of objects; leave posture out of --features to judge "
+            "touch alone"
+        )
     if choice.components > components and choice.projection == "pca":
         yield (
             f"warning: {task}: the trials span {components} components, "
@@ -211,17 +217,6 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
             f"warning: {task}: two components explain the same variance to within "
             f"{gap:.1e}; which of them is kept is arbitrary"
         )
-
-
-def _posture(dataset: DataSet, task: str) -> str:
-    """A sentence on what the joint angles tell of a task before any touch."""
-    share = posture_accuracy(dataset, task)
-    return (
-        f"{'warning: ' if share > LEAK else ''}{task}: the joint angles at onset alone "
-        f"give {share:.1%} of the labels (1-NN, leave-one-out), so the model may "
-        "recognise places instead of objects; leave posture out of --features to judge "
-        "touch alone"
-    )
 
 
 def _geometry(fitted: Fitted, task: str) -> Iterator[str]:

@@ -72,10 +72,10 @@ def test_too_many_or_an_empty_one_are_refused(make_touch, tmp_path):
 def test_touches_in_other_units_do_not_share_an_axis(make_touch, tmp_path):
     touch = make_touch()
     counts = {**touch.meta["skin"], "counts_per_newton": None}
-    other = replace(touch, meta={**touch.meta, "skin": counts})
+    in_counts = replace(touch, meta={**touch.meta, "skin": counts})
     sentence = "b: max_force is in counts, that of the first recording in N"
     with pytest.raises(InputError, match=sentence):
-        comparison.draw([("a", touch), ("b", other)], tmp_path / "a.png")
+        comparison.draw([("a", touch), ("b", in_counts)], tmp_path / "a.png")
     assert not (tmp_path / "a.png").exists()
 
 

@@ -61,6 +61,6 @@ def test_a_folder_without_the_trials_is_one_sentence(
     refusal,
 ):
     save(tmp_path / "new.npz", make_touch(kind="soft", seed=9))
-    said = refusal("show", tmp_path / "new.npz", "--model", exported / "model.onnx")
-    assert "holds none of the nearest trials, such as soft_" in said
-    assert said.endswith("name their folder by --data")
+    message = refusal("show", tmp_path / "new.npz", "--model", exported / "model.onnx")
+    assert "holds none of the nearest trials, such as soft_" in message
+    assert message.endswith("name their folder by --data")

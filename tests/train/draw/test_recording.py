@@ -16,10 +16,16 @@ from train.draw.recording import draw
 TOUCH = demo.recordings()[0]
 
 
-def test_the_sketch_is_drawn_below_the_curves(tmp_path):
-    plain = tmp_path / "plain.png"
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The picture of a touch."""
+    out = tmp_path_factory.mktemp("picture") / "plain.png"
+    assert main(["show", str(TOUCH), "--out", str(out)]) == 0
+    return out
+
+
+def test_the_sketch_is_drawn_below_the_curves(plain, tmp_path):
     sketched = tmp_path / "sketched.png"
-    assert main(["show", str(TOUCH), "--out", str(plain)]) == 0
     assert main(["show", str(TOUCH), "--scene", "--out", str(sketched)]) == 0
     assert sketched.stat().st_size > plain.stat().st_size
 
@@ -32,15 +38,14 @@ def test_a_label_with_dollar_signs_is_no_formula(tmp_path, beside):
     assert main(["show", str(tmp_path / "a.npz"), *beside]) == 0
 
 
-def test_shear_adds_arrows(tmp_path):
+def test_shear_adds_arrows(plain, tmp_path):
     touch = load(TOUCH)
     quarter = (touch.frames // 4).astype(np.int16)
     sheared = replace(touch, shear=np.stack([quarter, -quarter], axis=3))
-    draw(touch, tmp_path / "plain.png")
     draw(sheared, tmp_path / "arrows.png")
-    plain, arrows = (imread(tmp_path / name) for name in ("plain.png", "arrows.png"))
-    assert plain.shape == arrows.shape
-    white = (arrows == 1.0).all(axis=2).sum() - (plain == 1.0).all(axis=2).sum()
+    without, arrows = (imread(path) for path in (plain, tmp_path / "arrows.png"))
+    assert without.shape == arrows.shape
+    white = (arrows == 1.0).all(axis=2).sum() - (without == 1.0).all(axis=2).sum()
     assert white > 100
 
 
@@ -55,8 +60,16 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
     assert not (tmp_path / "no.png").exists()
 
 
+def edited(folder, simulation):
+    """The file of a touch with another simulation."""
+    touch = load(TOUCH)
+    file = folder / "edited.npz"
+    save(file, replace(touch, meta={**touch.meta, "simulation": simulation}))
+    return file
+
+
 @pytest.mark.parametrize(
-    "edited",
+    "simulation",
     [
         5,
         {"effects": ["sliding"]},
@@ -65,13 +78,12 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
     ],
 )
 def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
-    edited,
-    tmp_path,
-    refusal,
+    simulation, tmp_path, refusal
 ):
-    touch = load(TOUCH)
-    file = tmp_path / "edited.npz"
-    save(file, replace(touch, meta={**touch.meta, "simulation": edited}))
-    assert main(["show", str(file)]) == 0
+    file = edited(tmp_path, simulation)
     sentence = refusal("show", file, "--scene")
     assert sentence.startswith(f"train: {file}: meta.simulation: not that of a scene: ")
+
+
+def test_an_edited_simulation_does_not_hinder_a_picture_without_the_sketch(tmp_path):
+    assert main(["show", str(edited(tmp_path, 5))]) == 0

@@ -22,9 +22,9 @@ HEAD = {
 
 
 def touch(n, place, label, confidence=1.0):
-    known = {"event": "decision", "task": "category", "flags": []}
-    known |= {"contact": n, "onset_s": float(n)}
-    return known | {"place": place, "label": label, "confidence": confidence}
+    decision = {"event": "decision", "task": "category", "flags": []}
+    decision |= {"contact": n, "onset_s": float(n)}
+    return decision | {"place": place, "label": label, "confidence": confidence}
 
 
 @pytest.fixture

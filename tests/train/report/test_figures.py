@@ -14,9 +14,9 @@ from train.report.figures import PHONE, STROKES, bars, confusion
 
 def test_the_same_numbers_give_the_same_bytes_and_others_do_not():
     truth = np.array(["a", "a", "b"])
-    said = np.array(["a", "z", "b"])
-    first = confusion("n", "t", truth, said)
-    assert first == confusion("n", "t", truth, said)
+    answers = np.array(["a", "z", "b"])
+    first = confusion("n", "t", truth, answers)
+    assert first == confusion("n", "t", truth, answers)
     assert first.png != confusion("n", "t", truth, truth).png
     assert imread(io.BytesIO(first.narrow)).shape[1] == PHONE * 200
 

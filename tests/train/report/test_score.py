@@ -56,8 +56,8 @@ def test_a_change_that_moves_trials_among_others_costs():
     X, y = clear()
     best = grid_search(X, {"t": y})
     assert transfer(X, {"t": y}, best, X + 0.01)["t"].accuracy > 0.8
-    others = np.roll(X, 1, axis=0)
-    assert transfer(X, {"t": y}, best, others)["t"].accuracy < 0.3
+    next_trials = np.roll(X, 1, axis=0)
+    assert transfer(X, {"t": y}, best, next_trials)["t"].accuracy < 0.3
 
 
 def test_nested_accuracy_of_clear_classes_is_one():

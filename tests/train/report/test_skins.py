@@ -39,8 +39,8 @@ def taxels(layout):
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (3, 5), (7, 11)])
 def test_a_larger_taxel_lies_in_the_middle_of_its_parts(forearm, angles, row, col):
     skin = replace(forearm, column_angles_deg=angles)
-    parts = product((2 * row, 2 * row + 1), (2 * col, 2 * col + 1))
-    middle = np.mean([skin.position(*part) for part in parts], axis=0)
+    places = product((2 * row, 2 * row + 1), (2 * col, 2 * col + 1))
+    middle = np.mean([skin.position(*place) for place in places], axis=0)
     place = pooled_layout(skin).position(row, col)
     assert place[2] == pytest.approx(middle[2])
     assert direction(place) == pytest.approx(direction(middle))

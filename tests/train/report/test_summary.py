@@ -20,7 +20,7 @@ from train.report.summary import (
 )
 
 
-def said(fitted, words):
+def warnings_with(fitted, words):
     """The warnings with some words."""
     return [line for line in warnings(fitted) if words in line]
 
@@ -54,32 +54,37 @@ def test_flattering_data_and_left_out_recordings_get_a_warning(
     assert f"the window of 9 s is too long: {ends}" in text
 
 
+def refitted(recordings, folder, features, change):
+    """The fit of recordings that a function of their place and themselves changes."""
+    for i, path in enumerate(sorted(recordings.glob("*.npz"))):
+        save(folder / path.name, change(i, load(path)))
+    return train.fit(str(folder), features=[features], jobs=1, k=1, quick=True)
+
+
 def test_joint_angles_that_leak_the_label_get_a_warning(recordings, tmp_path):
     """The arm stood elsewhere for each object: its angles tell all without a touch."""
     objects = sorted({load(path).labels["object"] for path in recordings.glob("*.npz")})
-    for path in recordings.glob("*.npz"):
-        recording = load(path)
-        place = 0.3 * objects.index(recording.labels["object"])
-        joints = np.full_like(recording.joints, place)
-        save(tmp_path / path.name, replace(recording, joints=joints))
-    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+
+    def place(_, recording):
+        angle = 0.3 * objects.index(recording.labels["object"])
+        return replace(recording, joints=np.full_like(recording.joints, angle))
+
+    fitted = refitted(recordings, tmp_path, "posture", place)
     assert posture_accuracy(fitted.dataset, "object") == 1.0
-    (sentence,) = said(fitted, "warning: object")
+    (sentence,) = warnings_with(fitted, "warning: object")
     assert "at onset alone give 100.0% of the labels" in sentence
 
 
 def test_joint_angles_common_to_objects_are_no_leak(recordings, tmp_path):
     """Every recording begins in a pose that one of another object has too, and no
     other."""
-    for i, path in enumerate(sorted(recordings.glob("*.npz"))):
-        recording = load(path)
-        save(
-            tmp_path / path.name,
-            replace(recording, joints=0.0 * recording.joints + i % 8),
-        )
-    fitted = train.fit(str(tmp_path), features=["posture"], jobs=1, k=1, quick=True)
+
+    def place(i, recording):
+        return replace(recording, joints=0.0 * recording.joints + i % 8)
+
+    fitted = refitted(recordings, tmp_path, "posture", place)
     assert posture_accuracy(fitted.dataset, "object") == 0.0 < LEAK
-    assert said(fitted, "warning: object: the joint angles") == []
+    assert warnings_with(fitted, "warning: object: the joint angles") == []
 
 
 def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
@@ -88,24 +93,21 @@ def test_equal_trials_of_different_labels_are_counted(recordings, tmp_path):
     shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
     touch = load(recordings / "soft_7.npz")
     save(tmp_path / "again.npz", touch)
-    other = {**touch.labels, "object": "another"}
-    save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": other}))
+    labels = {**touch.labels, "object": "another"}
+    save(tmp_path / "other.npz", replace(touch, meta={**touch.meta, "labels": labels}))
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1, k=1)
-    (sentence,) = said(fitted, "have the same coordinates")
+    (sentence,) = warnings_with(fitted, "have the same coordinates")
     assert sentence.startswith("warning: object: 3 trials have")
 
 
 def test_a_task_of_one_label_has_no_trial_far_outside(recordings, tmp_path):
-    for path in sorted(recordings.glob("*.npz")):
-        recording = load(path)
+    def label(_, recording):
         labels = {**recording.labels, "place": "here"}
-        save(
-            tmp_path / path.name,
-            replace(recording, meta={**recording.meta, "labels": labels}),
-        )
-    fitted = train.fit(str(tmp_path), features=["paper"], jobs=1, k=1, quick=True)
+        return replace(recording, meta={**recording.meta, "labels": labels})
+
+    fitted = refitted(recordings, tmp_path, "paper", label)
     assert "place" in fitted.chosen
-    assert said(fitted, "lies far outside") == []
+    assert warnings_with(fitted, "lies far outside") == []
 
 
 @pytest.mark.parametrize("factor", [3e6, 1e12])
@@ -116,13 +118,15 @@ def test_a_trial_so_far_outside_that_the_others_hardly_differ_is_named(
     times too many leaves a few steps for all others."""
     fixed = {"projection": "pca", "scaling": "none", "jobs": 1, "k": 1}
     fitted = train.fit(str(recordings), features=["paper"], components=5, **fixed)
-    assert said(fitted, "steps") == []
+    assert warnings_with(fitted, "steps") == []
     outlier = fitted.X.copy()
     outlier[7] *= factor
     dataset = fitted.dataset
     classifier = ContactClassifier(fitted.classifier.choices, dataset.names)
     classifier.fit(outlier, {task: dataset.labels(task) for task in fitted.chosen})
-    sentences = said(replace(fitted, classifier=classifier, X=outlier), "steps")
+    sentences = warnings_with(
+        replace(fitted, classifier=classifier, X=outlier), "steps"
+    )
     assert len(sentences) == len(fitted.chosen)
     path = dataset.trials[7].path
     assert f"because {path} lies far outside all others" in sentences[0]
@@ -146,32 +150,31 @@ def test_rows_that_are_equal_but_for_rounding_are_not_equal():
     assert tied_across_labels(rows, np.array([0, 1, 1, 0, 1, 1])) == 2
 
 
-def test_a_joint_angle_beyond_its_limits_is_named_with_file_and_frame(fitted):
-    trial = fitted.measured.trials[1]
-    joints = trial.recording.joints.copy()
-    joints[7, 2] = 1e4
-    recording = replace(trial.recording, joints=joints)
-    trials = list(fitted.measured.trials)
-    trials[1] = replace(trial, recording=recording)
-    wrong = replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
+def with_joints(fitted, change):
+    """The fit of trials whose joint angles a function of their place and themselves
+    gives."""
+    trials = []
+    for i, trial in enumerate(fitted.measured.trials):
+        recording = replace(trial.recording, joints=change(i, trial.recording.joints))
+        trials.append(replace(trial, recording=recording))
+    return replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
 
-    (line,) = said(wrong, "beyond its limits")
-    assert f"{trial.path}: at frame 7 joint upper_arm_roll is at 10000" in line
-    assert said(fitted, "beyond its limits") == []
+
+def test_a_joint_angle_beyond_its_limits_is_named_with_file_and_frame(fitted):
+    def change(i, joints):
+        joints = joints.copy()
+        joints[7, 2] = 1e4 if i == 1 else joints[7, 2]
+        return joints
+
+    (line,) = warnings_with(with_joints(fitted, change), "beyond its limits")
+    path = fitted.measured.trials[1].path
+    assert f"{path}: at frame 7 joint upper_arm_roll is at 10000" in line
+    assert warnings_with(fitted, "beyond its limits") == []
 
 
 def test_angles_in_degrees_name_some_recordings_and_count_the_others(fitted):
-    trials = [
-        replace(
-            trial,
-            recording=replace(
-                trial.recording, joints=trial.recording.joints * 180.0 / np.pi
-            ),
-        )
-        for trial in fitted.measured.trials
-    ]
-    wrong = replace(fitted, measured=replace(fitted.measured, trials=tuple(trials)))
+    wrong = with_joints(fitted, lambda _, joints: np.degrees(joints))
 
-    assert len(said(wrong, "beyond its limits")) == 3
-    (line,) = said(wrong, "further recordings with such joint angles")
-    assert line.startswith(f"warning: {len(trials) - 3} ")
+    assert len(warnings_with(wrong, "beyond its limits")) == 3
+    (line,) = warnings_with(wrong, "further recordings with such joint angles")
+    assert line.startswith(f"warning: {len(fitted.measured.trials) - 3} ")
