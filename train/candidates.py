@@ -166,9 +166,7 @@ def candidates(
     only what carries over to other skins and arms is tried.
     """
     mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
-    full = mode.full
-    if fixed.features is not None:
-        full = [tuple(fixed.features)]
+    full = mode.full if fixed.features is None else [tuple(fixed.features)]
     early = [] if fixed.asks else mode.early
     projections = KINDS if fixed.projection is None else (fixed.projection,)
     combinations = []

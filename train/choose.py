@@ -23,7 +23,7 @@ from train.evaluate import (
 )
 from train.groups import TRIAL, Divisions
 from train.labels import NO_CONTACT
-from train.pipeline import Choice
+from train.pipeline import Choice, Choices
 from train.progress import bar
 from train.stopping import Early, held_out
 from train.vectors import Booleans, Floats, Integers, Labels, Vectors
@@ -37,7 +37,7 @@ WINDOW_MARGIN = 0.02
 """Accuracy that is not worth twice the wait."""
 
 
-Plan = tuple[Integers, Sequence[Mapping[str, Choice]]]
+Plan = tuple[Integers, Sequence[Choices]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
 
 
@@ -129,11 +129,10 @@ class Choosing:
         """Whether entire groups are left out for a task."""
         return self._groups is not None and task in self._groups.tasks
 
-    def _vectors(self, dataset: DataSet, window_s: float) -> Vectors:
-        """The trials, with the features of a data set at a window."""
-        X = dataset.features(window_s, self._samples)
-        widths = tuple(dataset.widths(self._samples))
-        return Vectors(X, self._y, dataset.names, widths)
+    def _vectors(self, window_s: float) -> Vectors:
+        """The trials at a window."""
+        dataset = self._dataset.with_kernels(window_s)
+        return dataset.vectors(window_s, self._samples, self._y)
 
     def _tables(
         self,
@@ -180,7 +179,7 @@ class Choosing:
     def _right(self, window_s: float) -> dict[str, Floats]:
         """{task: the shares of right answers to each trial, of the candidate that is
         best in plain cross-validation}."""
-        vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
+        vectors = self._vectors(window_s)
         what = f"{window_s:g} s"
         trials, groups = self._tables(vectors, self.candidates, what, nested=False)
         right: dict[str, Floats] = {}
@@ -236,7 +235,7 @@ class Choosing:
             {task: its settings}, the fold of each trial, and
             [fold]{task: the choice made without the fold's trials}.
         """
-        vectors = self._vectors(self._dataset.with_kernels(window_s), window_s)
+        vectors = self._vectors(window_s)
         trials, groups = self._tables(vectors, self.candidates, "choosing", nested=True)
         chosen = {}
         of_task = {}
@@ -278,7 +277,7 @@ class Choosing:
         """The answers of the candidates for early decision points at one of them."""
         candidates = self._early_candidates
         dataset = self._dataset.of(features_of(candidates))
-        vectors = self._vectors(dataset, window_s)
+        vectors = dataset.vectors(window_s, self._samples, self._y)
         what = f"{window_s:g} s"
         return self._tables(vectors, candidates, what, nested=False, repeated=False)
 
@@ -434,7 +433,7 @@ def _planned(
     return replace(settings, by_fold=tuple(of_tasks))
 
 
-def _of_tasks(choices: Mapping[str, Choice], tasks: Sequence[str]) -> dict[str, Choice]:
+def _of_tasks(choices: Choices, tasks: Sequence[str]) -> dict[str, Choice]:
     """{task: its choice} of some tasks."""
     return {task: choices[task] for task in tasks}
 

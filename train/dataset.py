@@ -33,7 +33,7 @@ from train.feature_sets import axes, moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
-from train.vectors import Booleans, Floats, Strings
+from train.vectors import Booleans, Floats, Labels, Strings, Vectors
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Recordings:
     @property
     def of_owner(self) -> tuple[Recording, ...]:
         """Those that are not simulated; all where all are."""
-        own = tuple(r for r in self.recordings if "simulation" not in r.meta)
-        return own or self.recordings
+        recordings = tuple(r for r in self.recordings if "simulation" not in r.meta)
+        return recordings or self.recordings
 
     @property
     def mixed(self) -> bool:
@@ -190,6 +190,11 @@ class DataSet:
                 for t in self.trials
             ]
         )
+
+    def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
+        """The feature vectors at a window, with the labels of some tasks."""
+        X = self.features(window_s, samples)
+        return Vectors(X, y, self.names, self.widths(samples), self.is_own)
 
     def with_kernels(self, window_s: float) -> DataSet:
         """The same trials with the tables that features of kernels need, for a window.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from edge.touch.features import WINDOW_S
 from train.dataset import DataSet
 from train.novelty import MOST_COMPONENTS
-from train.pipeline import Choice
+from train.pipeline import Choices
 from train.settings import Settings
 from train.stopping import FEWEST
 
@@ -112,7 +111,7 @@ class _Sizes:
         return self.once + (points - 1) * self.early + self.full
 
 
-def _bytes_of(choices: Mapping[str, Choice], dataset: DataSet, samples: int) -> int:
+def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
     """Bytes of the constants that project and compare at a decision point.
 
     A column has a mean, a gain, and a weight for each coordinate; a trial its

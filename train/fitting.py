@@ -92,13 +92,8 @@ class Fitted:
             tasks.update(choice.targets)
             features += choice.features
         dataset = self.measured.of(features)
-        return dataset, Vectors(
-            dataset.features(self.window_s, self.samples),
-            {task: dataset.labels(task) for task in tasks},
-            dataset.names,
-            dataset.widths(self.samples),
-            dataset.is_own,
-        )
+        y = {task: dataset.labels(task) for task in tasks}
+        return dataset, dataset.vectors(self.window_s, self.samples, y)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,7 +242,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))
-    X = dataset.features(settings.window_s, fixed.samples)
+    vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
     if points:
         sequential = calibrate(measured, y, points, settings, fixed)
@@ -255,15 +250,13 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
         if not fixed.quick:
             notes += _early_of_known(measured, y, points, settings, fixed, sequential)
     else:
-        widths = dataset.widths(fixed.samples)
-        vectors = Vectors(X, y, dataset.names, widths, dataset.is_own)
         classifier = ContactClassifier.of(settings.choices, vectors)
     return Fitted(
         dataset=dataset,
         measured=measured,
         window_s=settings.window_s,
         samples=fixed.samples,
-        X=X,
+        X=vectors.X,
         chosen=settings.chosen,
         candidates=tuple(settings.candidates),
         classifier=classifier,

@@ -23,6 +23,7 @@ from train.evaluate import (
     Rule,
     evaluate,
     finest,
+    fold_numbers,
     group_folds,
     stratified_folds,
 )
@@ -146,18 +147,19 @@ class Mixing:
         return evaluate(self.vectors, everyone, grids, jobs=self.jobs)
 
     def scores(self, grids: Sequence[SearchGrid]) -> Scores:
-        """The answers with single trials, and with entire groups, left out."""
+        """The answers with single trials left out, and with entire groups where there
+        are enough."""
         labels = {task: y[self.is_own] for task, y in self.y.items()}
         count = fold_count(int(self.is_own.sum()), self.quick)
-        by_trial = self.answers(grids, stratified_folds(labels[finest(labels)], count))
+        folds = stratified_folds(labels[finest(labels)], count)
+        tables = {TRIAL: self.answers(grids, folds)}
         groups = None
         if self.leave_out != TRIAL:
             groups = self.dataset.part(self.is_own).groups(self.leave_out)
         number = 0 if groups is None else len(set(groups.tolist()))
-        if groups is None or number < FEWEST_GROUPS:
-            return Scores(by_trial, by_trial, 0)
-        by_group = self.answers(grids, group_folds(groups, count))
-        return Scores(by_trial, by_group, number)
+        if groups is not None and number >= FEWEST_GROUPS:
+            tables[self.leave_out] = self.answers(grids, group_folds(groups, count))
+        return Scores(tables, number)
 
     def weight_names(self) -> dict[tuple[int, int], str]:
         """The weights in words."""
@@ -177,57 +179,59 @@ class Scores:
     """Answers to the owner's trials.
 
     Attributes:
-        by_trial: with single trials left out.
-        by_group: with entire groups left out; `by_trial` without enough groups.
+        tables: {what is left out: the answers}, for `TRIAL` and, where there are enough
+            groups, for their label.
         groups: number of groups.
     """
 
-    by_trial: AnswerTable
-    by_group: AnswerTable
+    tables: dict[str, AnswerTable]
     groups: int
 
-    def empty_plans(self, leave_out: str) -> dict[str, Plan]:
+    def left_out(self, task: str) -> str:
+        """What is left out to choose the weights of a task: entire groups where there
+        are enough, unless the task names them."""
+        return next((name for name in self.tables if name not in (TRIAL, task)), TRIAL)
+
+    def empty_plans(self) -> dict[str, Plan]:
         """{what is left out: its folds, none of which has a choice yet}."""
         plans: dict[str, Plan] = {}
-        for left_out, table in ((leave_out, self.by_group), (TRIAL, self.by_trial)):
-            count = int(table.folds.max()) + 1
-            plans[left_out] = table.folds, [{} for _ in range(count)]
+        for left_out, table in self.tables.items():
+            plans[left_out] = table.folds, [{} for _ in fold_numbers(table.folds)]
         return plans
 
     def weigh(
         self,
         task: str,
         settled: Chosen,
-        mixing: Mixing,
+        labelled: int,
         plans: Mapping[str, Plan],
     ) -> Chosen:
-        """The settings of a task with their weights; also enters those of each fold."""
-        leave_out = mixing.leave_out
-        table = self.by_trial if task == leave_out else self.by_group
+        """The settings of a task with their weights, for so many of the owner's trials;
+        also enters those of each fold."""
+        left_out = self.left_out(task)
+        table = self.tables[left_out]
+        choices = table.choices[task]
         # The first within a standard error of the best, as ten trials hardly tell them
         # apart; fewer than that choose nothing.
-        rank = np.arange(len(table.choices[task]))
-        rule = Rule(rank, rank[:1] if mixing.labelled(task) < ENOUGH else None)
-        best = table.choices[task][table.chosen(task, rule)]
-        for left_out, answers in ((leave_out, self.by_group), (TRIAL, self.by_trial)):
+        rank = np.arange(len(choices))
+        rule = Rule(rank, rank[:1] if labelled < ENOUGH else None)
+        for name, answers in self.tables.items():
             places = answers.by_fold(task, rule)
-            for by_task, place in zip(plans[left_out][1], places, strict=True):
-                by_task[task] = answers.choices[task][place]
-        single = table is self.by_trial
+            for by_task, place in zip(plans[name][1], places, strict=True):
+                by_task[task] = choices[place]
+        count = 0 if left_out == TRIAL else self.groups
         return replace(
             settled,
-            choice=best,
-            accuracy=promised(
-                table.nested(task, rule), groups=0 if single else self.groups
-            ),
-            by_trial=promised(self.by_trial.nested(task, rule)),
-            left_out=TRIAL if single else leave_out,
+            choice=choices[table.chosen(task, rule)],
+            accuracy=promised(table.nested(task, rule), groups=count),
+            by_trial=promised(self.tables[TRIAL].nested(task, rule)),
+            left_out=left_out,
             folds=table.folds,
         )
 
-    def shares(self, task: str, leave_out: str) -> dict[tuple[int, int], float]:
+    def shares(self, task: str) -> dict[tuple[int, int], float]:
         """{weights: share of right answers}."""
-        table = self.by_trial if task == leave_out else self.by_group
+        table = self.tables[self.left_out(task)]
         right = table.held_out(task)[:, table.tested[task]].mean(axis=1)
         weights = [choice.weights for choice in table.choices[task]]
         return dict(zip(weights, right, strict=True))
@@ -264,10 +268,11 @@ def mix(mixing: Mixing, choose: Settings) -> MixResult:
         )
     settled = mixing.settings(choose)
     scores = mixing.scores(mixing.grids(settled))
-    plans = scores.empty_plans(mixing.leave_out)
+    plans = scores.empty_plans()
     chosen = {}
     for task in settled:
-        chosen[task] = scores.weigh(task, settled[task], mixing, plans)
+        labelled = mixing.labelled(task)
+        chosen[task] = scores.weigh(task, settled[task], labelled, plans)
         notes += _sentences(task, chosen[task].choice, scores, mixing)
     together = decided_together(chosen, mixing.vectors, plans, mixing.jobs)
     folds, without = plans[TRIAL]
@@ -277,7 +282,7 @@ def mix(mixing: Mixing, choose: Settings) -> MixResult:
 def _sentences(task: str, best: Choice, scores: Scores, mixing: Mixing) -> list[str]:
     """How much the simulated trials help a task."""
     names = mixing.weight_names()
-    shares = scores.shares(task, mixing.leave_out)
+    shares = scores.shares(task)
     accuracies = [f"{names[weights]} {share:.1%}" for weights, share in shares.items()]
     sentences = [f"{task}: {', '.join(accuracies)}; taken: {names[best.weights]}"]
     if task in mixing.shared and shares[ALONE] == max(shares.values()):

@@ -17,7 +17,7 @@ from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.evaluate import Result, stratified_folds
 from train.fitting import Fitted
 from train.labels import NO_CONTACT
-from train.pipeline import Choice, ContactClassifier, fittable
+from train.pipeline import Choice, Choices, ContactClassifier, fittable
 from train.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines, picture
@@ -71,7 +71,7 @@ class Exported:
 def _left_out(
     vectors: Vectors,
     task: str,
-    choices: Mapping[str, Choice],
+    choices: Choices,
     test: Integers,
 ) -> tuple[list[Strings], dict[int, Explanation]]:
     """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has

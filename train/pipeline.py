@@ -158,6 +158,10 @@ class Choice:
         return how_often(labels != "", is_own, self.weights)
 
 
+Choices = Mapping[str, Choice]
+"""{task: its settings}."""
+
+
 def how_often(
     labelled: Booleans,
     is_own: Booleans | None,
@@ -171,7 +175,7 @@ def how_often(
 
 
 def fittable(
-    choices: Mapping[str, Choice],
+    choices: Choices,
     y: Labels,
     is_own: Booleans | None,
 ) -> dict[str, Choice]:
@@ -202,6 +206,7 @@ class Decided(NamedTuple):
     distances: Floats
 
 
+@dataclass(eq=False)
 class ContactClassifier:
     """All tasks of a model: projection and neighbours of each, on the same trials.
 
@@ -226,20 +231,14 @@ class ContactClassifier:
             `edge.model.agreement`.
     """
 
-    def __init__(
-        self,
-        choices: Mapping[str, Choice],
-        features: Sequence[str] = FEATURES,
-        widths: Sequence[int] | None = None,
-    ) -> None:
-        self.choices = choices
-        self.features = tuple(features)
-        self.widths = widths
+    choices: Choices
+    features: Sequence[str] = FEATURES
+    widths: Sequence[int] | None = None
 
     @classmethod
     def of(
         cls,
-        choices: Mapping[str, Choice],
+        choices: Choices,
         vectors: Vectors,
         complete: bool = True,
     ) -> ContactClassifier:

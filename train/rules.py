@@ -46,11 +46,9 @@ NEVER = 2.0
 def upper_limit(wrong: int, trials: int, level: float) -> float:
     """The largest error rate that `wrong` of `trials` does not reject at a level
     (exact)."""
-    return (
-        1.0
-        if wrong >= trials
-        else float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
-    )
+    if wrong >= trials:
+        return 1.0
+    return float(beta.ppf(1.0 - level, wrong + 1, trials - wrong))
 
 
 def stops(confidence: Floats, rule: StoppingRule, unknown: Booleans) -> Integers:
@@ -92,12 +90,10 @@ class Course:
         trials = np.arange(self.unknown.shape[1])
         at = [stops(confidence, rule, self.unknown) for confidence in self.confidences]
         last = np.max(at, axis=0)
-        by_part = [
-            wrong[part, trials] for wrong, part in zip(self.wrong, at, strict=True)
-        ]
-        return last, np.any(
-            [*by_part, self.unknown[last, trials] & self.withheld], axis=0
-        )
+        pairs = zip(self.wrong, at, strict=True)
+        wrong = [of_part[points, trials] for of_part, points in pairs]
+        withheld = self.unknown[last, trials] & self.withheld
+        return last, np.any([*wrong, withheld], axis=0)
 
 
 def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:

@@ -3,6 +3,7 @@ finds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
@@ -159,7 +160,6 @@ class Decomposition:
         self._new = new
         self._labels = labels
         self._first = first
-        self._new_scores: Floats | None = None
         self._along: dict[
             tuple[str, tuple[float, ...]], list[tuple[Floats, Floats]]
         ] = {}
@@ -186,6 +186,11 @@ class Decomposition:
             spaces.append(_rounded(_beside(rows)[:, :most], _beside(new)[:, :most]))
         return _nearest(spaces, k)
 
+    @cached_property
+    def _new_scores(self) -> Floats:
+        """Coordinates of the new rows along the eigenvectors."""
+        return self._spectrum.scores_of(self._new)
+
     def _discriminants(
         self,
         task: str,
@@ -193,8 +198,6 @@ class Decomposition:
     ) -> list[tuple[Floats, Floats]]:
         """[shrinkage] coordinates (trials, c) and (m, c) along the discriminants of a
         task's labels."""
-        if self._new_scores is None:
-            self._new_scores = self._spectrum.scores_of(self._new)
         if (task, shrinkages) not in self._along:
             spectrum = self._spectrum
             classes = spectrum.classes(self._labels[task])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from train.candidates import Candidate
 from train.choose import Chosen, EarlySettings
-from train.pipeline import Choice
+from train.pipeline import Choice, Choices
 from train.vectors import Integers
 
 
@@ -66,7 +66,7 @@ class Settings:
         Args:
             folds: count those chosen without each fold too.
         """
-        settings: list[Mapping[str, Choice]] = [self.choices]
+        settings: list[Choices] = [self.choices]
         settings += self.without if folds else []
         if self.early is not None:
             early = self.early.settings

@@ -46,7 +46,7 @@ from edge.model.info import (
 from edge.touch.features import FEATURES
 from train.evaluate import finest, stratified_folds
 from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
-from train.pipeline import Choice, ContactClassifier, columns_of, types_of
+from train.pipeline import Choices, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
 from train.vectors import Booleans, Floats, Integers, Strings, Vectors
@@ -68,7 +68,7 @@ LEAST_SLOPE = 1e-3
 likely."""
 
 
-AtPoints = Sequence[Mapping[str, Choice]]
+AtPoints = Sequence[Choices]
 """[decision point]{task: Choice}."""
 
 
@@ -83,8 +83,8 @@ class Early:
     """
 
     until_s: float
-    choices: Mapping[str, Choice]
-    by_fold: Sequence[Mapping[str, Choice]]
+    choices: Choices
+    by_fold: Sequence[Choices]
 
 
 Answers = dict[str, tuple[Strings, Floats]]
@@ -248,6 +248,7 @@ class HeldOut:
     margins: dict[str, Floats]
 
 
+@dataclass(eq=False)
 class SequentialClassifier:
     """All tasks of a model at several windows, with rules that say when to stop
     waiting.
@@ -272,28 +273,19 @@ class SequentialClassifier:
         novelty_: its limits.
     """
 
-    def __init__(
-        self,
-        choices: Mapping[str, Choice],
-        decision_points_s: Sequence[float],
-        features: Sequence[str] = FEATURES,
-        jobs: int = 1,
-        widths: Sequence[int] | None = None,
-        early: Early | None = None,
-    ) -> None:
-        self.choices = choices
-        self.early = early
-        self.decision_points_s = tuple(decision_points_s)
-        self.features = features
-        self.jobs = jobs
-        self.widths = widths
+    choices: Choices
+    decision_points_s: Sequence[float]
+    features: Sequence[str] = FEATURES
+    jobs: int = 1
+    widths: Sequence[int] | None = None
+    early: Early | None = None
 
     def fit(
         self,
         X: Floats,
         y: Mapping[str, Strings],
         folds: Integers,
-        fold_choices: Sequence[Mapping[str, Choice]],
+        fold_choices: Sequence[Choices],
         is_own: Booleans | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
@@ -338,15 +330,15 @@ class SequentialClassifier:
         early = {} if self.early is None else self.early.choices
         return self._at_points(self.choices, early)
 
-    def _without(self, fold_choices: Sequence[Mapping[str, Choice]]) -> list[AtPoints]:
+    def _without(self, fold_choices: Sequence[Choices]) -> list[AtPoints]:
         """[fold][decision point]{task: the choice made without the fold's trials}."""
         early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
         return list(map(self._at_points, fold_choices, early))
 
     def _at_points(
         self,
-        full: Mapping[str, Choice],
-        early: Mapping[str, Choice],
+        full: Choices,
+        early: Choices,
     ) -> AtPoints:
         """[decision point]{task: Choice} of choices for the full window and for early
         points."""

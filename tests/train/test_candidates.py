@@ -72,9 +72,11 @@ def test_simulated_things_of_several_kinds_are_decided_without_shear():
 
 
 def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
-    tried = {(candidate.sets, candidate.projection) for candidate in candidates(TASKS)}
-    both = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
-    assert tried == both - {(("paper",), "lda")}
+    combinations = {
+        (candidate.sets, candidate.projection) for candidate in candidates(TASKS)
+    }
+    usual = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
+    assert combinations == usual - {(("paper",), "lda")}
 
 
 def test_settings_that_are_fixed_are_held():
@@ -88,9 +90,9 @@ def test_settings_that_are_fixed_are_held():
     assert grid.neighbours == (2,)
 
 
-def numbers_of(tried):
+def numbers_of(of_candidates):
     """The least shrinkage, and the most directions and components of candidates."""
-    grids = [grid for candidate in tried for grid in candidate.grids]
+    grids = [grid for candidate in of_candidates for grid in candidate.grids]
     return {
         "shrinkage": np.min([grid.shrinkages for grid in grids]),
         "directions": {grid.most_directions for grid in grids},

@@ -29,10 +29,10 @@ def early_settings(make_touch, folder, arm, k):
     for kind, seed in product(("hard", "soft"), range(6)):
         touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
         save(folder / f"{kind}-{seed}.npz", touch)
-    tried = [c for c in candidates({}, joints=arm) if c.name in EARLY]
-    dataset = load_trials([folder], Measurement(features_of(tried)))
+    early = [c for c in candidates({}, joints=arm) if c.name in EARLY]
+    dataset = load_trials([folder], Measurement(features_of(early)))
     y = {"softness": dataset.labels("softness")}
-    choosing = Choosing(dataset, y, tried, Divisions.of(dataset, y), samples=40)
+    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=40)
     chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
     return choosing.early(1.2, chosen)
 
@@ -47,7 +47,7 @@ def test_decision_points_before_the_full_window_have_settings_where_joints_are_k
     assert len(early.by_fold) == 10
     # The number of neighbours is that of the full window, as the graph has one.
     assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
-    assert settings.known == early
+    assert settings.settings_of_known == early
 
 
 def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
@@ -82,7 +82,7 @@ def settled():
             "without a fold": [choice.k for choice in without],
             "accuracy": chosen.accuracy.accuracy,
             "by trial": chosen.by_trial.accuracy,
-            "known": chosen.known and chosen.known.k,
+            "known": chosen.choice_of_known and chosen.choice_of_known.k,
         }
 
     return settle
@@ -135,10 +135,10 @@ def hits(agreeing):
         test = folds == fold
         X = vectors.X[test]
         model = ContactClassifier.of(choices, vectors.part(~test))
-        said = {task: decision.labels for task, decision in model.decide(X).items()}
+        answers = {task: decision.labels for task, decision in model.decide(X).items()}
         near = model.nearest("category", model.squares("category", X))
-        said["alone"] = vote(model.labels_["category"][near])
-        for task, labels in said.items():
+        answers["alone"] = vote(model.labels_["category"][near])
+        for task, labels in answers.items():
             of_task = "category" if task == "alone" else task
             named = model.classes_[of_task][labels]
             right[task][test] = named == vectors.y[of_task][test]
@@ -161,8 +161,8 @@ def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits
 
 
 def test_a_category_is_right_where_both_of_its_factors_are(hits):
-    both = hits["mobility"] & hits["softness"]
-    assert (hits["category"] == both).all()
+    of_factors = hits["mobility"] & hits["softness"]
+    assert (hits["category"] == of_factors).all()
     assert (hits["category"] != hits["alone"]).any()
 
 
@@ -208,8 +208,8 @@ def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(late):
 
 
 def test_accuracies_are_those_at_the_chosen_window(late):
-    told = late.chosen["kind"]
-    for result in (told.accuracy, told.by_trial, *told.candidates):
+    settings = late.chosen["kind"]
+    for result in (settings.accuracy, settings.by_trial, *settings.candidates):
         assert result.accuracy == 1.0
         assert result.interval == wilson(8, 8)
 
@@ -226,10 +226,10 @@ def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_
 
 
 @pytest.mark.parametrize(
-    "given", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}]
+    "words", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}]
 )
-def test_a_window_that_is_given_is_kept(given, make_touch, tmp_path):
-    fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **given)
+def test_a_window_that_is_given_is_kept(words, make_touch, tmp_path):
+    fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **words)
     assert fitted.window_s == 1.2
     assert not any("the window is" in note for note in fitted.notes)
 

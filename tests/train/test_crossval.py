@@ -114,16 +114,16 @@ def subspace_gap(ours, exact):
     """Largest sine between the spans of the first 1, 2, ... axes."""
     worst = 0.0
     for c in range(1, len(ours) + 1):
-        left = ours[:c] - ours[:c] @ exact[:c].T @ exact[:c]
-        worst = max(worst, float(np.linalg.norm(left, 2)))
+        outside = ours[:c] - ours[:c] @ exact[:c].T @ exact[:c]
+        worst = max(worst, float(np.linalg.norm(outside, 2)))
     return worst
 
 
 def rows_of(shape, values, rng):
     """Centred rows with these singular values."""
-    left = np.linalg.qr(rng.normal(size=(shape[0], len(values))))[0]
-    left = np.linalg.qr(left - left.mean(axis=0))[0]
-    return left * values @ np.linalg.qr(rng.normal(size=(shape[1], len(values))))[0].T
+    axes = np.linalg.qr(rng.normal(size=(shape[0], len(values))))[0]
+    axes = np.linalg.qr(axes - axes.mean(axis=0))[0]
+    return axes * values @ np.linalg.qr(rng.normal(size=(shape[1], len(values))))[0].T
 
 
 @pytest.mark.parametrize("shape", [(60, 24), (24, 60)])

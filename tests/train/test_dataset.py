@@ -104,11 +104,12 @@ def test_training_and_the_board_compute_the_same_bits(recordings, exported):
     for trial, expected in zip(data.trials[::3], data.features()[::3], strict=True):
         recording = load(trial.path)
         classifier = Classifier(model, recording.layout)
-        seen = []
+        contacts = []
         for frame in recording:
             classifier.push(frame)
-            seen += [w.contact for w in classifier._pending if w.contact not in seen]
-        vector = feature_vector(seen[0].series(), 1.2)
+            pending = [waiting.contact for waiting in classifier._pending]
+            contacts += [contact for contact in pending if contact not in contacts]
+        vector = feature_vector(contacts[0].series(), 1.2)
         assert vector.tobytes() == expected.tobytes()
 
 
@@ -127,8 +128,8 @@ def test_one_threshold_for_all(folder):
     assert high.layout.onset_counts == 600
     area = slice(40, 80)
     assert high.features()[:, area].sum() < low.features()[:, area].sum()
-    own = load_trials([folder], Measurement(threshold=400, onset=500))
-    assert own.layout.onset_counts == 500
+    higher = load_trials([folder], Measurement(threshold=400, onset=500))
+    assert higher.layout.onset_counts == 500
 
 
 def test_recordings_that_are_never_touched_are_left_out_and_named(folder, make_touch):

@@ -118,10 +118,12 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
     right = 0
     for fold in range(4):
         inner = np.zeros(len(choices))
-        for other in {*range(4)} - {fold}:
-            train = (folds != fold) & (folds != other)
+        for second_fold in {*range(4)} - {fold}:
+            train = (folds != fold) & (folds != second_fold)
             for i, choice in enumerate(choices):
-                inner[i] += told_right(choice, vectors, train, folds == other).sum()
+                inner[i] += told_right(
+                    choice, vectors, train, folds == second_fold
+                ).sum()
         best = choices[inner.argmax()]
         right += told_right(best, vectors, folds != fold, folds == fold).sum()
     assert table.nested("t").right == right
@@ -209,10 +211,13 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
             **repeated,
         )
 
-    both = table(first, repeated=(table(second),))
-    assert both.held_out("t").tolist() == [[0.5, 0.5, 0.5, 0.0], [1.0, 1.0, 0.5, 0.5]]
-    assert both.chosen("t") == 1
-    assert both.by_fold("t") == table(first).by_fold("t") == [0, 0]
+    repeated_table = table(first, repeated=(table(second),))
+    assert repeated_table.held_out("t").tolist() == [
+        [0.5, 0.5, 0.5, 0.0],
+        [1.0, 1.0, 0.5, 0.5],
+    ]
+    assert repeated_table.chosen("t") == 1
+    assert repeated_table.by_fold("t") == table(first).by_fold("t") == [0, 0]
 
 
 def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():

@@ -11,10 +11,10 @@ from edge.recording import Recording
 from edge.saving import save
 from train.dataset import Measurement, load_trials
 from train.evaluate import VARIANCE, stratified_folds
-from train.fitting import (
-    _leaks,
-    windows_of,
-)
+from train.fitting import _leaks, windows_of
+
+PAPER = {"features": ["paper"], "projection": "pca", "scaling": "IV", "jobs": 1}
+"""Few candidates."""
 
 
 @pytest.fixture(scope="module")
@@ -63,15 +63,17 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
                 tmp_path / f"{kind}{seed}.npz",
                 make_touch(kind=kind, seed=seed, labels=labels),
             )
-    fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
-    told = fitted.chosen["category"]
-    assert told.left_out == "object"
+    fitted = train.fit(str(tmp_path), **PAPER)
+    settings = fitted.chosen["category"]
+    assert settings.left_out == "object"
     # The 18 trials count as much as their six objects do.
-    assert [result.variance for result in (told.accuracy, *told.candidates)] == [
+    assert [
+        result.variance for result in (settings.accuracy, *settings.candidates)
+    ] == [
         3.0,
         3.0,
     ]
-    assert told.by_trial.variance == VARIANCE
+    assert settings.by_trial.variance == VARIANCE
     assert fitted.chosen["object"].left_out == "trial"
     # The folds have all labels of the task that has the most of them.
     folds = stratified_folds(fitted.dataset.labels("object"))
@@ -93,13 +95,7 @@ def objects(make_touch, tmp_path_factory):
 
 def test_early_errors_of_recorded_objects_are_told_for_both_ways_to_choose(objects):
     """The second is that of an export with `--leave-out trial`."""
-    fixed = {
-        "features": ["paper"],
-        "projection": "pca",
-        "window_s": 1.2,
-        "decision_points_s": (0.6, 1.2),
-        "jobs": 1,
-    }
+    fixed = {**PAPER, "decision_points_s": (0.6, 1.2)}
     exported = train.fit(objects, **fixed)
     assert exported.chosen["softness"].left_out == "object"
     single = train.fit(objects, leave_out="trial", **fixed)
@@ -121,15 +117,8 @@ def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
         labels = {"category": label, "object": "hard 0"}
         save(tmp_path / f"{name}.npz", make_touch(seconds=0.0, labels=labels))
     paths = [str(recordings), str(tmp_path)]
-    both = train.fit(paths, features=["paper"], projection="pca", scaling="IV", jobs=1)
-    alone = train.fit(
-        paths[0],
-        features=["paper"],
-        projection="pca",
-        scaling="IV",
-        jobs=1,
-    )
-    after, before = (f.chosen["category"].accuracy for f in (both, alone))
+    fits = [train.fit(data, **PAPER) for data in (paths, paths[0])]
+    after, before = (fitted.chosen["category"].accuracy for fitted in fits)
     assert after.right == before.right + 1
     assert after.total == before.total + 2
 

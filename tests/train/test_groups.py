@@ -65,6 +65,8 @@ def test_entire_kinds_are_left_out_where_every_class_has_three(
     fitted = train.fit(str(tmp_path), features=["paper"], projection="pca", jobs=1)
     assert fitted.chosen["category"].left_out == left_out
     assert {
-        max(grid.components) for tried in fitted.candidates for grid in tried.grids
+        max(grid.components)
+        for candidate in fitted.candidates
+        for grid in candidate.grids
     } == {10}
     assert fitted.chosen["object"].left_out == "trial"

@@ -45,8 +45,8 @@ def five(make_touch, tmp_path_factory):
     """A fit to five trials with a category alone, beside simulated ones."""
     folder = tmp_path_factory.mktemp("five")
     simulated = saved(folder / "simulated", make_touch, 24, simulated=True)
-    own = saved(folder / "own", make_touch, 5, simulated=False, first=50)
-    return train.fit([own, simulated], **GIVEN)
+    own_folder = saved(folder / "own", make_touch, 5, simulated=False, first=50)
+    return train.fit([own_folder, simulated], **GIVEN)
 
 
 def test_five_trials_with_a_category_alone_are_trained_with_all_the_simulated_ones(
@@ -77,7 +77,7 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
     make_touch, tmp_path
 ):
     simulated = saved(tmp_path / "simulated", make_touch, 24, simulated=True, swap=True)
-    own = saved(
+    own_folder = saved(
         tmp_path / "own",
         make_touch,
         22,
@@ -85,7 +85,7 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
         first=50,
         room="kitchen",
     )
-    fitted = train.fit([own, simulated], **GIVEN)
+    fitted = train.fit([own_folder, simulated], **GIVEN)
     assert fitted.chosen["category"].choice.weights == (0, 1)
     # No simulated trial has a room.
     assert fitted.chosen["room"].choice.weights == (0, 1)
@@ -98,25 +98,25 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
 
 def test_two_trials_choose_nothing(make_touch, tmp_path):
     simulated = saved(tmp_path / "simulated", make_touch, 8, simulated=True)
-    own = saved(tmp_path / "own", make_touch, 2, simulated=False, first=50)
+    own_folder = saved(tmp_path / "own", make_touch, 2, simulated=False, first=50)
     with pytest.raises(
         InputError, match="2 of the trials are no simulated ones; record at least"
     ):
-        train.fit([own, simulated], **GIVEN)
+        train.fit([own_folder, simulated], **GIVEN)
 
 
 def test_a_weight_of_three_is_a_trial_that_stands_three_times():
     rng = np.random.default_rng(0)
     X = rng.normal(size=(12, 6))
     labels = np.array(["a", "b", "c"] * 4)
-    own = np.arange(12) >= 8
+    is_own = np.arange(12) >= 8
     choice = Choice("IV", 2, 1, "lda", weights=(1, 3))
     fitted = ContactClassifier({"t": choice}, ("max_force", "contact_area")).fit(
         X,
         {"t": labels},
-        own,
+        is_own,
     )
-    times = np.repeat(np.arange(12), np.where(own, 3, 1))
+    times = np.repeat(np.arange(12), np.where(is_own, 3, 1))
     oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(
         X[times], labels[times]
     )

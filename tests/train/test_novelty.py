@@ -128,9 +128,9 @@ def test_held_out_scores_do_not_depend_on_the_held_out_trials():
     X, labels = trials(40)
     folds = stratified_folds(labels, 5)
     scores = held_out_scores(X, labels, folds, WIDTHS)
-    others = folds != 2
-    alone = NoveltySpace.of(X[:, others], labels[others], WIDTHS)
-    assert scores[:, ~others].tolist() == alone.scores(X[:, ~others]).tolist()
+    training = folds != 2
+    alone = NoveltySpace.of(X[:, training], labels[training], WIDTHS)
+    assert scores[:, ~training].tolist() == alone.scores(X[:, ~training]).tolist()
 
 
 def test_trials_without_a_fold_have_no_score():

@@ -15,9 +15,9 @@ def exact(values):
     rows = np.array([[Fraction(x) for x in row] for row in values])
     distances = []
     for i, row in enumerate(rows):
-        others = np.delete(rows, i, axis=0)
-        mean = others.mean(axis=0)
-        variance = ((others - mean) ** 2).mean()
+        rest = np.delete(rows, i, axis=0)
+        mean = rest.mean(axis=0)
+        variance = ((rest - mean) ** 2).mean()
         distances.append(float(abs(row - mean).max()) / float(variance) ** 0.5)
     return distances
 

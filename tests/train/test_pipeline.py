@@ -37,8 +37,8 @@ def test_the_projection_works_in_a_scikit_learn_pipeline():
         pipe = make_pipeline(Projection("IV", 3, kind=kind), KNeighborsClassifier(1))
         assert (pipe.fit(X, y).predict(X) == y).all()
         assert cross_val_score(pipe, X, y, cv=5).shape == (5,)
-        again = clone(pipe).fit(X, y)
-        assert (again[0].weights_ == pipe[0].weights_).all()
+        copy = clone(pipe).fit(X, y)
+        assert (copy[0].weights_ == pipe[0].weights_).all()
 
 
 def test_a_classifier_answers_every_task_by_the_rules():
@@ -82,8 +82,11 @@ def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
     assert gaps["random"].max() < 2.0 < gaps["real"].min()
     # Simulated trials that count for nothing say nothing either, though here they are
     # all wrong.
-    both = np.vstack([X, -X]), {task: np.tile(labels, 2) for task, labels in y.items()}
-    model.fit(*both, np.arange(80) < 40)
+    doubled = (
+        np.vstack([X, -X]),
+        {task: np.tile(labels, 2) for task, labels in y.items()},
+    )
+    model.fit(*doubled, np.arange(80) < 40)
     assert np.ptp(model.decide(X)["real"].distances, axis=1).min() > 2.0
 
 

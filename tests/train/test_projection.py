@@ -208,10 +208,10 @@ def test_the_discriminants_of_several_tasks_stand_side_by_side():
     X = features(40)
     sides = np.repeat(["a", "b"], 20)
     shapes = np.tile(["x", "y", "z", "z"], 10)
-    both = Projection("IV", kind="lda").fit(X, np.column_stack([sides, shapes]))
+    together = Projection("IV", kind="lda").fit(X, np.column_stack([sides, shapes]))
     alone = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (sides, shapes)]
-    assert (both.weights_ == np.hstack(alone)).all()
-    assert both.rank_ == 3
+    assert (together.weights_ == np.hstack(alone)).all()
+    assert together.rank_ == 3
 
 
 @pytest.mark.parametrize("value", [0.0, 7.5])

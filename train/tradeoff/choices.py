@@ -6,7 +6,7 @@ from typing import Any
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.candidates import candidates
+from train.candidates import candidates, features_of
 from train.choose import Chosen
 from train.dataset import DataSet, Measurement, Recordings, load_trials
 from train.evaluate import Result
@@ -69,9 +69,8 @@ def followed(
     """
     drawn = kinds_of(raw.recordings) is not None
     usual = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
-    sets = [name for candidate in usual for name in candidate.sets]
     measurement = Measurement(
-        expand([*sets, *features]),
+        expand([*features_of(usual), *features]),
         WINDOWS_S[-1],
         threshold=None if like is None else like.threshold_counts,
         onset=None if like is None else like.onset,

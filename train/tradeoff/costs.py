@@ -161,8 +161,9 @@ def difference(before: Hits, after: Hits, *, fewer: bool) -> tuple[float, float,
     """The percentage points gained by a change on the same trials, and their 95 %
     interval."""
     trials = after if fewer else before
-    were = np.array([before[trial] for trial in trials])
-    return paired(were, np.array([after.get(trial, False) for trial in trials]))
+    were = [before[trial] for trial in trials]
+    are = [after.get(trial, False) for trial in trials]
+    return paired(np.array(were), np.array(are))
 
 
 def measure(

@@ -94,8 +94,8 @@ class StoppingComparison:
 def soonest_s(compared: StoppingComparison, level: float) -> float | None:
     """The shortest mean time of early decisions of an accuracy; None where none has
     it."""
-    rules = [rule for rule in compared.certified if 1.0 - rule.wrong >= level]
-    return min((rule.mean_s for rule in rules), default=None)
+    means_s = (r.mean_s for r in compared.certified if 1.0 - r.wrong >= level)
+    return min(means_s, default=None)
 
 
 def compare_stopping(

@@ -141,10 +141,14 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     simulated = "" if scene is None else f", simulated from the scene {scene.name}"
     report = _write(measured, out, counted(len(dataset.trials), "contact") + simulated)
     front = ParetoFront.of(points, main, measured.after_s, quick=quick)
-    with write_whole(out / "front.json") as file:
-        text = json.dumps(front.to_dict(dataset.digest), indent=1)
-        file.write(text.encode() + b"\n")
+    _write_front(front, out / "front.json", dataset.digest)
     return report
+
+
+def _write_front(front: ParetoFront, path: Path, digest: str) -> None:
+    text = json.dumps(front.to_dict(digest), indent=1)
+    with write_whole(path) as file:
+        file.write(text.encode() + b"\n")
 
 
 def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> Commands:

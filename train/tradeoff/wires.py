@@ -126,7 +126,7 @@ def wire_time_s(
     (`meta.wire_s`). Simulated ones have the paper's skin. Others tell nothing.
     """
     recorded = [recording.meta.get("wire_s") for recording in recordings]
-    times = [float(wire_s) for wire_s in recorded if isinstance(wire_s, int | float)]
+    times = [wire_s for wire_s in recorded if isinstance(wire_s, int | float)]
     if times:
         return 0.5 / rate_hz + max(times)
     if all("simulation" in recording.meta for recording in recordings):
@@ -143,7 +143,6 @@ def waited_s(layout: SkinLayout, rate_hz: float) -> float:
     """
     choices = [microcontroller(layout)] if layout.axes else wires(layout)
     fastest = min(choices, key=lambda choice: choice.frame_s)
-    wired = next(
-        (choice for choice in choices if choice.name.startswith("AD7147, 3")), fastest
-    )
+    three_buses = (wire for wire in choices if wire.name.startswith("AD7147, 3"))
+    wired = next(three_buses, fastest)
     return 0.5 * wired.every(rate_hz) / rate_hz + wired.frame_s

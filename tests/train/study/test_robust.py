@@ -65,8 +65,8 @@ def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(
     data = context.dataset
     changed = variants(scene)[change]
     trials = dict(simulate(changed))
-    asked = [trials[trial.path.name] for trial in data.trials]
-    expected = vectors(follow(asked, data.layout, data.chain))
+    sensed = [trials[trial.path.name] for trial in data.trials]
+    expected = vectors(follow(sensed, data.layout, data.chain))
     assert (vectors(simulated_again(changed, data)) == expected).all()
     assert (expected != context.vectors()).any()
 
@@ -74,20 +74,21 @@ def test_a_change_gives_the_contacts_of_its_scene_in_the_data_sets_order(
 def test_recordings_of_another_scene_are_refused(context, scene, monkeypatch):
     monkeypatch.setattr(robust, "variants", lambda scene: {})
     fewer = replace(scene, trials={**scene.trials, "count": 1})
-    for other in (fewer, replace(scene, seed=scene.seed + 1)):
+    for foreign_scene in (fewer, replace(scene, seed=scene.seed + 1)):
         with pytest.raises(
             InputError, match="cody18 gives other trials than these recordings"
         ):
-            robust.section(replace(context, scene=other))
+            robust.section(replace(context, scene=foreign_scene))
 
 
 def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_it(
     scene, tmp_path
 ):
     """What a heavy thing does under half the force is no contradiction of its label."""
-    objects = scenes.load(SCENE, count=2).objects
+    objects = scenes.load(SCENE).objects
     heavy = [thing for thing in objects if thing.name == "wooden crate"]
-    alone = replace(scene, objects=tuple(heavy))
+    single = {**scene.trials, "count": 1}
+    alone = replace(scene, objects=tuple(heavy), trials=single)
     weak = variants(alone)["arm stiffness x 0.5"]
     with pytest.raises(InputError, match="contradicted"):
         list(simulate(weak))
@@ -108,10 +109,10 @@ def test_a_trial_stays_the_draw_that_was_recorded_under_an_arm_too_weak_to_move_
     ],
 )
 def test_a_damaged_count_of_draws_is_one_sentence(context, scene, simulation, sentence):
-    first, *others = context.dataset.trials
+    first, *later_trials = context.dataset.trials
     meta = {**first.recording.meta, "simulation": simulation}
     damaged = replace(first, recording=replace(first.recording, meta=meta))
-    data = replace(context.dataset, trials=(damaged, *others))
-    said = rf"{first.path.name}: meta\.simulation.*{sentence}"
-    with pytest.raises(InputError, match=said):
+    data = replace(context.dataset, trials=(damaged, *later_trials))
+    message = rf"{first.path.name}: meta\.simulation.*{sentence}"
+    with pytest.raises(InputError, match=message):
         simulated_again(scene, data)

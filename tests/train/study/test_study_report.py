@@ -68,9 +68,9 @@ def test_a_perfect_replication_differs_by_the_chance_of_both_samples():
 
 
 def test_more_trials_narrow_the_interval_of_a_difference():
-    one = difference(80.0, 85.0, 140)
-    eight = difference(80.0, 85.0, 8 * 140)
-    assert one[0] < eight[0] < 5.0 < eight[1] < one[1]
+    of_one_set = difference(80.0, 85.0, 140)
+    of_eight_sets = difference(80.0, 85.0, 8 * 140)
+    assert of_one_set[0] < of_eight_sets[0] < 5.0 < of_eight_sets[1] < of_one_set[1]
 
 
 def test_several_data_sets_count_as_their_mean():
@@ -172,7 +172,7 @@ def test_every_method_has_a_row(studied):
     assert compared["method"].nunique() == len(methods.OURS) + 4
 
 
-def sentence(papers, other):
+def sentence(papers, best):
     """The sentence on softness, with so many of 50 trials right by the paper's method
     and by another, b."""
 
@@ -180,7 +180,7 @@ def sentence(papers, other):
         results = [{"softness": Result(right, 50)} for right in rights]
         return dict(zip((methods.PAPER, "b"), results, strict=True))
 
-    return methods.sentence("softness", answers(papers, other), answers(41, 42))
+    return methods.sentence("softness", answers(papers, best), answers(41, 42))
 
 
 def test_accuracy_on_objects_never_met_stands_beside_that_on_trials():
@@ -198,7 +198,7 @@ def test_in_a_browser_nothing_overflows_or_is_missing(studied):
 
 
 @pytest.mark.parametrize(
-    ("given", "sentence"),
+    ("words", "sentence"),
     [
         (["--data", "nowhere"], "nowhere"),
         (["--jobs", "0"], "--jobs must be at least 1"),
@@ -206,9 +206,9 @@ def test_in_a_browser_nothing_overflows_or_is_missing(studied):
         ([], "16 trials are too few to study"),
     ],
 )
-def test_bad_input_is_one_sentence(given, sentence, recordings, tmp_path, refusal):
-    data = [] if "--data" in given else ["--data", recordings]
-    assert sentence in refusal("study", "--out", tmp_path / "out", *data, *given)
+def test_bad_input_is_one_sentence(words, sentence, recordings, tmp_path, refusal):
+    data = [] if "--data" in words else ["--data", recordings]
+    assert sentence in refusal("study", "--out", tmp_path / "out", *data, *words)
     assert not any((tmp_path / "out").iterdir())
 
 
@@ -221,6 +221,8 @@ def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, refusal)
             labels={"mobility": "fixed"},
         )
         save(tmp_path / f"{seed:02d}.npz", touch)
-    said = refusal("study", "--data", tmp_path, "--out", tmp_path / "out")
-    assert "every trial has the same mobility: there is nothing to distinguish" in said
+    message = refusal("study", "--data", tmp_path, "--out", tmp_path / "out")
+    assert (
+        "every trial has the same mobility: there is nothing to distinguish" in message
+    )
     assert not any((tmp_path / "out").iterdir())

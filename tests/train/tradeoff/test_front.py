@@ -37,7 +37,7 @@ def test_the_points_come_fastest_first(front):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "milliseconds"),
+    ("wish", "milliseconds"),
     [
         ("fast", 100),
         ("accurate", 901),
@@ -50,13 +50,13 @@ def test_the_points_come_fastest_first(front):
         ("0.9", 901),
     ],
 )
-def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wanted, milliseconds):
-    point = ParetoFront.read(front(text()), DIGEST).pick(wanted)
+def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wish, milliseconds):
+    point = ParetoFront.read(front(text()), DIGEST).pick(wish)
     assert point.milliseconds == milliseconds
 
 
 @pytest.mark.parametrize(
-    ("wanted", "said"),
+    ("wish", "message"),
     [
         ("99", "the fastest point takes 100 ms"),
         ("0.95", "the most accurate point reaches 0.900"),
@@ -67,14 +67,14 @@ def test_a_point_is_chosen_by_name_by_time_or_by_accuracy(front, wanted, millise
         ("0", "not '0'"),
     ],
 )
-def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wanted, said):
+def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wish, message):
     with pytest.raises(InputError, match="--front") as caught:
-        ParetoFront.read(front(text()), DIGEST).pick(wanted)
-    assert said in str(caught.value)
+        ParetoFront.read(front(text()), DIGEST).pick(wish)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         ("[]", "not a front.json"),
         ("{", "not a front.json"),
@@ -90,7 +90,7 @@ def test_a_wish_that_no_point_fulfils_is_one_sentence(front, wanted, said):
         ),
     ],
 )
-def test_a_damaged_file_is_one_sentence(front, content, said):
+def test_a_damaged_file_is_one_sentence(front, content, message):
     with pytest.raises(InputError, match=r"front\.json: ") as caught:
         ParetoFront.read(front(content), DIGEST)
-    assert said in str(caught.value)
+    assert message in str(caught.value)

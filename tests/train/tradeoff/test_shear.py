@@ -15,32 +15,34 @@ def answers(shares, unmet=None, early=()):
     """Answers about mobility at windows of 0.2, 0.4, ... s."""
     unmet = unmet or [None] * len(shares)
     points = {}
-    for i, (share, other) in enumerate(zip(shares, unmet, strict=True)):
-        points[round(0.2 * (i + 1), 1)] = {"mobility": chosen(share, other, of=10)}
+    for i, (share, share_unmet) in enumerate(zip(shares, unmet, strict=True)):
+        points[round(0.2 * (i + 1), 1)] = {
+            "mobility": chosen(share, share_unmet, of=10)
+        }
     rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
-    known = {"mobility": SimpleNamespace(certified=rules)}
-    return Answers(points, {KNOWN: known, UNMET: {}})
+    of_known = {"mobility": SimpleNamespace(certified=rules)}
+    return Answers(points, {KNOWN: of_known, UNMET: {}})
 
 
 def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
-    made = answers([9, 7, 9, 8])
-    assert shear.reached_s(made.shares("mobility", KNOWN), 0.9) is None
-    assert shear.reached_s(made.shares("mobility", KNOWN), 0.8) == 0.6
-    assert shear.reached_s(made.shares("mobility", KNOWN), 0.7) == 0.2
+    shear_answers = answers([9, 7, 9, 8])
+    assert shear.reached_s(shear_answers.shares("mobility", KNOWN), 0.9) is None
+    assert shear.reached_s(shear_answers.shares("mobility", KNOWN), 0.8) == 0.6
+    assert shear.reached_s(shear_answers.shares("mobility", KNOWN), 0.7) == 0.2
 
 
 def test_objects_never_met_have_times_of_their_own():
-    made = answers([9, 9], unmet=[5, 8])
-    assert shear.reached_s(made.shares("mobility", UNMET), 0.8) == 0.4
+    shear_answers = answers([9, 9], unmet=[5, 8])
+    assert shear.reached_s(shear_answers.shares("mobility", UNMET), 0.8) == 0.4
     assert shear.reached_s(answers([9, 9]).shares("mobility", UNMET), 0.1) is None
 
 
 def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
-    made = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
-    assert made.early_s("mobility", KNOWN, 0.9) == 0.5
-    assert made.early_s("mobility", KNOWN, 0.95) == 0.8
-    assert made.early_s("mobility", KNOWN, 0.99) is None
-    assert made.early_s("mobility", UNMET, 0.9) is None
+    shear_answers = answers([9], early=[(0.3, 0.25), (0.5, 0.1), (0.8, 0.05)])
+    assert shear_answers.early_s("mobility", KNOWN, 0.9) == 0.5
+    assert shear_answers.early_s("mobility", KNOWN, 0.95) == 0.8
+    assert shear_answers.early_s("mobility", KNOWN, 0.99) is None
+    assert shear_answers.early_s("mobility", UNMET, 0.9) is None
 
 
 def test_gains_are_paired_differences():
@@ -72,7 +74,7 @@ def test_three_axes_take_three_times_the_bits(forearm):
 
 
 def test_the_section_draws_every_task():
-    made = answers([9, 9], [7, 8], early=[(0.3, 0.05)])
-    section = shear.section(Compared(made, made))
+    shear_answers = answers([9, 9], [7, 8], early=[(0.3, 0.05)])
+    section = shear.section(Compared(shear_answers, shear_answers))
     assert [table.name for table in section.tables] == ["shear_times", "shear"]
     assert section.figures[0].png.startswith(b"\x89PNG")

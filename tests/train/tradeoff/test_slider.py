@@ -19,7 +19,7 @@ ANSWERS = {
     1.2: {"mobility": chosen(99, 73), "<b>": chosen(91)},
 }
 RULE = SimpleNamespace(
-    asked=0.1,
+    error=0.1,
     folds=5,
     mean_s=0.5,
     wrong=0.05,
@@ -36,17 +36,17 @@ MEASURED = measured(
 )
 
 
-def shown():
+def page():
     return slider(MEASURED)
 
 
 def test_the_interval_is_that_which_the_front_promises():
     point = ParetoFront.of(ANSWERS, "mobility").pick("1000")
-    assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in shown()
+    assert f"({100 * point.low:.0f} to {100 * point.high:.0f})" in page()
 
 
 def test_the_time_of_an_accuracy_is_told_early_and_fixed():
-    text = shown()
+    text = page()
     assert "mobility after 0.50 s on average (early), 1 s (fixed)" in text
     assert "&lt;b&gt; after 1.2 s (fixed)" in text
 
@@ -56,7 +56,7 @@ def test_a_task_that_never_is_so_right_is_told():
 
 
 def test_the_names_of_the_front_and_the_other_prices_have_a_line_each():
-    text = shown()
+    text = page()
     for name, share in (("fast", "60 %"), ("balanced", "60 %"), ("accurate", "99 %")):
         assert f"<td>{name}</td><td>{share} after" in text
         assert f"make export DATA=mine FRONT={name}" in text
@@ -69,7 +69,7 @@ def test_the_names_of_the_front_and_the_other_prices_have_a_line_each():
 
 
 def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
-    text = shown()
+    text = page()
     assert '<td class="share">97 %</td><td class="interval">(86 to 99)</td>' in text
     assert text.count('<td class="unseen">73 %</td>') == 1
     assert "make export DATA=mine EXPORT=&#x27;--window 1&#x27;" in text
@@ -80,7 +80,7 @@ def test_without_a_script_the_lines_show_the_accuracy_after_a_second():
 @contextmanager
 def in_a_browser(folder, width, slider):
     """The page with the slider of a class at its beginning."""
-    report = write(folder, "Title", [], [Section("Answer", widget=shown())])
+    report = write(folder, "Title", [], [Section("Answer", widget=page())])
     with chromium(width, report.resolve().as_uri()) as browser:
         browser.execute_script(
             f"const i = document.querySelector('.{slider}'); i.value = 0;"

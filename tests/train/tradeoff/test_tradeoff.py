@@ -68,8 +68,8 @@ class TestWires:
     def test_the_wire_is_that_of_the_recordings_or_unknown(self, make_touch, forearm):
         touch = make_touch()
         assert wire_time_s([touch], forearm, 100.0) is None
-        told = replace(touch, meta={**touch.meta, "wire_s": 0.0182})
-        assert wire_time_s([told], forearm, 100.0) == pytest.approx(0.0232)
+        wired = replace(touch, meta={**touch.meta, "wire_s": 0.0182})
+        assert wire_time_s([wired], forearm, 100.0) == pytest.approx(0.0232)
         simulated = replace(touch, meta={**touch.meta, "simulation": {}})
         assert 0.005 < wire_time_s([simulated], forearm, 100.0) < 0.02
 
@@ -106,8 +106,8 @@ def fronted(recordings, tmp_path_factory):
 def test_export_writes_the_very_model_of_a_point(recordings, fronted, tmp_path, capsys):
     path, choice = fronted
     export(tmp_path, "--data", recordings, "--front", "fast", "--fronts", path)
-    said = capsys.readouterr().err
-    assert f"category {choice.by_trial.accuracy:.1%} (62 to 100) in 410 ms" in said
+    message = capsys.readouterr().err
+    assert f"category {choice.by_trial.accuracy:.1%} (62 to 100) in 410 ms" in message
     info = Model(tmp_path / "model.onnx").info
     task = info.tasks["category"]
     assert info.window_s == 0.4
@@ -134,10 +134,10 @@ def test_a_point_that_cannot_be_exported_is_one_sentence(
     more,
     sentence,
 ):
-    given = ["--data", str(recordings), "--out", str(tmp_path), "--front", "fast"]
+    words = ["--data", str(recordings), "--out", str(tmp_path), "--front", "fast"]
     if more[0] == "--data":
         more = ["--data", *(str(recordings / name) for name in more[1:])]
-    assert main([*given, "--fronts", str(fronted[0]), *more]) == 2
+    assert main([*words, "--fronts", str(fronted[0]), *more]) == 2
     assert sentence in capsys.readouterr().err.splitlines()[-1]
     assert not list(tmp_path.iterdir())
 
@@ -184,9 +184,14 @@ class TestCosts:
 
 
 def test_prices_are_two_numbers():
-    both = "wrong=1,second=1"
+    prices = "wrong=1,second=1"
     assert cost("second=0,wrong=2.5") == (2.5, 0.0)
-    for text in ("wrong=10", "wrong=-1,second=1", "wrong=inf,second=1", f"{both},x=1"):
+    for text in (
+        "wrong=10",
+        "wrong=-1,second=1",
+        "wrong=inf,second=1",
+        f"{prices},x=1",
+    ):
         with pytest.raises(argparse.ArgumentTypeError, match="like wrong=10,second=1"):
             cost(text)
 
@@ -243,9 +248,9 @@ class TestEarly:
         compared = comparison(share_right(0.5, 0.7, 0.9))
         right = np.arange(100) < 90
         rule = early.Certified(0.1, early.FOLDS, right, right, 0.0, 1.0, 0.6)
-        bolder = replace(rule, asked=0.3, right=np.arange(100) < 70, mean_s=0.4)
-        compared.certified.extend([rule, replace(rule, asked=0.2), bolder])
-        listed = [rule.asked for rule in uses.distinct(compared)]
+        bolder = replace(rule, error=0.3, right=np.arange(100) < 70, mean_s=0.4)
+        compared.certified.extend([rule, replace(rule, error=0.2), bolder])
+        listed = [rule.error for rule in uses.distinct(compared)]
         assert listed == [0.1, 0.3]
 
     def test_an_early_decision_is_judged_on_the_contacts_of_the_folds_that_certified_it(
@@ -269,7 +274,7 @@ class TestEarly:
         dataset = followed(read([save_touches(tmp_path, 20)]))
         compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
         assert compared.right.all()
-        rules = {rule.asked: rule for rule in compared.certified}
+        rules = {rule.error: rule for rule in compared.certified}
         rule = rules[0.15]
         assert rule.folds == early.FOLDS
         assert rule.wrong == 0.0
@@ -290,12 +295,13 @@ class TestEarly:
                 save(tmp_path / f"{kind}-{number}.npz", touch)
         dataset = followed(read([str(tmp_path)]))
         met = []
+        fixed = {"features": ("paper",), "projection": "pca", "scaling": "IV", "k": 1}
+        fit = partial(early.fit, **fixed)
 
         def spy(trials, **options):
             met.append(set(trials.labels("object")))
             return fit(trials, **options)
 
-        fit = early.fit
         monkeypatch.setattr(early, "fit", spy)
         compared = early.compare_stopping(dataset, (0.6, 1.2), leave_out="object")
         objects = set(dataset.labels("object"))
@@ -309,11 +315,8 @@ class TestEarly:
         tmp_path,
         monkeypatch,
     ):
-        monkeypatch.setattr(
-            early,
-            "fit",
-            partial(early.fit, features=("zone_kernels",)),
-        )
+        fixed = {"features": ("zone_kernels",), "projection": "lda", "scaling": "IV"}
+        monkeypatch.setattr(early, "fit", partial(early.fit, **fixed))
         dataset = followed(read([save_touches(tmp_path, 20)]), ("zone_kernels",))
         assert early.compare_stopping(dataset, (0.6, 1.2))["category"].right.all()
 
@@ -363,8 +366,8 @@ def board_file(path, digest):
 
 def test_a_board_file_of_another_model_is_one_sentence(recordings, tmp_path, refusal):
     path = board_file(tmp_path / "board.json", "0" * 64)
-    given = "--data", recordings, "--board", path, "--out", tmp_path / "out"
-    assert "was made with a model of other recordings" in refusal("tradeoff", *given)
+    words = "--data", recordings, "--board", path, "--out", tmp_path / "out"
+    assert "was made with a model of other recordings" in refusal("tradeoff", *words)
     assert not any((tmp_path / "out").iterdir())
 
 
@@ -403,8 +406,8 @@ def written(tmp_path_factory):
 
 def test_no_process_is_one_sentence(tmp_path, refusal):
     words = "--data", tmp_path, "--board", tmp_path / "board.json", "--jobs", 0
-    said = refusal("tradeoff", *words, "--out", tmp_path / "out")
-    assert said.endswith("--jobs must be at least 1, not 0")
+    message = refusal("tradeoff", *words, "--out", tmp_path / "out")
+    assert message.endswith("--jobs must be at least 1, not 0")
 
 
 def test_the_report_needs_no_other_page(written):
