@@ -89,7 +89,7 @@ class FakeAD7147(FakeChip):
         results = np.where(as_set, self._sense(t), connections[:, 0] | 1)
         results[last + 1 :] = 0
         self.registers[RESULTS : RESULTS + STAGES] = results
-        first = self._pointer
-        self._pointer = (self._pointer + (n + 1) // 2) & 0x3FF
-        served = self.registers[first : first + (n + 1) // 2].astype(">u2").tobytes()
+        end = self._pointer + (n + 1) // 2
+        served = self.registers[self._pointer : end].astype(">u2").tobytes()
+        self._pointer = end & 0x3FF
         return served.ljust(n, b"\0")[:n]

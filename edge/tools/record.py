@@ -358,16 +358,15 @@ def _joint_names(
     Raises:
         InputError: the source lacks the arm's angles.
     """
-    names = None if arm is None else arm.names
     if arguments.joints is not None:
-        return names
+        return None if arm is None else arm.names
     if arm is not None and opened.dof != arm.dof:
         raise InputError(
             f"{opened.source} gives {opened.dof or 'no'} joint angles, but "
             f"{arguments.arm or arguments.model} has {arm.dof} joints; name another source "
             "with --joints"
         )
-    return names if opened.playback is None else opened.playback.recording.joint_names
+    return None if opened.playback is None else opened.playback.recording.joint_names
 
 
 def wire_s(file: SkinFile) -> float:
