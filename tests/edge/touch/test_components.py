@@ -1,17 +1,11 @@
-"""Components labelled by runs are those of scipy.ndimage.label, the seam joined."""
+"""Components labelled by runs, of winding shapes and of counts below zero; those of noise
+are in `test_region`."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from edge.touch.components import components_of
 from edge.touch.region import find_regions
-from tests.edge.touch.test_region import reference_masks, serpentine
-
-
-def padded(active):
-    return np.hstack([active, np.zeros((len(active), 1), dtype=bool)])
+from tests.edge.touch.test_region import by_scipy, by_us, serpentine
 
 
 def spiral(side):
@@ -38,8 +32,6 @@ def comb(side):
 
 
 SHAPES = {
-    "none": np.zeros((5, 7), dtype=bool),
-    "all": np.ones((5, 7), dtype=bool),
     "one": np.ones((1, 1), dtype=bool),
     "row": np.array([[True, False, True, True]]),
     "spiral": spiral(40),
@@ -51,40 +43,9 @@ SHAPES = {
 
 @pytest.mark.parametrize("wraps", [False, True])
 @pytest.mark.parametrize("name", SHAPES)
-def test_shapes_have_the_components_of_scipy(name, wraps):
-    assert_same(SHAPES[name], wraps)
-
-
-def assert_same(active, wraps):
-    components = components_of(padded(active), wraps)
-    labels = np.full(active.shape, -1)
-    labels[active] = components.of_taxel
-    masks = reference_masks(active, wraps)
-    masks.sort(key=lambda mask: np.flatnonzero(mask)[0])
-    expected = np.full(active.shape, -1)
-    for number, mask in enumerate(masks):
-        expected[mask] = number
-    np.testing.assert_array_equal(labels, expected)
-    assert components.areas.tolist() == [int(mask.sum()) for mask in masks]
-
-
-@settings(max_examples=30, deadline=None)
-@given(
-    rows=st.integers(1, 40),
-    cols=st.integers(1, 40),
-    density=st.floats(0.0, 1.0),
-    wraps=st.booleans(),
-    seed=st.integers(0, 10**6),
-)
-def test_noise_of_any_density_has_the_components_of_scipy(
-    rows,
-    cols,
-    density,
-    wraps,
-    seed,
-):
-    active = np.random.default_rng(seed).random((rows, cols)) < density
-    assert_same(active, wraps)
+def test_shapes_have_the_regions_of_scipy(name, wraps):
+    arguments = SHAPES[name].astype(np.uint16), 0, None, wraps
+    assert by_us(*arguments) == by_scipy(*arguments)
 
 
 def test_counts_below_zero_have_their_peak():
