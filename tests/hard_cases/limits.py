@@ -9,6 +9,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
+from mpmath import mpf
 
 from edge import demo
 from edge.classifier import Classifier
@@ -156,16 +157,16 @@ def transform_error(counts, scale):
     contact = contact_of(frames, layout, horizon_s=1.2, features=COURSES)
     vector = feature_vector(contact.series(), 1.2, 8, COURSES).reshape(4, 8)
     with mpmath.workdps(50):
-        force = mpmath.mpf(int(counts)) / mpmath.mpf(scale)
-        floor = mpmath.mpf(layout.threshold_counts + 1) / mpmath.mpf(scale)
+        force = mpf(int(counts)) / mpf(scale)
+        floor = mpf(layout.threshold_counts + 1) / mpf(scale)
         true = [
             mpmath.log(force + floor),
             mpmath.sqrt(force),
             mpmath.log(floor),
-            mpmath.mpf(0),
+            mpf(0),
         ]
         errors = [
-            abs(mpmath.mpf(value) - want) / max(1, abs(want))
+            abs(mpf(value) - want) / max(1, abs(want))
             for row, want in zip(vector.tolist(), true, strict=True)
             for value in row
         ]

@@ -11,6 +11,7 @@ from functools import cache
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
+from mpmath import mpf
 
 from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
@@ -262,21 +263,21 @@ def confidence_error(kind, point, factor, seed):
             label = info.tasks[task].labels.index(decision.label)
             rule = info.stopping[task]
             with mpmath.workdps(50):
-                far = [mpmath.mpf(float(d)) for d in decision.label_distances]
+                far = [mpf(float(d)) for d in decision.label_distances]
                 rival = min(d for i, d in enumerate(far) if i != label)
-                typical = mpmath.mpf(info.novelty.limits[point][0])
-                novelty = mpmath.mpf(decision.novelty) / typical
-                excess = mpmath.log(novelty) if novelty > 1 else mpmath.mpf(0)
+                typical = mpf(info.novelty.limits[point][0])
+                novelty = mpf(decision.novelty) / typical
+                excess = mpmath.log(novelty) if novelty > 1 else mpf(0)
                 terms = [
-                    mpmath.mpf(rule.slopes[point]) * (rival - far[label]),
-                    mpmath.mpf(rule.intercepts[point]),
-                    -mpmath.mpf(rule.doubts[point]) * excess,
+                    mpf(rule.slopes[point]) * (rival - far[label]),
+                    mpf(rule.intercepts[point]),
+                    -mpf(rule.doubts[point]) * excess,
                 ]
                 log_odds = sum(terms)
                 true = 1 / (1 + mpmath.exp(-log_odds))
                 # An ulp of each term moves the probability by p (1 - p) of it.
                 resolved = 1 + true * (1 - true) * sum(map(abs, terms))
-                error = abs(mpmath.mpf(decision.confidence) - true) / resolved
+                error = abs(mpf(decision.confidence) - true) / resolved
             worst = max(worst, float(error))
     return worst
 

@@ -67,6 +67,11 @@ def run(scene, step_s=0.01, **options) -> Seen:
     return run_batch(scene, specs_of(scene, step_s), **options)
 
 
+def press(*add, **keys) -> Seen:
+    """A run of one fixed object with these keys."""
+    return run(make(one_object(**keys), *add))
+
+
 Trace = namedtuple("Trace", "t force q target slide speed depth")
 """The rig's motion and forces, (steps, n) each."""
 

@@ -97,20 +97,32 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
 
 
 STATE = set("stems tilt inertia friction sliding turning tipping viscous".split())
-"""Effects with state of their own."""
+"""Modules with state of their own."""
+
+
+def modules_of(effects):
+    """The modules of a trial's effects, in the order in which their hooks run."""
+    shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
+    return ("base", *shared, *effects)
 
 
 @pytest.fixture(scope="module")
-def batches():
+def bare():
+    """A batch without effects, and none."""
+    return batch_of(scene())
+
+
+@pytest.fixture(scope="module")
+def batches(bare):
     """A batch of each kind of trials, and the effects that it calls for."""
     effects = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
     trial_scene = scene(*effects, objects=everything())
-    return [batch_of(trial_scene, i) for i in range(len(kinds(trial_scene)))]
+    return [bare, *(batch_of(trial_scene, i) for i in range(len(kinds(trial_scene))))]
 
 
 def test_3_only_the_called_effects_state_exists(batches):
     for batch, effects in batches:
-        assert set(batch.trials.states) == STATE & {*effects, "viscous"}, effects
+        assert set(batch.trials.states) == STATE & {*modules_of(effects)}, effects
 
 
 def test_3_only_the_called_effects_leave_traces(batches):
@@ -122,15 +134,9 @@ def test_3_only_the_called_effects_leave_traces(batches):
 
 @pytest.mark.parametrize("name", ["times", "kept", "valid"])
 def test_3_only_the_called_sensors_effects_leave_theirs(batches, name):
-    assert all(getattr(batch.all_readings[0], name) is not None for batch, _ in batches)
-    bare, _ = batch_of(scene())
-    assert getattr(bare.all_readings[0], name) is None
-
-
-def test_3_without_effects_there_is_only_the_depth():
-    bare, _ = batch_of(scene())
-    assert bare.trials.states == {}
-    assert set(bare.traces) == {"depth_m"}
+    without, *arrays = (getattr(batch.all_readings[0], name) for batch, _ in batches)
+    assert without is None
+    assert all(array is not None for array in arrays)
 
 
 def test_4_adding_an_effect_leaves_the_others_draws():
@@ -164,8 +170,7 @@ def plan():
 
 def owners_of(effects, stage):
     """The modules whose hooks a trial of these effects runs in a stage, in order."""
-    shared = {"viscous"} if {"relaxation", "inertia"} & set(effects) else set()
-    have = [n for n in ("base", *shared, *effects) if hasattr(module_of(n), stage)]
+    have = [n for n in modules_of(effects) if hasattr(module_of(n), stage)]
     return have[-1:] if stage in INSTEAD else have
 
 
@@ -187,16 +192,13 @@ def bits(batch, i):
     return {name: a.tobytes() for name, a in arrays.items() if a is not None}
 
 
-SENSORS = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
-
-
-@pytest.mark.parametrize(("sensors", "arrays"), [((), 3), (SENSORS, 6)])
-def test_6_results_do_not_depend_on_the_batch(sensors, arrays):
+def test_6_results_do_not_depend_on_the_batch():
+    sensors = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
     add = ["tilt", "inertia", *sensors]
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
     every = tuple(spec for specs in kinds(trial_scene).values() for spec in specs)
     together = run_batch(trial_scene, every)
-    assert len(bits(together, 0)) == arrays
+    assert len(bits(together, 0)) == 6
     alone = [(spec,) for spec in every[::2]]
     for specs in (*alone, every[::-1], every[3:10]):
         chosen = run_batch(trial_scene, specs)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from edge.touch.arm import Chain
@@ -15,6 +16,7 @@ from tests.train.simulate.scenes import (
     make,
     movable,
     one_object,
+    press,
     run,
     scene,
     slider,
@@ -49,8 +51,8 @@ class TestArm:
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (chain.dof, 50))
         pose = Kinematics(chain).pose(q)
         want = chain.pose(q.T)
-        np.testing.assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
-        np.testing.assert_allclose(pose.rotation.T, want[:, :3, :3], atol=2e-15)
+        assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
+        assert_allclose(pose.rotation.T, want[:, :3, :3], atol=2e-15)
 
     def test_the_gains_give_the_stiffness_that_was_measured_at_mid_forearm(self):
         pose = Kinematics(Chain.cody()).pose(np.radians(CODY_START_DEG)[:, None])
@@ -66,7 +68,7 @@ class TestArm:
         batch = run(make(one_object(), lead_s=0.3))
         before = batch.joints[0, :25]
         rate = np.diff(before, axis=0) * 100.0
-        np.testing.assert_allclose(rate.sum(axis=1), 0.349, atol=1e-3)
+        assert_allclose(rate.sum(axis=1), 0.349, atol=1e-3)
         assert (batch.force[0, :29] == 0.0).all()
         assert batch.force[0, 31] > 0.0
 
@@ -77,17 +79,17 @@ class TestArm:
         rig = Rig(h=h, arm_k=k, arm_d=d, speed=1e6, travel_s=1e-6, law=Law([[0.0]]))
         trace = rig.run(3000)
         want = 1.0 - np.exp(-trace.t[:, 0] * k / d)
-        np.testing.assert_allclose(trace.q[:, 0], want, atol=2e-3)
+        assert_allclose(trace.q[:, 0], want, atol=2e-3)
 
     def test_a_frame_ends_at_its_own_time_and_not_at_the_sum_of_its_steps(self):
-        batch = run(make(one_object()))
+        batch = press()
         assert batch.trials.clock.t.tolist() == [batch.t[-1]] * 2
         assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
 
     def test_contact_holds_the_arm_where_the_object_is(self):
         # A rigid, fixed object: the skin's point at the contact does not go on along
         # the push.
-        batch = run(make(one_object(width_m=0.05)))
+        batch = press(width_m=0.05)
         t = batch.trials
         held = t.scene.kinematics.pose(batch.joints[0].T)
         point = held.origin + held.rotation[2] * t.contact.z[0]
@@ -260,12 +262,17 @@ class TestInertia:
 
 
 class TestFriction:
+    def push(self, t):
+        """(3, n) newtons of the arm on the objects."""
+        contact = t.contact
+        return contact.loads[0] * contact.normal + contact.pull * contact.along_face
+
     def test_a_sliding_skin_bears_less_by_the_arms_compliance(self):
         # Quasi-static and stiff: a = c_nn F + c_nt T with T = mu F, so F falls by
         # c_nn / (c_nn + mu c_nt).
         mu = 0.4
-        plain = run(make(one_object(width_m=0.05)))
-        held = run(make(one_object(width_m=0.05, skin_friction=mu)))
+        plain = press(width_m=0.05)
+        held = press(width_m=0.05, skin_friction=mu)
         shear = held.trials.states["friction"]
         pull = held.trials.contact.pull[0]
         force = held.force[0, -1]
@@ -277,7 +284,7 @@ class TestFriction:
         assert force < 0.95 * plain.force[0, -1]
 
     def test_the_skin_moves_along_the_face_as_its_jacobian_says(self):
-        t = run(make(one_object(width_m=0.05, skin_friction=0.4))).trials
+        t = press(width_m=0.05, skin_friction=0.4).trials
         pose = t.scene.kinematics.pose(t.arm.q_frame)
         local = np.einsum(
             "kin,in->kn",
@@ -293,7 +300,7 @@ class TestFriction:
                 point = pose.origin + np.einsum("kin,kn->in", pose.rotation, local)
                 moved.append((point * t.contact.along_face).sum(axis=0))
             want = t.states["friction"].jacobian[j]
-            np.testing.assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
+            assert_allclose((moved[1] - moved[0]) / 2e-6, want, atol=1e-7)
 
     def test_a_face_that_sticks_pulls_as_the_skin_is_stretched_when_all_is_at_rest(
         self,
@@ -302,39 +309,25 @@ class TestFriction:
         t = run(replace(stuck, travel_s=0.6)).trials
         pull = t.contact.pull
         assert (np.abs(pull) > 0.5).all()
-        np.testing.assert_allclose(1e4 * t.states["friction"].stretch, pull, rtol=1e-3)
+        assert_allclose(1e4 * t.states["friction"].stretch, pull, rtol=1e-3)
 
     def test_a_smooth_soft_object_presses_along_the_forearms_normal(self):
         foam = one_object(family="foam", width_m=0.1, skin_friction=0.0)
         t = run(make(foam, "tilt")).trials
-        push = (
-            t.contact.loads[0] * t.contact.normal
-            + t.contact.pull * t.contact.along_face
-        )
         forearm = t.scene.kinematics.pose(t.arm.q_frame).rotation[2]
         askew = (t.contact.normal * forearm).sum(axis=0)
         assert (np.abs(askew) > 0.03).all()
-        np.testing.assert_allclose(
-            (push * forearm).sum(axis=0) / t.contact.loads[0],
-            0.0,
-            atol=0.01,
-        )
+        along = (self.push(t) * forearm).sum(axis=0) / t.contact.loads[0]
+        assert_allclose(along, 0.0, atol=0.01)
 
     def test_askew_the_skin_bears_the_shears_part_along_its_own_normal(self):
-        batch = run(make(one_object(width_m=0.05, skin_friction=0.4), "tilt"))
+        batch = press("tilt", width_m=0.05, skin_friction=0.4)
         t = batch.trials
-        push = (
-            t.contact.loads[0] * t.contact.normal
-            + t.contact.pull * t.contact.along_face
-        )
         forearm = t.scene.kinematics.pose(t.arm.q).rotation[2]
         across = t.contact.normal - forearm * (t.contact.normal * forearm).sum(axis=0)
         across /= np.sqrt((across * across).sum(axis=0))
-        np.testing.assert_allclose(
-            batch.force[:, -1],
-            (push * across).sum(axis=0),
-            rtol=2e-3,
-        )
+        want = (self.push(t) * across).sum(axis=0)
+        assert_allclose(batch.force[:, -1], want, rtol=2e-3)
 
     def test_the_shear_cannot_lift_more_than_a_thing_weighs(self):
         held = run(make(movable(0.05, 0.5, 0.5, skin_friction=0.5, width_m=0.2)))
@@ -359,7 +352,7 @@ class TestFriction:
 
 class TestTilt:
     def test_depth_and_tilt_follow_the_joints_as_their_jacobians_say(self):
-        t = run(make(one_object(width_m=0.05), "tilt")).trials
+        t = press("tilt", width_m=0.05).trials
         tilt.locate(t.everyone)
         before = t.contact.y_frame.copy()
         jacobian = t.contact.jacobian.copy()
@@ -371,7 +364,7 @@ class TestTilt:
             # does not.
             moved = t.contact.y_frame - before
             moved[0] -= before[1] * (middle - t.states["tilt"].lever[0])
-            np.testing.assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
+            assert_allclose(moved / 1e-6, jacobian[j], atol=2e-5)
             t.arm.q[j] -= 1e-6
 
     def test_an_object_pushed_past_the_skins_end_is_still_met_on_the_skin(self):
@@ -391,9 +384,5 @@ class TestTilt:
         t = run(trial_scene, 0.0025).trials
         moved = (t.contact.jacobian * (t.arm.q - t.arm.q_frame)[:, None]).sum(axis=0)
         assert (np.abs(moved) > 1e-9).all()
-        np.testing.assert_allclose(
-            t.contact.depth,
-            t.contact.y_frame + moved,
-            rtol=0.0,
-            atol=1e-13,
-        )
+        want = t.contact.y_frame + moved
+        assert_allclose(t.contact.depth, want, rtol=0.0, atol=1e-13)

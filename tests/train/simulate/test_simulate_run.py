@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from edge.recording import load
 from tests.train.simulate.scenes import make, one_object, scene
@@ -58,7 +59,7 @@ def test_a_recordings_arrays_are_as_the_contract_says(demo, trial):
     assert trial.frames.shape[1:] == (16, 24)
     assert trial.joints is not None
     assert trial.joints.shape == (len(trial.t), 5)
-    np.testing.assert_allclose(np.diff(trial.t), 0.01)
+    assert_allclose(np.diff(trial.t), 0.01)
     touched = trial.t[np.argmax(trial.frames.max(axis=(1, 2)) > demo.skin.onset)]
     assert touched > 0.1
     assert trial.t[-1] >= touched + 2.0
@@ -146,7 +147,7 @@ class TestSensors:
         fewer = recorded(dropped_frames={"part": 0.4})
         assert 0.45 < len(fewer.t) / len(plain.t) < 0.75
         where = np.searchsorted(plain.t, fewer.t)
-        np.testing.assert_array_equal(fewer.frames, plain.frames[where])
+        assert_array_equal(fewer.frames, plain.frames[where])
 
     def test_crosstalk_reaches_further_taxels(self, plain):
         leak = recorded(crosstalk={"part": 0.05})

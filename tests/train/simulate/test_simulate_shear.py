@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from edge.errors import InputError
 from tests.train.simulate.scenes import movable, one_object, run, scene
@@ -75,7 +76,7 @@ def test_the_sum_along_the_rows_is_the_pull_that_the_arm_feels(mu, add):
     along = traction(batch)[0].sum(axis=(0, 1))
     pull = batch.trials.contact.pull
     assert (np.abs(pull) > 0.01).all()
-    np.testing.assert_allclose(along, pull, rtol=1e-9)
+    assert_allclose(along, pull, rtol=1e-9)
 
 
 def test_the_skin_is_drawn_against_its_own_motion():
@@ -98,7 +99,7 @@ def test_taxels_that_all_stick_bear_alike():
     assert loaded.sum() > 10
     alike = t.contact.pull / loaded.sum(axis=(0, 1))
     expected = np.where(loaded, alike, 0.0)
-    np.testing.assert_allclose(along, expected, rtol=1e-12)
+    assert_allclose(along, expected, rtol=1e-12)
 
 
 def test_taxels_that_all_slip_bear_friction_times_their_load():
@@ -107,7 +108,7 @@ def test_taxels_that_all_slip_bear_friction_times_their_load():
     assert (touch.force > 10.0).all()
     # The pull obeys the load of the step before, which is less by its growth.
     along = np.abs(traction(batch)[0])
-    np.testing.assert_allclose(along, 0.05 * touch.image, rtol=5e-3)
+    assert_allclose(along, 0.05 * touch.image, rtol=5e-3)
 
 
 def test_no_taxel_leaves_its_cone():
@@ -124,7 +125,7 @@ def test_around_the_forearm_a_load_acts_along_the_faces_normal():
     _, around = traction(batch)
     assert (t.touch.image.any(axis=0).sum(axis=0) > 1).all()
     expected = t.touch.image * np.sin(t.bed.column_angle)
-    np.testing.assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
+    assert_allclose(around, expected, rtol=1e-12, atol=1e-15)
     # The skin is pressed away from the middle of the contact.
     assert (around.min(axis=(0, 1)) < 0.0).all()
     assert (around.max(axis=(0, 1)) > 0.0).all()
@@ -141,7 +142,7 @@ def test_a_face_that_turns_takes_the_normal_with_it():
     along, around = traction(batch)
     expected = t.touch.image * np.sin(t.bed.column_angle - turned)
     assert np.count_nonzero(expected) > 20
-    np.testing.assert_allclose(around, expected, rtol=1e-12)
+    assert_allclose(around, expected, rtol=1e-12)
     assert not along.any()
 
 

@@ -6,9 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import solve, toeplitz
 
-from tests.train.simulate.scenes import Law, Rig, make, one_object, run
+from tests.train.simulate.scenes import Law, Rig, make, one_object, press, run
 from train.simulate import contact
 from train.simulate.effects import cover, lateral
 from train.simulate.effects.pop import BREAKS, SLOPES
@@ -32,7 +33,7 @@ class TestRelaxation:
         ramp = np.minimum(t, up)
         rise = 1.0 - np.exp(-ramp / tau)
         z = ratio * k * rate * tau * rise * np.exp(-(t - ramp) / tau)
-        np.testing.assert_allclose(trace.force, k * rate * ramp + z, rtol=1e-8)
+        assert_allclose(trace.force, k * rate * ramp + z, rtol=1e-8)
 
 
 class TestBed:
@@ -238,23 +239,23 @@ def test_foam_pressed_flat_is_as_hard_as_the_skin():
 
 
 def test_a_sleeve_is_in_series_with_the_skin():
-    t = run(make(one_object(cover_n_m=2500.0))).trials
-    np.testing.assert_allclose(t.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
+    t = press(cover_n_m=2500.0).trials
+    assert_allclose(t.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
 
 
 def test_a_sleeve_spreads_the_load_and_loses_none():
     plain, covered = (
-        run(make(one_object(width_m=0.05, **more)))
+        press(width_m=0.05, **more)
         for more in ({}, {"cover_n_m": 2500.0, "cover_spread": 0.2})
     )
     for batch in (plain, covered):
         total = batch.counts[0].sum(axis=(1, 2)) / 1000.0
-        np.testing.assert_allclose(total, batch.force[0], atol=0.05)
+        assert_allclose(total, batch.force[0], atol=0.05)
     assert (covered.counts[0, -1] > 0).sum() > (plain.counts[0, -1] > 0).sum()
 
 
 def test_a_sleeve_gives_each_of_four_neighbours_its_part():
-    t = run(make(one_object(cover_n_m=2500.0, cover_spread=0.1))).trials
+    t = press(cover_n_m=2500.0, cover_spread=0.1).trials
     t.touch.image[:] = 0.0
     t.touch.image[5, 3] = 1.0
     cover.pass_on(t.everyone)
@@ -263,7 +264,7 @@ def test_a_sleeve_gives_each_of_four_neighbours_its_part():
     want[5, 3] = 0.6
     want[[4, 6], 3] = 0.1
     want[5, [2, 4]] = 0.1
-    np.testing.assert_allclose(image, want, atol=1e-15)
+    assert_allclose(image, want, atol=1e-15)
 
 
 class TestBubbles:
@@ -314,25 +315,25 @@ class TestBubbles:
 
 def test_the_stems_that_are_held_bear_by_their_own_bends():
     keys = {"stem_slip_m": 0.03, "stem_spread_m": 0.5, "stem_damping": 0.0}
-    batch = run(make(one_object(family="foliage", **keys)))
+    batch = press(family="foliage", **keys)
     stems = batch.trials.states["stems"]
     bent = np.maximum(batch.trials.contact.depth[0] - stems.depth, 0.0)
     assert (bent > 0.03).any()
     assert (stems.stiffness[bent > 0.03] == 0.0).all()
     want = (stems.stiffness * bent).sum(axis=0)
     assert (want > 0.1).all()
-    np.testing.assert_allclose(batch.force[:, -1], want, rtol=1e-9)
+    assert_allclose(batch.force[:, -1], want, rtol=1e-9)
     # Between two rows, each stem's load is nearer to the one that it stands nearer to.
     row = stems.taxel // len(batch.trials.bed.columns) + stems.part
     middle = (row * stems.stiffness * bent).sum(axis=0) / want
     counts = batch.counts[:, -1].sum(axis=2, dtype=float)
     measured = (counts * np.arange(16)).sum(axis=1) / counts.sum(axis=1)
-    np.testing.assert_allclose(measured, middle, atol=0.01)
+    assert_allclose(measured, middle, atol=0.01)
 
 
 def test_stems_that_have_slipped_off_damp_no_more():
     keys = {"stem_slip_m": 0.02, "stem_spread_m": 0.02, "stem_damping": 1.0}
-    batch = run(make(one_object(family="foliage", **keys)))
+    batch = press(family="foliage", **keys)
     assert (batch.force.max(axis=1) > 0.5).all()
     assert (batch.trials.states["stems"].stiffness == 0.0).all()
     assert (batch.force[:, -1] == 0.0).all()
@@ -340,12 +341,12 @@ def test_stems_that_have_slipped_off_damp_no_more():
 
 def test_no_row_that_the_face_does_not_cover_is_the_deepest():
     keys = {"family": "bubbles", "pop_n": 1e6, "bubble_n_m": 300.0, "bubble_m": 0.05}
-    batch = run(make(one_object(width_m=0.02, **keys), "tilt"))
+    batch = press("tilt", width_m=0.02, **keys)
     covered = batch.trials.bed.weight > 0.0
     depth = batch.trials.touch.line_depth
     want = np.where(covered, depth, 0.0).max(axis=0)
     assert (want < depth.max(axis=0)).all()
-    np.testing.assert_array_equal(batch.traces["depth_m"][:, -1], want)
+    assert_array_equal(batch.traces["depth_m"][:, -1], want)
 
 
 def loads_of(t):
@@ -360,8 +361,8 @@ def test_at_rest_each_row_under_a_pivoting_arm_has_relaxed_to_its_own_spring():
     viscous = t.states["viscous"]
     elastic = loads_of(t).sum(axis=0)
     assert (np.ptp(elastic, axis=0) > 0.1).all()
-    np.testing.assert_allclose(t.bed.row_force, elastic, atol=1e-3)
-    np.testing.assert_allclose(viscous.before, viscous.ratio * elastic, atol=1e-3)
+    assert_allclose(t.bed.row_force, elastic, atol=1e-3)
+    assert_allclose(viscous.before, viscous.ratio * elastic, atol=1e-3)
 
 
 def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
@@ -370,7 +371,7 @@ def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
     intact = t.bed.intact
     assert (np.ptp(intact.sum(axis=0), axis=0) > 0.0).all()
     want = (loads_of(t) * intact).sum(axis=0)
-    np.testing.assert_allclose(t.bed.row_force, want, atol=1e-6)
+    assert_allclose(t.bed.row_force, want, atol=1e-6)
 
 
 def test_the_tangents_of_a_bubble_lie_below_the_gas_law_by_a_third_at_most():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from train.simulate import streams
 
@@ -18,9 +19,7 @@ def test_a_stream_is_numpys_own_of_the_seed_and_its_words(seed):
     for trial, spawn_key in ((5, words), (None, words[:-1])):
         sequence = np.random.SeedSequence(seed, spawn_key=spawn_key)
         want = np.random.Generator(np.random.PCG64(sequence)).random(4)
-        np.testing.assert_array_equal(
-            streams.stream(seed, "noise", "soft", trial).random(4), want
-        )
+        assert_array_equal(streams.stream(seed, "noise", "soft", trial).random(4), want)
 
 
 @pytest.mark.parametrize(
@@ -43,11 +42,9 @@ def test_seed_name_condition_and_trial_each_give_another_stream(second):
 def test_a_trials_draw_does_not_depend_on_the_trials_beside_it(kind):
     every = streams.draws(3, "yaw", "soft", np.arange(50), kind)
     numbers = np.array([7, 2, 31])
-    np.testing.assert_array_equal(
-        streams.draws(3, "yaw", "soft", numbers, kind), every[numbers]
-    )
+    assert_array_equal(streams.draws(3, "yaw", "soft", numbers, kind), every[numbers])
     want = getattr(streams.stream(3, "yaw", "soft"), kind)(50)
-    np.testing.assert_array_equal(every, np.clip(want, -2.5, 2.5))
+    assert_array_equal(every, np.clip(want, -2.5, 2.5))
 
 
 def test_a_normal_draw_is_cut_at_two_and_a_half_deviations():
@@ -69,4 +66,4 @@ def test_noise_is_normal_and_each_number_takes_two_bytes():
     numbers = np.full_like(values, 7.0)
     streams.add_normal(fresh, 3.0, numbers)
     assert fresh.random() == generator_again.random()
-    np.testing.assert_array_equal(numbers, np.float32(7.0) + values)
+    assert_array_equal(numbers, np.float32(7.0) + values)
