@@ -6,6 +6,7 @@ Linux's driver ad714x.
 """
 
 from collections.abc import Iterator, Mapping
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,12 +108,12 @@ class AD7147(Chip):
             BusError: the chip does not answer.
         """
         super().__init__(bus, address, into=into)
-        self._checks = []
+        checks = []
         for register, values in CHECK_ROWS:
             pointer = write(address, words((register,)))
             row = read(address, 2 * len(values))
-            self._checks.append((register, words(values), bus.prepare(pointer, row)))
-        self._turn = -1
+            checks.append((words(values), bus.prepare(pointer, row)))
+        self._checks = cycle(checks)
         identity = int.from_bytes(fetch(bus, address, words((DEVICE_ID,)), 2), "big")
         if identity & 0xFFF0 != 0x1470:
             raise self.wrong(
@@ -160,7 +161,7 @@ class AD7147(Chip):
             yield
         fetch(self.bus, self.address, words((STATUS,)), 6)
         yield
-        for register, *_ in self._checks:
+        for register, _ in CHECK_ROWS:
             if not self.healthy():
                 place = f"register {register:#04x} of the AD7147"
                 raise self.wrong(f"{place} does not keep what is written")
@@ -169,8 +170,7 @@ class AD7147(Chip):
     def healthy(self) -> bool:
         """Whether the next row of `CHECK_ROWS`, each in turn, holds what was
         written."""
-        self._turn = (self._turn + 1) % len(self._checks)
-        _, expected, prepared = self._checks[self._turn]
+        expected, prepared = next(self._checks)
         self.bus.transfer(prepared)
         return prepared.buffer.tobytes() == expected
 

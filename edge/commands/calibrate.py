@@ -208,7 +208,7 @@ def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int
     for kind in {chip.kind for chip in file.chips}:
         chips = [chip for chip in file.chips if chip.kind is kind]
         taxels = np.concatenate([chip.served for chip in chips])
-        signs = np.repeat([c.sign for c in chips], [len(c.served) for c in chips])
+        signs = np.concatenate([[chip.sign] * len(chip.served) for chip in chips])
         rest = baseline.ravel()[taxels].astype(np.int64)
         middle = int(np.median(rest))
         if kind.rests_at_zero and signs.min() > 0 and middle > file.layout.onset:

@@ -162,18 +162,20 @@ def run(arguments: argparse.Namespace) -> int:
     ) as live:
         for sentence in differences(model.info.layout, live.skin.layout):
             LOG.warning(f"{arguments.model}: {sentence}")
+        writers = []
+        max_contacts = 1
+        if arguments.map is not None:
+            from edge.output.touch_map import map_writer  # few runs keep a map
+
+            max_contacts = MAX_CONTACTS
+            writers.append(map_writer(arguments.map, model.info))
         classifier = Classifier(
             model,
             live.skin.layout,
             error=arguments.error,
-            max_contacts=1 if arguments.map is None else MAX_CONTACTS,
+            max_contacts=max_contacts,
             motion_on_skin=on_skin,
         )
-        writers = []
-        if arguments.map is not None:
-            from edge.output.touch_map import map_writer  # few runs keep a map
-
-            writers.append(map_writer(arguments.map, model.info))
         with (
             closing(live.lines(arguments.udp, writers)) as lines,
             _listeners(arguments, model, live.opened) as listeners,

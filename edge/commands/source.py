@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +77,7 @@ def open_skin(
     *,
     calibrated: bool = True,
     model: Model | None = None,
-    arm: Chain | None = None,
+    joint_names: Sequence[str] | None = None,
 ) -> Iterator[Opened]:
     """The skin that the options name, closed at the end of the block.
 
@@ -85,15 +85,15 @@ def open_skin(
         arguments: with the options of `options.add_skin`.
         calibrated: refuse a real skin that has no calibration.
         model: its contact threshold is used if it is lower than the skin's.
-        arm: whose joint angles a recording must have; they are put into the arm's
-            order.
+        joint_names: the joint angles that a recording must have; they are put into
+            this order.
 
     Raises:
         InputError: the options or the skin's file cannot be used.
         EdgeError: the skin cannot be read.
     """
     if arguments.fake is not None:
-        opened = _played(arguments, arm)
+        opened = _played(arguments, joint_names)
     elif arguments.loop or arguments.real_time:
         raise InputError("--loop and --real-time work only with --fake REC.npz")
     elif arguments.skin is None:
@@ -113,7 +113,7 @@ def open_skin(
         yield opened
 
 
-def _played(arguments: argparse.Namespace, arm: Chain | None) -> Opened:
+def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) -> Opened:
     """The recording of --fake, played onto fake chips."""
     from edge.fake.player import carried_hz, play_file  # a robot has a skin
 
@@ -126,7 +126,7 @@ def _played(arguments: argparse.Namespace, arm: Chain | None) -> Opened:
     skin, playback = play_file(
         arguments.fake,
         file,
-        joint_names=None if arm is None else arm.names,
+        joint_names=joint_names,
         noise_counts=arguments.noise,
         loop=arguments.loop,
         real_time=arguments.real_time,
@@ -230,26 +230,43 @@ def reading(
         dof = model.info.dof
     if arguments.fake is not None:
         arguments.real_time |= real_time or arguments.web is not None
-    played_arm = arm if arguments.joints is None else None
+    names = None if arm is None else arm.names
+    played_names = names if arguments.joints is None else None
     with ExitStack() as stack:
-        opened = stack.enter_context(open_skin(arguments, model=model, arm=played_arm))
+        opening = open_skin(arguments, model=model, joint_names=played_names)
+        opened = stack.enter_context(opening)
         # Before this point a signal ends the program at once, as nothing can be lost.
         stop = stack.enter_context(stop_on(*ending_signals()))
         if model is not None and needs_joints and arguments.joints is None:
             model.require_joints(opened.dof, opened.source)
-        skin = opened.skin
-        joints: JointSource | None = opened.playback if opened.dof else None
-        if arguments.joints is not None:
-            from edge.touch.joint_stream import open_joints  # few arms send angles
-
-            names = None if arm is None else arm.names
-            stream = open_joints(arguments.joints, dof, names, skin.clock.real)
-            joints = stack.enter_context(stream)
-        loop = Loop(skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
-        live = None
-        if arguments.web is not None:
-            from edge.tools.page import open_page  # few runs have a page
-
-            served = open_page(arguments.web, skin.layout, title=opened.source, **page)
-            live = stack.enter_context(served)
+        joints = stack.enter_context(_joints(arguments.joints, opened, dof, names))
+        loop = Loop(opened.skin, joints=joints, lasts_s=opened.lasts_s, stop=stop)
+        live = stack.enter_context(_page(arguments.web, opened, page))
         yield Reading(opened, loop, stop, live, Output.of(arguments))
+
+
+def _page(
+    address: str | None,
+    opened: Opened,
+    options: Mapping[str, Any],
+) -> AbstractContextManager[Page | None]:
+    """The live page, where one is asked for."""
+    if address is None:
+        return nullcontext()
+    from edge.tools.page import open_page  # few runs have a page
+
+    return open_page(address, opened.skin.layout, title=opened.source, **options)
+
+
+def _joints(
+    option: str | None,
+    opened: Opened,
+    dof: int | None,
+    names: Sequence[str] | None,
+) -> AbstractContextManager[JointSource | None]:
+    """The joint angles that another program sends, or those of a played recording."""
+    if option is None:
+        return nullcontext(opened.playback if opened.dof else None)
+    from edge.touch.joint_stream import open_joints  # few arms send angles
+
+    return open_joints(option, dof, names, opened.skin.clock.real)

@@ -140,9 +140,7 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     reading = _reading(top.table("read", {}))
     buses = read_buses(top.tables("bus", "bus"), layout, sign)
     chips = [chip for bus in buses for chip in bus.chips]
-    # Chips that differ have the defaults of no kind.
-    kinds = {chip.traits.defaults for chip in chips}
-    defaults = kinds.pop() if len(kinds) == 1 else Defaults()
+    defaults = _defaults(chips)
     signal = _signal(signals, layout, defaults)
     if not skin.has("threshold_counts") and defaults.threshold_counts:
         layout = SkinLayout.from_dict({**asdict(defaults), **skin.raw}, where=where)
@@ -150,9 +148,15 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     if top.has("calibration"):
         calibration = _calibration(top.table("calibration"), layout, chips)
     named = top.table("labels", {})
-    labels = {str(task): named.texts(str(task)) for task in named.raw}
+    labels = {task: named.texts(task) for task in named.raw}
     top.done()
     return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
+
+
+def _defaults(chips: Sequence[ChipSpec]) -> Defaults:
+    """The defaults of the chips; for chips that differ, those of no kind."""
+    kinds = {chip.traits.defaults for chip in chips}
+    return kinds.pop() if len(kinds) == 1 else Defaults()
 
 
 def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signal:
