@@ -30,7 +30,7 @@ FOLLOW_BITS = 2
 class TaxelMap:
     """The place of each taxel of a skin among the stages of its chips.
 
-    One stage and one chip beyond the last stand for a taxel that no chip serves.
+    The index -1 of a stage and of a chip stands for a taxel that no chip serves.
 
     Attributes:
         stage: (taxels,) index of its stage among the stages of all chips.
@@ -51,27 +51,28 @@ class TaxelMap:
 
 def taxel_map(file: SkinFile) -> TaxelMap:
     """The map of a skin's taxels; its calibration bounds their values."""
-    chips = file.chips
     taxels = file.layout.rows * file.layout.cols
-    taxel_of = np.concatenate([chip.taxels for chip in chips])
-    owner_of = np.repeat(np.arange(len(chips)), [len(chip.taxels) for chip in chips])
-    wired = np.flatnonzero(taxel_of != UNUSED)
-    stage = np.full(taxels, len(taxel_of))
-    stage[taxel_of[wired]] = wired
-    chip_of = np.full(taxels, len(chips))
-    chip_of[taxel_of[wired]] = owner_of[wired]
-    sign = np.array([*(chip.sign for chip in chips), 1], dtype=np.int32)
-    highest = np.array([*(chip.traits.highest for chip in chips), 0xFFFF])[chip_of]
+    stage = np.full(taxels, -1)
+    chip_of = np.full(taxels, -1)
+    sign = np.ones(taxels, dtype=np.int32)
+    highest = np.full(taxels, 0xFFFF)
+    first = 0
+    for number, chip in enumerate(file.chips):
+        stage[chip.served] = first + np.flatnonzero(np.array(chip.taxels) != UNUSED)
+        chip_of[chip.served] = number
+        sign[chip.served] = chip.sign
+        highest[chip.served] = chip.traits.highest
+        first += len(chip.taxels)
     lowest = np.zeros_like(highest)
     if file.calibration is not None:
         rest = file.calibration.baseline.ravel().astype(np.int64)
         reach = file.signal.saturation_counts + file.signal.drift_limit_counts
         lowest = rest - reach
         highest = np.minimum(highest, rest + reach)
-    served = chip_of < len(chips)
+    served = chip_of >= 0
     for row, col in file.signal.dead:
         served[row * file.layout.cols + col] = False
-    return TaxelMap(stage, chip_of, sign[chip_of], lowest, highest, served)
+    return TaxelMap(stage, chip_of, sign, lowest, highest, served)
 
 
 def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -34,9 +34,8 @@ class ShearReader:
         """Take the chips' buffers, in the file's order."""
         self._chips = []
         for chip, data in zip(file.chips, rows, strict=True):
-            taxels = np.array(chip.taxels)
-            stages = np.flatnonzero(taxels != UNUSED)
-            self._chips.append((data, len(taxels), stages, taxels[stages]))
+            stages = np.flatnonzero(np.array(chip.taxels) != UNUSED)
+            self._chips.append((data, len(chip.taxels), stages, chip.served))
         self._shape = file.layout.shape
         self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
         rest: NDArray[np.uint16] = self.raw  # the middle of the range
