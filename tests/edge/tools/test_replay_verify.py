@@ -131,11 +131,10 @@ def test_a_golden_file_that_lacks_a_key_is_one_sentence(verify_changed, arrays, 
 
 
 def test_counts_of_another_shape_differ(verify_changed, arrays):
-    for shape in ((1, 1_000_000), (len(arrays["series_counts"]), 3), (7,)):
-        arrays["series_counts"] = np.zeros(shape, np.int64)
-        status, checks, _ = verify_changed()
-        assert status == 1
-        assert checks[1]["expected"] == str(shape)
+    arrays["series_counts"] = np.zeros((1, 1_000_000), np.int64)
+    status, checks, _ = verify_changed()
+    assert status == 1
+    assert checks[1]["expected"] == "(1, 1000000)"
 
 
 def test_vectors_of_another_model_are_refused(verify_changed, arrays):
