@@ -134,6 +134,11 @@ def bus(board):
     bus.close()
 
 
+@pytest.fixture
+def chip(bus):
+    return Block(bus, 0, taxels=TAXELS)
+
+
 SPEC = ChipSpec(Block, 0, tuple(range(TAXELS)))
 
 
@@ -143,8 +148,7 @@ def frame(chip):
     return taxels[0].tolist(), bool(intact.all())
 
 
-def test_each_request_is_answered_by_its_own_frame(board, bus):
-    chip = Block(bus, 0, taxels=TAXELS)
+def test_each_request_is_answered_by_its_own_frame(chip):
     assert [frame(chip) for _ in range(3)] == [([n] * TAXELS, True) for n in (3, 4, 5)]
     assert chip.healthy()
 
@@ -157,14 +161,9 @@ def test_each_request_is_answered_by_its_own_frame(board, bus):
     ],
 )
 def test_silence_is_a_timeout_and_half_an_answer_a_fault(
-    board,
-    bus,
-    cut,
-    error,
-    sentence,
+    board, bus, chip, cut, error, sentence
 ):
     """A fault is read again at once, a timeout after a pause."""
-    chip = Block(bus, 0, taxels=TAXELS)
     board.change = lambda answer, _: cut(answer)
     bus.timeout_s = HASTY_S
     with pytest.raises(error, match=sentence):
@@ -175,8 +174,7 @@ def test_silence_is_a_timeout_and_half_an_answer_a_fault(
     assert frame(chip)[1]
 
 
-def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(board, bus):
-    chip = Block(bus, 0, taxels=TAXELS)
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(board, bus, chip):
     late = []
 
     def hold(answer, number):
@@ -186,7 +184,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(board, bus):
     board.change = hold
     bus.timeout_s = 0.3
     with pytest.raises(BusTimeout):
-        chip.bus.transfer(chip.frame)
+        chip.read()
     bus.timeout_s = PATIENT_S
     assert frame(chip) == ([board.asked] * TAXELS, True)
 
@@ -199,11 +197,10 @@ def test_a_microcontroller_that_restarts_when_it_is_opened_is_waited_for(board):
     bus.close()
 
 
-def test_an_unplugged_port_is_gone_until_it_is_plugged_in_again(board, bus):
-    chip = Block(bus, 0, taxels=TAXELS)
+def test_an_unplugged_port_is_gone_until_it_is_plugged_in_again(board, bus, chip):
     board.unplug()
     with pytest.raises(BusGone, match="plug the microcontroller in again"):
-        chip.bus.transfer(chip.frame)
+        chip.read()
     with pytest.raises(BusMissing):
         bus.reopen()
     board.plug()

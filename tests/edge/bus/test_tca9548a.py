@@ -24,6 +24,11 @@ def muxed(**options):
     return bus, TCA9548A(bus, 0x70, **options)
 
 
+@pytest.fixture
+def bus():
+    return muxed()[0]
+
+
 def test_each_channel_is_a_bus_with_its_own_chip():
     _, mux = muxed()
     chips = [AD7147(mux.channel(n), 0x2C) for n in range(8)]
@@ -41,8 +46,7 @@ def beside(bus):
     return muxes
 
 
-def test_two_muxes_on_one_bus_are_never_open_at_once():
-    bus, _ = muxed()
+def test_two_muxes_on_one_bus_are_never_open_at_once(bus):
     chips = [AD7147(mux.channel(2), 0x2C) for mux in beside(bus)]
     for chip in chips:
         list(chip.settings())
@@ -55,10 +59,9 @@ def test_two_muxes_on_one_bus_are_never_open_at_once():
     ("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)]
 )
 def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
-    absent, opens
+    bus, absent, opens
 ):
     """One that has gone must not cost the chips of this one."""
-    bus, _ = muxed()
     first, second = beside(bus)
     second.select(5)
     bus.inject([Fault(address=0x71, at=range(absent))])
@@ -68,9 +71,8 @@ def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
     assert (bus.chips[0x71].connected == []) == opens
 
 
-def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed():
+def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed(bus):
     """Chips behind both muxes then answer at one address."""
-    bus, _ = muxed()
     first, _ = beside(bus)
     first.select(3)
     assert first.kept()
@@ -82,8 +84,7 @@ def test_a_channel_that_another_program_opens_beside_is_noticed_and_closed():
     assert first.kept()
 
 
-def test_a_mux_beside_that_does_not_answer_may_have_a_channel_open():
-    bus, _ = muxed()
+def test_a_mux_beside_that_does_not_answer_may_have_a_channel_open(bus):
     first, _ = beside(bus)
     first.select(3)
     bus.inject([Fault(address=0x71, at=range(100))])

@@ -13,7 +13,8 @@ from edge import demo
 from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
-from edge.output import touch_map as touchmap
+from edge.output.event_writer import LineWriter
+from edge.output.touch_map import map_writer
 from edge.recording import load
 from edge.saving import save
 from edge.touch.arm import Chain
@@ -167,7 +168,7 @@ def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
 
 
 def write(path, info, events):
-    writer = touchmap.map_writer(path, info)
+    writer = map_writer(path, info)
     for event in events:
         writer.put(event)
     writer.close()
@@ -221,7 +222,7 @@ def test_a_file_that_is_no_map_of_this_arm_is_not_written_to(tmp_path, text, sen
     path = tmp_path / "notes.txt"
     path.write_text(text + "\n")
     with pytest.raises(InputError, match=sentence):
-        touchmap.map_writer(path, MODEL.info)
+        map_writer(path, MODEL.info)
     assert path.read_text() == text + "\n"
 
 
@@ -241,7 +242,7 @@ def test_a_full_disk_costs_lines_and_not_decisions():
     """/dev/full answers each write as a full disk does; here it stands behind a map's
     writer."""
     with open("/dev/full", "wb", buffering=0) as full:
-        writer = touchmap.LineWriter("map", full.write)
+        writer = LineWriter("map", full.write)
         writer.put({})
         writer.put({})
         writer.close()
@@ -269,4 +270,4 @@ def test_what_is_no_file_is_refused_as_a_map(tmp_path):
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", tmp_path, "/dev/null", "a\0b"):
         with pytest.raises(InputError, match="cannot be (read|written)"):
-            touchmap.map_writer(path, MODEL.info)
+            map_writer(path, MODEL.info)
