@@ -76,7 +76,8 @@ def touches(
                 "labels": source.labels,
                 "skin": file.layout.to_dict(),
                 "skin_name": file.name,
-                "source": f"a simulated touch of the demo ({path.stem}), mapped onto this skin",
+                "source": f"a simulated touch of the demo ({path.stem}), mapped onto "
+                "this skin",
                 "trial": name,
             }
             recording = Recording(

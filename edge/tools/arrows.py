@@ -16,7 +16,7 @@ SHORTEST = 0.2
 
 
 def region_shear(frame: Frame, regions: Sequence[Region]) -> NDArray[np.int64] | None:
-    """(rows, cols, 2) the shear of the taxels in contact; None on a skin of one axis."""
+    """(rows, cols, 2) shear of the taxels in contact; None on a skin of one axis."""
     if frame.shear is None:
         return None
     touched = np.zeros(frame.counts.shape, dtype=np.bool_)

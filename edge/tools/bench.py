@@ -166,8 +166,8 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     contact = first_contact(frames, info.tracker(layout))
     if contact is None:
         raise InputError(
-            f"{model.path}: a contact begins above {layout.onset} counts, which no taxel "
-            "reaches"
+            f"{model.path}: a contact begins above {layout.onset} counts, which no "
+            "taxel reaches"
         )
     series = contact[1]
     counts = [frame.counts for frame in frames[INSIDE]]

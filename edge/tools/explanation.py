@@ -2,8 +2,8 @@
 
 A touch's coordinates are z = W'd, where d are its features less their mean in training,
 scaled and cut off at the training data's reach. Its squared distance to a trial at b is
-|z|^2 + |b|^2 - 2 b'z. The last term is a sum over the features: 2 b'W_f'd_f is how much nearer
-feature f brings the touch to the trial than its mean would.
+|z|^2 + |b|^2 - 2 b'z. The last term is a sum over the features: 2 b'W_f'd_f is how much
+nearer feature f brings the touch to the trial than its mean would.
 """
 
 from collections.abc import Sequence

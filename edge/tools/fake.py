@@ -44,8 +44,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const="",
         metavar="REC.npz",
-        help="plug a USB adapter with the skin's chips into this machine (Linux, as root); they "
-        "feel this recording over and over, or nothing",
+        help="plug a USB adapter with the skin's chips into this machine (Linux, as "
+        "root); they feel this recording over and over, or nothing",
     )
     add_noise(parser, "the chips of --plug")
     parser.add_argument(

@@ -172,6 +172,7 @@ def reasons(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in REASONS:
             raise InputError(
-                f"--keep-if takes {', '.join(REASONS)}, separated by commas, not {name!r}"
+                f"--keep-if takes {', '.join(REASONS)}, separated by commas, not "
+                f"{name!r}"
             )
     return names

@@ -69,8 +69,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             "--only",
             "WHICH",
             review.kind_or_task,
-            "only recordings that are unsure, wrong or unlabelled, or that have a task; "
-            "repeat it for recordings that are all of these",
+            "only recordings that are unsure, wrong or unlabelled, or that have a "
+            "task; repeat it for recordings that are all of these",
         ),
     ):
         parser.add_argument(
@@ -359,8 +359,8 @@ def _check_names(
             )
         if new in former:
             raise InputError(
-                f"{name}: has labels for both {former[new]} and {old}; only one of them "
-                f"can become {new}"
+                f"{name}: has labels for both {former[new]} and {old}; only one of "
+                f"them can become {new}"
             )
         former[new] = old
 

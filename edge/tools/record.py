@@ -71,16 +71,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=task_label,
         metavar="TASK=LABEL",
-        help="what the skin touches, such as object=box; repeat it for several tasks, or in a "
-        "terminal for several labels, which are then chosen by key; not needed with "
-        "--web",
+        help="what the skin touches, such as object=box; repeat it for several tasks, "
+        "or in a terminal for several labels, which are then chosen by key; not needed "
+        "with --web",
     )
     parser.add_argument(
         "--out",
         type=Path,
         default="recordings",
         metavar="FOLDER|FILE.npz",
-        help="a folder for numbered trials (default: %(default)s), or a file for one trial",
+        help="a folder for numbered trials (default: %(default)s), or a file for one "
+        "trial",
     )
     parser.add_argument(
         "--model",
@@ -324,8 +325,8 @@ def _labels(
         )
     if len(labels) < len(arguments.label) and not by_key and arguments.web is None:
         raise InputError(
-            "--label names a task twice; only in a terminal or on the page does a person "
-            "choose the label"
+            "--label names a task twice; only in a terminal or on the page does a "
+            "person choose the label"
         )
     return labels
 
@@ -363,8 +364,8 @@ def _joint_names(
     if arm is not None and opened.dof != arm.dof:
         raise InputError(
             f"{opened.source} gives {opened.dof or 'no'} joint angles, but "
-            f"{arguments.arm or arguments.model} has {arm.dof} joints; name another source "
-            "with --joints"
+            f"{arguments.arm or arguments.model} has {arm.dof} joints; name another "
+            "source with --joints"
         )
     return None if opened.playback is None else opened.playback.recording.joint_names
 
@@ -426,8 +427,8 @@ class Recorder:
         self.held = self.labels
 
     def press(self, keys: str) -> None:
-        """Take keys: a number chooses its label, d deletes the last trial, where no page
-        does so."""
+        """Take keys: a number chooses its label; d deletes the last trial, unless a
+        page does so."""
         choices = dict(zip(DIGITS, self.choices, strict=False))
         for key in keys:
             if key in choices:

@@ -144,7 +144,7 @@ def _replay(
 
 
 def compared(name: str, first: Summary, second_name: str, second: Summary) -> str:
-    """The gains and losses of a second model on the same labelled recordings, by task."""
+    """Gains and losses of a second model on the same labelled recordings, by task."""
     lines = [f"{second_name} compared with {name}:"]
     for task in first.hits.keys() & second.hits.keys():
         shared = first.hits[task].keys() & second.hits[task].keys()

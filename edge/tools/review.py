@@ -1,5 +1,5 @@
-"""What a person sees of a recorded touch: its curve, its decisions, and which touches ask
-for a look."""
+"""What a person sees of a recorded touch: its curve, its decisions, and which touches
+ask for a look."""
 
 import argparse
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Command-line options of the commands that write trials: their labels and their arm."""
+"""Command-line options of the commands that write trials: their labels and the arm."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def real(monkeypatch):
     return now
 
 
-def test_a_paced_clock_is_no_faster_than_real_time_and_goes_on_without_a_loop_that_is_late(
+def test_a_paced_clock_keeps_to_real_time_and_goes_on_without_a_late_loop(
     real,
 ):
     """It does not hurry after it: what others send at real times would seem to come too

@@ -51,7 +51,7 @@ def test_a_contact_is_as_large_in_metres_on_a_finer_skin():
     assert fine == pytest.approx(coarse, rel=0.1)
 
 
-def test_every_contact_begins_and_goes_on_for_a_window_on_a_skin_whose_scale_is_unknown():
+def test_every_contact_lasts_for_a_window_on_a_skin_whose_scale_is_unknown():
     file = skinfile.load(skinfile.shipped("mpr121"))
     for name, recording in touches.touches(file, trials=3):
         onset_s, _ = first_contact(recording, ContactTracker(recording.layout))

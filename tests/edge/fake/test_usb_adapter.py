@@ -89,7 +89,7 @@ def test_an_absent_chip_is_not_acknowledged_and_a_message_without_data_finds_one
     assert acknowledged(usb)
 
 
-def test_a_broken_transfer_and_a_read_before_other_messages_stall_the_request_and_no_other():
+def test_a_broken_transfer_and_a_read_before_others_stall_that_request_alone():
     usb = adapter(Fault(code=errno.EIO, at=[0]))
     assert message_out(usb, b"\x04") == (-errno.EPIPE, 1, b"")
     assert message_in(usb, 1, FIRST)[0] == -errno.EPIPE

@@ -26,7 +26,9 @@ def trials(counts):
     ],
 )
 def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
-    meant, label, counts
+    meant,
+    label,
+    counts,
 ):
     labels = trials(dict(zip((meant, label), counts, strict=True)))
     sentence = (

@@ -160,10 +160,11 @@ def test_every_command_takes_a_model_with_new_labels(with_mug, edge, touches):
 def test_a_label_spelled_like_a_known_one_is_asked_about(teach, make_touch, tmp_path):
     path = tmp_path / "x.npz"
     save(path, labelled(make_touch(), category="sofft-fixed", object="hard 1"))
-    sentence = "category: {}1 trial of the new label 'sofft-fixed'{}; did you mean 'soft-fixed'?\n"
-    left_out = sentence.format("left out ", "; --new-labels adds it")
+    label = "1 trial of the new label 'sofft-fixed'"
+    question = "; did you mean 'soft-fixed'?\n"
+    left_out = f"category: left out {label}; --new-labels adds it{question}"
     assert left_out in teach(path)[2]
-    assert sentence.format("", "") in teach(path, "--new-labels")[2]
+    assert f"category: {label}{question}" in teach(path, "--new-labels")[2]
 
 
 @pytest.mark.parametrize(

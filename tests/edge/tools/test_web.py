@@ -66,7 +66,9 @@ def test_no_other_file_is_served(server):
 
 @pytest.mark.parametrize("token", ["", "wrong", "caf%C3%A9"])
 def test_without_the_token_nothing_is_served_and_no_action_taken(
-    server, actions, token
+    server,
+    actions,
+    token,
 ):
     server.show({"t": 1.5})
     for path in ("/", "/events"):
