@@ -223,8 +223,8 @@ class Contact:
         if self._rows and age_s <= self.age_s:
             age_s = self.age_s
             self._forget_last()
-        if frame.valid is not None and not self.missing_taxels:
-            self.missing_taxels = bool((self.layout.alive & ~frame.valid).any())
+        if frame.valid is not None:
+            self.missing_taxels |= bool((self.layout.alive & ~frame.valid).any())
         counted = [0] * PLAIN
         beside = False
         if region is not None:

@@ -23,7 +23,6 @@ class Feature:
         samples: times at which it is taken; 0 for the model's number.
         zones: the zones whose sums it needs, besides the region's own peak and area.
         wide: whether it has many values a frame.
-        single: whether it is one number for the window (for each cell, kernel or joint).
         of_joints: whether it is made of the joint angles.
         kernels: how many values kernels make of it; 0 of a feature without kernels.
     """
@@ -36,7 +35,6 @@ class Feature:
     samples: int = 0
     zones: tuple[str, ...] = ()
     wide: bool = False
-    single: bool = False
     of_joints: bool = False
     kernels: int = 0
 

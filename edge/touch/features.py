@@ -47,14 +47,16 @@ def widths(
     """
     lengths = []
     for feature in feature_types(names):
-        length = feature.kernels or 1
+        length = feature.kernels or feature.samples or samples
+        if feature.summary not in ("", "rate"):
+            length = 1  # one number for the window
         if feature.of_joints:
-            length = joints
+            length *= joints
         elif feature.quantity == "taxel_force":
             from edge.touch.cells import Cells
 
-            length = Cells(layout).count
-        lengths.append(length * (1 if feature.single else feature.samples or samples))
+            length *= Cells(layout).count
+        lengths.append(length)
     return tuple(lengths)
 
 

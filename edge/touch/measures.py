@@ -123,7 +123,6 @@ def feature(name: str) -> Feature:
         samples=int(times or 0),
         zones=_zones(zone, quantity),
         wide=quantity in WIDE,
-        single=summary not in ("", "rate") or quantity in KERNELS,
         of_joints=zone == "arm",
         kernels=KERNELS.get(quantity, 0),
     )
