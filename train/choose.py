@@ -333,30 +333,23 @@ class Choosing:
         untouched = self._dataset.untouched_labels(task)
         of_trials = promised(trials.answered(task, trial_places), untouched)
         promise = partial(promised, untouched=untouched, groups=count)
-        candidates = self._candidate_rules(task, table)
+        own_rule = self._rule(task, table)
+        own_rules = [
+            replace(own_rule, allowed=places_of(candidate, choices))
+            for candidate in self.candidates
+        ]
         chosen = Chosen(
             choice=choices[table.chosen(task, rule)],
             accuracy=promise(table.nested(task, rule)),
             by_trial=of_trials,
             left_out=left_out,
-            candidates=tuple(
-                promise(table.nested(task, alone)) for alone in candidates
-            ),
-            picks=tuple(choices[table.chosen(task, alone)] for alone in candidates),
+            candidates=tuple(promise(table.nested(task, own)) for own in own_rules),
+            picks=tuple(choices[table.chosen(task, own)] for own in own_rules),
             folds=table.folds,
         )
         if table is not trials:
             chosen = self._with_known(chosen, task, trials)
         return chosen, without
-
-    def _candidate_rules(self, task: str, table: AnswerTable) -> list[Rule]:
-        """For each candidate, the rule that chooses among its settings alone."""
-        choices = table.choices[task]
-        rule = self._rule(task, table)
-        return [
-            replace(rule, allowed=places_of(candidate, choices))
-            for candidate in self.candidates
-        ]
 
     def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:
         """A task's settings, with those that are best for recorded objects."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from edge.touch.features import WINDOW_S
 from train.dataset import DataSet
 from train.novelty import MOST_COMPONENTS
@@ -55,60 +53,38 @@ def usual_points(
         )
         return (settings.window_s,)
     dataset = dataset.of(sorted(settings.features()))
-    sizes = _Sizes.of(dataset, settings, samples)
-    points: list[float] = []
     for every_s in STEPS_S:
         # A long window has as many decision points as the usual one.
         step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
         points = _rising(step_s, settings.window_s)
-        if sizes.total(len(points)) <= LARGEST_BYTES:
+        size = _size(len(points), dataset, settings, samples)
+        if size <= LARGEST_BYTES:
             if every_s > STEPS_S[0]:
                 notes.append(
                     f"{len(points)} decision points, one every {step_s:g} s, so that "
                     "the model stays below 1.2 MB; --decision-points asks for more"
                 )
             return tuple(points)
-    megabytes = sizes.total(len(points)) / 1e6
     notes.append(
         "no decision points before the full window: they would make the model about "
-        f"{megabytes:.1f} MB; --decision-points asks for them"
+        f"{size / 1e6:.1f} MB; --decision-points asks for them"
     )
     return (settings.window_s,)
 
 
-@dataclass(frozen=True)
-class _Sizes:
-    """Bytes of a model's constants.
-
-    Attributes:
-        once: of those that all decision points share.
-        early: of each decision point before the full window.
-        full: of the full window.
-    """
-
-    once: int
-    early: int
-    full: int
-
-    @classmethod
-    def of(cls, dataset: DataSet, settings: Settings, samples: int) -> _Sizes:
-        """The sizes of the model that some settings give."""
-        columns = sum(dataset.widths(samples))
-        trials = len(dataset.trials)
-        novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
-        novelty += 8 * columns + 8 * trials
-        early = settings.choices
-        if settings.early is not None:
-            early = {**early, **settings.early.settings.choices}
-        return cls(
-            once=2 * MOST_COMPONENTS * columns,
-            early=novelty + _bytes_of(early, dataset, samples),
-            full=novelty + _bytes_of(settings.choices, dataset, samples),
-        )
-
-    def total(self, points: int) -> int:
-        """Bytes of a model with so many decision points."""
-        return self.once + (points - 1) * self.early + self.full
+def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:
+    """Bytes of the constants of a model with so many decision points."""
+    columns = sum(dataset.widths(samples))
+    trials = len(dataset.trials)
+    shared = 2 * MOST_COMPONENTS * columns
+    novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
+    novelty += 8 * columns + 8 * trials
+    early = settings.choices
+    if settings.early is not None:
+        early = {**early, **settings.early.settings.choices}
+    full = _bytes_of(settings.choices, dataset, samples)
+    before = (points - 1) * (novelty + _bytes_of(early, dataset, samples))
+    return shared + before + novelty + full
 
 
 def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:

@@ -274,22 +274,6 @@ class AnswerTable:
     tested: Mapping[str, Booleans] = field(default_factory=dict, repr=False)
     repeated: tuple[AnswerTable, ...] = ()
 
-    @classmethod
-    def empty(
-        cls,
-        folds: Integers,
-        choices: dict[str, list[Choice]],
-        classes: Mapping[str, Integers],
-    ) -> AnswerTable:
-        """A table without answers, for `enter`; see `_Fit` for the classes."""
-        right = {}
-        tested = {}
-        for task, labels in classes.items():
-            tested[task] = (labels >= 0) & (folds >= 0)
-            shape = (len(fold_numbers(folds)), len(choices[task]), 1)
-            right[task] = np.tile(~tested[task], shape)
-        return cls(folds, choices, right, tested)
-
     def enter(self, pair: tuple[int, int], answers: Mapping[str, Booleans]) -> None:
         """Take in the answers {task: (candidates, tests)} of the fit without a pair of
         folds to the trials of both."""
@@ -408,7 +392,12 @@ def evaluate(
     vectors = replace(vectors, X=finite(vectors.X))
     classes = {task: _classes(labels) for task, labels in vectors.y.items()}
     choices = {task: _choices(task, grids, classes) for task in classes}
-    table = AnswerTable.empty(folds, choices, classes)
+    right = {}
+    tested = {}
+    for task, labels in classes.items():
+        tested[task] = (labels >= 0) & (folds >= 0)
+        right[task] = np.tile(~tested[task], (count, len(choices[task]), 1))
+    table = AnswerTable(folds, choices, right, tested)
     pairs = _pairs(folds, nested)
     work = (
         delayed(_answers)(vectors, classes, np.isin(folds, pair), grids)

@@ -55,7 +55,8 @@ class Answers:
     @property
     def wrong(self) -> list[int]:
         """The trials with a wrong answer."""
-        return [int(i) for i in np.flatnonzero(self.answers[-1] != self.truth)]
+        wrong: list[int] = np.flatnonzero(self.answers[-1] != self.truth).tolist()
+        return wrong
 
 
 @dataclass(frozen=True)

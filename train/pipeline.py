@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -439,7 +440,5 @@ def types_of(
 ) -> tuple[list[str], list[int]]:
     """Names and widths of the `names` among the features, in their order; all if
     empty."""
-    pairs = [
-        (f, w) for f, w in zip(features, widths, strict=True) if not names or f in names
-    ]
-    return [name for name, _ in pairs], [width for _, width in pairs]
+    is_named = [not names or name in names for name in features]
+    return list(compress(features, is_named)), list(compress(widths, is_named))

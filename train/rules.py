@@ -105,20 +105,16 @@ def candidates(points: int) -> tuple[StoppingRule, list[list[StoppingRule]]]:
     return full, [sure, fixed]
 
 
-def certify(
-    course: Course,
-    seconds: Floats,
-    level: float = TEST_SHARE * RISK,
-) -> list[StoppingRule]:
+def certify(course: Course, seconds: Floats) -> list[StoppingRule]:
     """The rules that no other rule beats in both certified error and mean time, the
     safest first.
 
     Args:
         course: of the task, on the calibration trials.
         seconds: (points,) windows.
-        level: of the tests; see the module.
     """
     n = course.unknown.shape[1]
+    full_level = TEST_SHARE * RISK
 
     def tested(rule: StoppingRule, level: float, before: float) -> StoppingRule:
         at, wrong = course.under(rule)
@@ -127,11 +123,11 @@ def certify(
         return StoppingRule(max(limit, before), mean, rule.confidence, rule.last)
 
     full, families = candidates(len(seconds))
-    passed = [tested(full, level, 0.0)]
+    passed = [tested(full, full_level, 0.0)]
     for family in families:
         before = passed[0].error
         for rule in family:
-            passed.append(tested(rule, level / len(families), before))
+            passed.append(tested(rule, full_level / len(families), before))
             before = passed[-1].error
     # Among equal rules the fixed window comes first, as it needs no confidence.
     passed.sort(key=lambda rule: (rule.error, rule.mean_s, not rule.fixed))

@@ -16,6 +16,7 @@ from train.dataset import Measurement, load_trials
 from train.evaluate import AnswerTable, Promise
 from train.feature_sets import expand
 from train.groups import Divisions, Groups
+from train.parts import part
 from train.pipeline import Choice, ContactClassifier, vote
 from train.vectors import Vectors
 
@@ -179,13 +180,8 @@ def touches(make_touch, folder, seconds, late_s):
     """Touches of two kinds that differ from `late_s` after onset on."""
     for seed in range(20):
         labels = {"kind": "ab"[seed % 2]}
-        touch = make_touch(
-            seed=seed,
-            seconds=seconds,
-            arm=False,
-            rate=25.0,
-            labels=labels,
-        )
+        touch = make_touch(seed=seed, seconds=seconds, arm=False, labels=labels)
+        touch = part(touch, slice(None, None, 4))
         frames = np.minimum(touch.frames, 700)
         frames[touch.t > 0.2 + late_s] //= 1 + seed % 2
         save(folder / f"{seed}.npz", replace(touch, frames=frames))

@@ -123,7 +123,7 @@ def test_the_category_is_judged_on_the_trials_with_a_wrong_object():
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
-    save_touches(folder, 12, seconds=1.3, rate=25.0)
+    save_touches(folder, 10, seconds=1.3)
     out = tmp_path_factory.mktemp("study")
     words = ["--data", ".", "--out", str(out), "--jobs", "1"]
     with pytest.MonkeyPatch.context() as patch:
@@ -214,12 +214,7 @@ def test_bad_input_is_one_sentence(words, sentence, recordings, tmp_path, refusa
 
 def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, refusal):
     for seed in range(20):
-        touch = make_touch(
-            seed=seed,
-            seconds=0.3,
-            rate=25.0,
-            labels={"mobility": "fixed"},
-        )
+        touch = make_touch(seed=seed, seconds=0.3, labels={"mobility": "fixed"})
         save(tmp_path / f"{seed:02d}.npz", touch)
     message = refusal("study", "--data", tmp_path, "--out", tmp_path / "out")
     assert (
