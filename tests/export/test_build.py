@@ -1,13 +1,12 @@
-"""Nodes and constants of a graph, and the projection in both of its notations."""
+"""Nodes and constants of a graph."""
 
 import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from export.build import OPSET, Builder, project, widened
+from export.build import OPSET, Builder, widened
 from tests.hard_cases.models import session
-from train.projection import Projection
 
 
 class Names:
@@ -60,18 +59,6 @@ def test_equal_constants_are_stored_once(graph):
     assert len({build.constant(v) for v in (2.0, [2.0], np.float32(2.0))}) == 3
     assert build.constant(0.0) != build.constant(-0.0)
     assert len(names.initial) == 5 + 1
-
-
-@pytest.mark.parametrize("scaling", ["none", "III"])
-def test_the_graph_projects_to_the_whole_numbers_of_the_estimator(graph, scaling):
-    build, _, run = graph
-    X = np.random.default_rng(0).gamma(2.0, size=(30, 120)) * 10.0 ** np.arange(
-        -3, 3
-    ).repeat(20)
-    p = Projection(scaling, 7).fit(X)
-    z = run(project(build, "x", 120, [p], [np.arange(120)])[0], X)
-    assert (z == np.rint(z)).all()
-    assert (z * p.grid_.unit == p.transform(X)).all()
 
 
 @pytest.mark.parametrize(

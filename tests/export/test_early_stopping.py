@@ -31,6 +31,9 @@ from train.dataset import load_trials
 from train.pipeline import Choice
 from train.stopping import Early
 
+LABELS = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
+"""Labels of 45 trials for two tasks."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -103,7 +106,6 @@ def with_early_settings(early, tmp_path_factory):
     """Vectors, and an estimator and a model whose tasks take other features and other
     directions before 1.2 s; one of them shares a space with another there alone."""
     rng = np.random.default_rng(3)
-    y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
     X = rng.normal(size=(3, 45, early.info.width))
     choices = {
         "t": Choice("none", 4, 3, features=FEATURES[:2]),
@@ -116,7 +118,7 @@ def with_early_settings(early, tmp_path_factory):
     }
     settings = Early(1.2, at_first, [at_first] * 10)
     path = tmp_path_factory.mktemp("early") / "model.onnx"
-    return X, *fitted_model(path, early.info, choices, X, y, settings)
+    return X, *fitted_model(path, early.info, choices, X, LABELS, settings)
 
 
 def test_decision_points_may_have_features_and_directions_of_their_own(
@@ -436,12 +438,11 @@ def lesson(early, tmp_path_factory, request):
     """
     new = request.param
     rng = np.random.default_rng(1)
-    y = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
     X, more, queries = (rng.normal(size=(3, n, early.info.width)) for n in (45, 3, 9))
     of_u = ("contact_area",) if new else FEATURES
     choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1, features=of_u)}
     path = tmp_path_factory.mktemp("taught") / "model.onnx"
-    sequential, before = fitted_model(path, early.info, choices, X, y)
+    sequential, before = fitted_model(path, early.info, choices, X, LABELS)
     data = taught(before, ["one", "two", "three"], more, FURTHER, new_labels=new)
     path.write_bytes(data)
     model = Model(path)

@@ -222,20 +222,12 @@ def test_the_accuracy_of_each_folder_is_printed(recordings, tmp_path, capsys):
     assert line.index(data[0]) < line.index(data[1])
 
 
-def test_recordings_that_are_held_out_are_scored_by_both_models(
-    exported,
-    recordings,
-    held_out,
-    tmp_path,
-    capsys,
-):
-    words = "--quick --features paper --decision-points none".split()
-    words += ["--test", held_out, "--compare", exported / "model.onnx"]
-    export(tmp_path, "--data", recordings, *words)
-    err = capsys.readouterr().err
-    assert "on recordings that it was not fitted on:" in err
-    assert "category: 16 of 16 right" in err
-    assert "category: 0 gained, 0 lost of 16: +0.0 points" in err
+def test_recordings_that_are_held_out_are_scored_by_both_models(exported, held_out):
+    model = Model(exported / "model.onnx")
+    text = held_out_text(model, model, sorted(held_out.iterdir()))
+    assert "on recordings that it was not fitted on:" in text
+    assert "category: 16 of 16 right" in text
+    assert "category: 0 gained, 0 lost of 16: +0.0 points" in text
 
 
 def test_a_former_model_in_the_same_place_is_compared_as_it_was(
@@ -261,9 +253,10 @@ def test_a_former_model_in_the_same_place_is_compared_as_it_was(
     [
         (["--test", "missing"], "missing: cannot be read: No such file or directory"),
         (["--test", "x.npz", "--compare", "old.onnx"], "old.onnx: no such model"),
+        (["--compare", "old.onnx"], "--compare needs --test"),
     ],
 )
-def test_held_out_recordings_and_a_former_model_are_read_before_any_work(
+def test_held_out_recordings_and_a_former_model_are_checked_before_any_work(
     words,
     sentence,
     tmp_path,
@@ -273,9 +266,3 @@ def test_held_out_recordings_and_a_former_model_are_read_before_any_work(
     monkeypatch.setattr("export.cli.fit", Mock(side_effect=AssertionError("fitted")))
     assert main(["--data", "data", "--out", str(tmp_path), *words]) == 2
     assert sentence in capsys.readouterr().err
-
-
-def test_a_comparison_needs_recordings_that_were_held_out(recordings, capsys):
-    words = ["--data", str(recordings), "--compare", "old.onnx"]
-    assert main(words) == 2
-    assert "--compare needs --test" in capsys.readouterr().err

@@ -32,8 +32,9 @@ def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
 
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
-    noise = np.random.default_rng(0).integers(0, 41, (60, 16, 24)).astype(np.uint16)
-    touches = [make_touch(seed=seed, seconds=0.4, arm=False) for seed in range(2)]
+    noise = np.random.default_rng(0).integers(0, 41, (20, 16, 24)).astype(np.uint16)
+    options = {"seconds": 0.2, "rate": 50.0, "arm": False}
+    touches = [make_touch(seed=seed, **options) for seed in range(2)]
     for i, touch in enumerate(touches):
         write_frames(
             tmp_path / "csv" / f"trial{i}",
@@ -57,7 +58,7 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
 
 def test_warnings_that_are_alike_are_one_line(make_touch, tmp_path, capsys):
     for name in "abc":
-        touch = make_touch(seconds=0.4, arm=False)
+        touch = make_touch(seconds=0.05, lead_s=0.0, arm=False)
         write_frames(tmp_path / "csv" / name, touch.t, touch.frames + 500)
     (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
     out = tmp_path / "out"
