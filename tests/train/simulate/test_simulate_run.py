@@ -235,7 +235,7 @@ class TestCommand:
             "felt",
         ),
         (
-            "labels.slides_m = 0.0\ntrials.lead_s = 0.05\ntrials.after_s = 0.15",
+            "labels.slides_m = 0.0\ntrials.lead_s = 0.02\ntrials.after_s = 0.1",
             "feather-movable and its kind: no step is within trials.tolerance",
         ),
     ],
