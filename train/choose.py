@@ -333,9 +333,9 @@ class Choosing:
         untouched = self._dataset.untouched_labels(task)
         of_trials = promised(trials.answered(task, trial_places), untouched)
         promise = partial(promised, untouched=untouched, groups=count)
-        own_rule = self._rule(task, table)
-        own_rules = [
-            replace(own_rule, allowed=places_of(candidate, choices))
+        by_error = self._rule(task, table)
+        candidate_rules = [
+            replace(by_error, allowed=places_of(candidate, choices))
             for candidate in self.candidates
         ]
         chosen = Chosen(
@@ -343,8 +343,8 @@ class Choosing:
             accuracy=promise(table.nested(task, rule)),
             by_trial=of_trials,
             left_out=left_out,
-            candidates=tuple(promise(table.nested(task, own)) for own in own_rules),
-            picks=tuple(choices[table.chosen(task, own)] for own in own_rules),
+            candidates=tuple(promise(table.nested(task, r)) for r in candidate_rules),
+            picks=tuple(choices[table.chosen(task, r)] for r in candidate_rules),
             folds=table.folds,
         )
         if table is not trials:
