@@ -33,7 +33,7 @@ def test_a_name_too_long_to_be_looked_up_is_one_sentence(tmp_path, refusal):
 
 def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, capsys):
     noise = np.random.default_rng(0).integers(0, 41, (20, 16, 24)).astype(np.uint16)
-    options = {"seconds": 0.2, "rate": 50.0, "arm": False}
+    options = {"seconds": 0.1, "lead_s": 0.1, "arm": False}
     touches = [make_touch(seed=seed, **options) for seed in range(2)]
     for i, touch in enumerate(touches):
         write_frames(
