@@ -51,13 +51,14 @@ def touch(
     seconds=1.6,
     lead_s=0.2,
     arm=True,
+    rate=100.0,
     labels=None,
 ):
     """A contact that grows: a hard one in force, a soft one in area. It imitates no
     physics."""
     rng = np.random.default_rng([seed, len(kind)])
-    n = round((lead_s + seconds) * 100)
-    t = np.arange(n) / 100.0
+    n = round((lead_s + seconds) * rate)
+    t = np.arange(n) / rate
     rows, cols = FOREARM.shape
     row = rng.integers(4, 10)
     col = rng.integers(0, cols)

@@ -40,7 +40,8 @@ def run(words: Sequence[str]) -> int:
         return 2
     paths = [str(checkout), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    program = [sys.executable, "-m", *module, *options]
+    # Without -P a folder `train` or `export` of the user's would run instead.
+    program = [sys.executable, "-P", "-m", *module, *options]
     try:
         return subprocess.call(program, env=environment)
     except KeyboardInterrupt:

@@ -305,7 +305,9 @@ def simulate(touch):
     row, column = np.array(where).T
     pads = [model.body(f"pad{number}").id for number in range(len(where))]
     rub = mujoco_layer.Rub(
-        model, pads, touch.thing.skin if touch.thing.layered else 0.0
+        model,
+        pads,
+        touch.thing.skin if touch.thing.layered else 0.0,
     )
     data = mujoco.MjData(model)
     data.qpos[: ARM.dof] = touch.begin_rad

@@ -63,7 +63,9 @@ def test_a_typing_error_is_answered_by_the_nearest_command(typed, sentence, caps
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize(("flag", "letters"), [("-q", ["e"]), ("--json", ["i", "w", "e"])])
+@pytest.mark.parametrize(
+    ("flag", "letters"), [("-q", ["e"]), ("--json", ["i", "w", "e"])]
+)
 def test_quiet_leaves_errors(flag, letters, capsys, monkeypatch):
     def run(arguments):
         log = logging.getLogger("edge.somewhere")

@@ -103,7 +103,10 @@ WRONG = [
 
 @pytest.mark.parametrize(("changes", "sentence"), WRONG)
 def test_what_is_wrong_is_said_in_one_sentence_that_names_the_file(
-    changes, sentence, make_touch, tmp_path
+    changes,
+    sentence,
+    make_touch,
+    tmp_path,
 ):
     path = tmp_path / "wrong.npz"
     touch = make_touch()
@@ -125,7 +128,9 @@ def test_whole_numbers_of_any_type_and_taxels_in_a_row_are_counts(kind, tmp_path
     counts = np.arange(2 * 12).reshape(2, 12)
     meta = {"labels": {"object": np.int64(3)}, "skin": {"rows": 3, "cols": 4}}
     recording = Recording(
-        np.array([0.0, 0.5], np.float32), counts.astype(kind), meta=meta
+        np.array([0.0, 0.5], np.float32),
+        counts.astype(kind),
+        meta=meta,
     )
     save(tmp_path / "a.npz", recording)
     back = load(tmp_path / "a.npz")

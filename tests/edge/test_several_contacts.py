@@ -73,7 +73,9 @@ def answers_of(events):
 
 @pytest.mark.parametrize("error", [None, ERROR])
 def test_no_frame_asks_more_than_a_few_questions_and_the_answers_are_the_same(
-    early, error, monkeypatch
+    early,
+    error,
+    monkeypatch,
 ):
     spread, questions = decided(early, error)
     assert sum(isinstance(event, Onset) for _, event in spread) == len(PLACES)

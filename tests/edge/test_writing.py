@@ -84,7 +84,9 @@ def test_a_name_that_another_process_takes_first_stays_as_it_is(path, tmp_path):
 
 
 def test_where_there_are_no_hard_links_a_file_is_still_whole_and_overwrites_none(
-    path, tmp_path, monkeypatch
+    path,
+    tmp_path,
+    monkeypatch,
 ):
     def refused(*_):
         raise PermissionError(1, "Operation not permitted")  # what FAT answers

@@ -177,7 +177,9 @@ def usual_neighbours(X, queries, components=6):
     pipe = usual_pipeline(X, components, 1, numbers)
     pca = pipe[0]
     vectors = exact.unrounded(
-        np.concatenate([X, queries]), pca.mean_, pca.components_.T
+        np.concatenate([X, queries]),
+        pca.mean_,
+        pca.components_.T,
     )
     truth = [
         exact.nearest(vectors[: len(X)], point, 1)[0][0] for point in vectors[len(X) :]

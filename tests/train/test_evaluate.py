@@ -122,7 +122,10 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
             train = (folds != fold) & (folds != second_fold)
             for i, choice in enumerate(choices):
                 inner[i] += told_right(
-                    choice, vectors, train, folds == second_fold
+                    choice,
+                    vectors,
+                    train,
+                    folds == second_fold,
                 ).sum()
         best = choices[inner.argmax()]
         right += told_right(best, vectors, folds != fold, folds == fold).sum()

@@ -262,10 +262,17 @@ def _labels_and_arrays(
         name = path.rpartition(".")[2]
         if value.ndim == 0 or value.dtype.kind in "US":
             is_label = name.lower() in ("label", "labels")
-            labels[task if is_label else name] = str(value)
+            labels[task if is_label else name] = _text(value)
         else:
             of_trial[name] = value
     return labels, of_trial
+
+
+def _text(value: NDArray[Any]) -> str:
+    """A text or a number as a label; HDF5 gives texts as UTF-8 bytes."""
+    if value.ndim == 0 and isinstance(value.item(), bytes):
+        return str(value.item(), "utf-8", "replace")
+    return str(value)
 
 
 def _groups(arrays: Arrays) -> dict[str, Arrays]:

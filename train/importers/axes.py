@@ -4,7 +4,7 @@ import argparse
 import re
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -170,15 +170,8 @@ def parted(table: Table, normal: str) -> Parted:
             f"{table.where}: {twice} names a column and a taxel of three axes; rename one "
             "of them"
         )
-    return Parted(
-        where=table.where,
-        data=data,
-        named=table.named,
-        shape=shape,
-        form=table.form,
-        whole=table,
-        axes=axes,
-    )
+    normal_table = replace(table, data=data, shape=shape, file_names=())
+    return Parted(**vars(normal_table), whole=table, axes=axes)
 
 
 def _by_letters(table: Table) -> pd.DataFrame:

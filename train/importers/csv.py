@@ -440,7 +440,10 @@ def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
             labels = _labels_in(where, rows[tasks])
             data = rows.drop(columns=["trial", *tasks])
             trial_table = replace(
-                table, where=where, data=data, file_names=tuple(table.names)
+                table,
+                where=where,
+                data=data,
+                file_names=tuple(table.names),
             )
             if "taxel" in data:
                 trial_table = _pivoted(trial_table, options)

@@ -161,7 +161,12 @@ def test_each_request_is_answered_by_its_own_frame(chip):
     ],
 )
 def test_silence_is_a_timeout_and_half_an_answer_a_fault(
-    board, bus, chip, cut, error, sentence
+    board,
+    bus,
+    chip,
+    cut,
+    error,
+    sentence,
 ):
     """A fault is read again at once, a timeout after a pause."""
     board.change = lambda answer, _: cut(answer)

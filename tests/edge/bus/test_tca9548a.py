@@ -59,7 +59,9 @@ def test_two_muxes_on_one_bus_are_never_open_at_once(bus):
     ("absent", "opens"), [(LEAVE_ATTEMPTS - 1, True), (LEAVE_ATTEMPTS, False)]
 )
 def test_a_mux_beside_is_asked_four_times_to_leave_the_bus_and_then_passed_over(
-    bus, absent, opens
+    bus,
+    absent,
+    opens,
 ):
     """One that has gone must not cost the chips of this one."""
     first, second = beside(bus)

@@ -45,7 +45,10 @@ def measured(edge, skin):
 
 
 def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
-    edge, skin, quiet, measured
+    edge,
+    skin,
+    quiet,
+    measured,
 ):
     before = skin.read_text()
     status, event, _ = measured(quiet)
@@ -65,7 +68,11 @@ def test_the_fakes_rest_values_are_measured_and_the_old_file_is_kept(
     [((), (NOISE_COUNTS**2 + 1 / 12) ** 0.5), (("--noise", 3), (9 + 1 / 12) ** 0.5)],
 )
 def test_a_fake_makes_noise_so_that_its_dead_bands_are_rehearsed(
-    skin, quiet, measured, options, deviation
+    skin,
+    quiet,
+    measured,
+    options,
+    deviation,
 ):
     first, repetition = (measured(quiet, *options, frames=90)[1] for _ in range(2))
     assert first == repetition
@@ -122,7 +129,13 @@ def spoil(monkeypatch):
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values(
-    skin, quiet, measured, spoil, value, share, sentence
+    skin,
+    quiet,
+    measured,
+    spoil,
+    value,
+    share,
+    sentence,
 ):
     spoil(value, share)
     for options in ((), ("--force",)):
@@ -134,7 +147,13 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
 
 @UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
-    skin, quiet, measured, spoil, value, share, sentence
+    skin,
+    quiet,
+    measured,
+    spoil,
+    value,
+    share,
+    sentence,
 ):
     assert measured(quiet)[0] == 0
     before = skin.read_text()
@@ -203,7 +222,11 @@ def calibrated(skin, quiet, measured):
     [("calibrated", "off the former calibration"), ("skin", "beyond the others")],
 )
 def test_a_skin_that_something_leans_on_steadily_is_refused(
-    request, measured, leant, former, compared
+    request,
+    measured,
+    leant,
+    former,
+    compared,
 ):
     skin = request.getfixturevalue(former)
     before = skin.read_text()
@@ -218,7 +241,11 @@ def test_a_skin_that_something_leans_on_steadily_is_refused(
 
 @pytest.mark.parametrize(("counts", "taxels"), [(120, SIX[:1]), (40, SIX)])
 def test_a_single_taxel_or_a_small_drift_is_calibrated(
-    calibrated, measured, leant, counts, taxels
+    calibrated,
+    measured,
+    leant,
+    counts,
+    taxels,
 ):
     status, _, err = measured(leant(counts, taxels))
     assert status == 0
@@ -249,7 +276,10 @@ def test_electrodes_of_unequal_wires_stand_out_only_where_they_are_touched():
 
 
 def test_a_calibration_that_would_make_taxels_deaf_is_refused(
-    edge, calibrated, quiet, measured
+    edge,
+    calibrated,
+    quiet,
+    measured,
 ):
     status, _, err = measured(quiet, "--noise", 9)
     assert status == 2

@@ -39,7 +39,9 @@ def installed(edge, new, running):
 
 
 def test_a_verified_model_takes_the_place_of_the_former_one_which_is_kept(
-    installed, new, running
+    installed,
+    new,
+    running,
 ):
     status, (event,), _ = installed()
     assert status == 0
@@ -73,7 +75,10 @@ def test_a_model_that_is_installed_twice_is_not_its_own_way_back(installed, runn
 
 @pytest.mark.parametrize("damage", ["model", "golden", "missing"])
 def test_a_model_that_does_not_verify_leaves_the_former_one(
-    installed, new, running, damage
+    installed,
+    new,
+    running,
+    damage,
 ):
     golden = new.with_name("golden.npz")
     if damage == "model":
@@ -89,7 +94,9 @@ def test_a_model_that_does_not_verify_leaves_the_former_one(
 
 
 def test_a_service_that_does_not_run_with_the_new_model_gets_the_former_one(
-    installed, running, monkeypatch
+    installed,
+    running,
+    monkeypatch,
 ):
     restarted = []
     monkeypatch.setattr(install, "restart", restarted.append)

@@ -74,7 +74,11 @@ def run(edge, exported):
 
 @pytest.mark.parametrize("name", ["hard_0", "soft_3"])
 def test_run_over_the_fake_decides_as_replay_does(
-    edge, run, exported, recordings, name
+    edge,
+    run,
+    exported,
+    recordings,
+    name,
 ):
     """The same frames, once from the file and once through drivers, wires and
     threads."""
@@ -98,7 +102,11 @@ def test_run_over_the_fake_decides_as_replay_does(
     [((), 1, 230), (("--loop", "--seconds", 4.6), 2, 460)],
 )
 def test_run_ends_with_its_recording_unless_told_to_loop(
-    run, parted, options, onsets, frames
+    run,
+    parted,
+    options,
+    onsets,
+    frames,
 ):
     events = run("--fake", parted, *options)[1]
     assert sum(event["event"] == "onset" for event in events) == onsets
@@ -171,7 +179,12 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     ],
 )
 def test_a_bad_option_is_one_sentence(
-    run, recordings, bare, tmp_path, arguments, sentence
+    run,
+    recordings,
+    bare,
+    tmp_path,
+    arguments,
+    sentence,
 ):
     files = {
         "REC": recordings / "hard_0.npz",

@@ -33,6 +33,18 @@ def test_a_command_of_the_workstation_runs_in_the_checkout(
     assert capfd.readouterr().out == output
 
 
+def test_a_folder_of_the_users_does_not_run_in_the_checkouts_place(
+    monkeypatch,
+    tmp_path,
+    capfd,
+):
+    (tmp_path / "train").mkdir()
+    (tmp_path / "train" / "__main__.py").write_text("print('another train')\n")
+    monkeypatch.chdir(tmp_path)
+    assert workstation.run(["simulate", "none.toml", "--explain"]) == 2
+    assert capfd.readouterr().out == ""
+
+
 def test_the_exit_status_is_that_of_the_command(capfd):
     assert workstation.run(["simulate", "none.toml", "--explain"]) == 2
     assert "none.toml" in capfd.readouterr().err

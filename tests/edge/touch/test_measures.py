@@ -195,7 +195,10 @@ def test_where_nothing_lies_the_place_is_that_of_the_frames_that_know_it():
     ]
     features = ["right_along", "right_force", "right_area"]
     vector = feature_vector(
-        series_of(FLAT, frames, features), 1.25, 6, features
+        series_of(FLAT, frames, features),
+        1.25,
+        6,
+        features,
     ).reshape(3, 6)
     assert vector[0].tolist() == [2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
     assert vector[1].tolist() == [0.0, 0.0, 0.4, 0.8, 0.0, 0.0]

@@ -29,7 +29,9 @@ def regions(row):
     ],
 )
 def test_a_contact_goes_on_in_the_region_that_it_shares_most_with(
-    before, after, shares
+    before,
+    after,
+    shares,
 ):
     contacts = [Followed(region) for region in regions(before)]
     candidates = regions(after)

@@ -78,7 +78,9 @@ def edited(folder, simulation):
     ],
 )
 def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
-    simulation, tmp_path, refusal
+    simulation,
+    tmp_path,
+    refusal,
 ):
     file = edited(tmp_path, simulation)
     sentence = refusal("show", file, "--scene")

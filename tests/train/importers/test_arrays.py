@@ -138,7 +138,7 @@ def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
 
 def test_trials_are_groups(tmp_path):
     of_groups(tmp_path / "a.h5")
-    assert list(map(list, trials_in(tmp_path / "a.h5"))) == [["object"], ["object"]]
+    assert trials_in(tmp_path / "a.h5") == [{"object": "cup"}, {"object": "pen"}]
 
 
 def test_a_grid_in_matlab_7_3_keeps_its_rows_and_columns(tmp_path):

@@ -87,12 +87,19 @@ def array(values, version=2, kind="UInt16", dims=()):
     """An array with so many rows and columns in its layout."""
     dimensions = [
         message_of(
-            "std_msgs/MultiArrayDimension", version, label="", size=size, stride=0
+            "std_msgs/MultiArrayDimension",
+            version,
+            label="",
+            size=size,
+            stride=0,
         )
         for size in dims
     ]
     layout = message_of(
-        "std_msgs/MultiArrayLayout", version, dim=dimensions, data_offset=0
+        "std_msgs/MultiArrayLayout",
+        version,
+        dim=dimensions,
+        data_offset=0,
     )
     name = f"std_msgs/{kind}MultiArray"
     return message_of(name, version, layout=layout, data=values.reshape(-1))

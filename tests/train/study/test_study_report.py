@@ -123,7 +123,7 @@ def test_the_category_is_judged_on_the_trials_with_a_wrong_object():
 @pytest.fixture(scope="module")
 def studied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("touches")
-    save_touches(folder, 10, seconds=1.3)
+    save_touches(folder, 10, seconds=1.3, rate=25.0)
     out = tmp_path_factory.mktemp("study")
     words = ["--data", ".", "--out", str(out), "--jobs", "1"]
     with pytest.MonkeyPatch.context() as patch:

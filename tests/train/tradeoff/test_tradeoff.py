@@ -387,7 +387,7 @@ class Written:
 def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
-    data = str(save_touches(folder / "data", 14))
+    data = str(save_touches(folder / "data", 14, rate=50.0))
     single = part(load(folder / "data" / "hard_00.npz"), slice(1))
     save(folder / "data" / "single_frame.npz", single)
     digest = read([data]).digest
