@@ -91,3 +91,10 @@ def bench_region_in_noise(shape, density, against):
     assert loudest(frame) == opencv_areas(frame)
     rivals = {"OpenCV": (partial(opencv_areas, frame), 10.0)}
     against(partial(loudest, frame), rivals)
+
+
+def bench_region_of_lone_taxels(against):
+    counts = np.zeros((16, 24), dtype=np.uint16)
+    counts[[1, 4, 7, 10, 13], [2, 20, 11, 5, 16]] = [90, 80, 70, 60, 55]
+    rivals = {"OpenCV": (partial(opencv_areas, counts), 4.0)}
+    against(partial(loudest, counts), rivals)
