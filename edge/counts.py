@@ -3,14 +3,14 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Counts
 from edge.errors import InputError
 
 MAX_COUNTS = 65535
 
 
-def as_counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
+def as_counts(frames: Array, scale: float | None) -> Counts:
     """Frames of another type as uint16, multiplied by `scale` and rounded.
 
     Raises:
@@ -45,7 +45,7 @@ def as_counts(frames: NDArray[Any], scale: float | None) -> NDArray[np.uint16]:
     return frames.astype(np.uint16)
 
 
-def in_rows(frames: NDArray[Any], rows: Any, cols: Any) -> NDArray[Any]:
+def in_rows(frames: Array, rows: Any, cols: Any) -> Array:
     """Flat frames (n, rows * cols) as (n, rows, cols).
 
     Raises:

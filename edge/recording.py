@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Array, Booleans, Counts, Floats
 from edge.config import parse_json, shown
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing
@@ -51,10 +52,10 @@ class Recording:
             columns, of the scale of `frames`; None on a skin of one axis.
     """
 
-    t: NDArray[np.float64]
-    frames: NDArray[np.uint16]
-    joints: NDArray[np.float64] | None = None
-    valid: NDArray[np.bool_] | None = None
+    t: Floats
+    frames: Counts
+    joints: Floats | None = None
+    valid: Booleans | None = None
     meta: dict[str, Any] = field(default_factory=dict)
     shear: NDArray[np.int16] | None = None
 
@@ -165,9 +166,9 @@ def _typed(
     values: Any,
     dtype: type,
     *shapes: tuple[int, ...],
-) -> NDArray[Any]:
+) -> Array:
     """An array that must have a type and one of some shapes; floats become float64."""
-    array: NDArray[Any] = np.asarray(values)
+    array: Array = np.asarray(values)
     if array.dtype.kind == "f":
         array = array.astype(np.float64)
     if array.dtype != dtype or array.shape not in shapes:
@@ -180,9 +181,9 @@ def _frames(
     values: Any,
     skin: Mapping[str, Any],
     scale: float | None,
-) -> NDArray[np.uint16]:
+) -> Counts:
     """The counts (n, rows, cols) of at least one frame."""
-    frames: NDArray[Any] = np.asarray(values)
+    frames: Array = np.asarray(values)
     if frames.dtype.kind in "iuf" and (frames.dtype != np.uint16 or scale is not None):
         from edge.counts import as_counts  # few files hold other numbers
 
@@ -201,7 +202,7 @@ def _frames(
     return frames
 
 
-def _times(values: Any, frames: int) -> NDArray[np.float64]:
+def _times(values: Any, frames: int) -> Floats:
     """Finite times (frames,) that never go back."""
     t = _typed("t", values, np.float64, (frames,))
     finite = np.isfinite(t)
@@ -218,7 +219,7 @@ def _times(values: Any, frames: int) -> NDArray[np.float64]:
     return t
 
 
-def _joints(values: Any, frames: int) -> NDArray[np.float64] | None:
+def _joints(values: Any, frames: int) -> Floats | None:
     """Joint angles (frames, dof), all NaN in a frame whose pose is not known."""
     if values is None:
         return None
@@ -253,7 +254,7 @@ def _labels(values: Any) -> dict[str, str]:
     return labels
 
 
-def _check_joint_names(names: Any, joints: NDArray[np.float64] | None) -> None:
+def _check_joint_names(names: Any, joints: Floats | None) -> None:
     if not _are_names(names) or len(set(names)) < len(names):
         raise InputError("meta.joint_names must be a list of different names")
     dof = 0 if joints is None else joints.shape[1]
@@ -267,7 +268,7 @@ def load_arrays(
     path: str | os.PathLike[str],
     file: BinaryIO | None = None,
     keys: Sequence[str] | None = None,
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, Array]:
     """Arrays of an `.npz`, read without pickle.
 
     An array is filled from the file piece by piece, so a header that claims more than
@@ -306,7 +307,7 @@ def load_arrays(
     return arrays
 
 
-def load_meta(name: str, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
+def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
     """The JSON object under `meta`."""
     raw = arrays.get("meta")
     if raw is None:
@@ -355,7 +356,7 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     return recording
 
 
-def warn_of_another_unit(name: str, t: NDArray[np.float64]) -> None:
+def warn_of_another_unit(name: str, t: Floats) -> None:
     """Name the likely unit of times that do not seem to be in seconds."""
     steps = np.diff(t)
     rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array
 from edge.errors import InputError
 from edge.recording import KEYS, Recording, checked, warn_of_another_unit
 from edge.touch.thresholds import doubt
@@ -71,7 +71,7 @@ def save(
 
 def save_arrays(
     path: str | os.PathLike[str],
-    arrays: dict[str, NDArray[Any]],
+    arrays: dict[str, Array],
     meta: dict[str, Any],
     *,
     overwrite: bool = True,

@@ -26,12 +26,12 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, numpy_helper
 
+from edge.arrays import Integers
 from edge.cli import dispatch
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import load_arrays
 from edge.writing import write_whole
-from train.vectors import Integers
 
 ROUNDS = 7
 CALLS = 200

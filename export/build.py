@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from onnx import TensorProto, numpy_helper
 
+from edge.arrays import Floats, Integers
 from train.projection import MOST_STEPS, Projection
-from train.vectors import Floats, Integers
 
 OPSET = 18
 

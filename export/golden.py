@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Floats
 from edge.model.model import Model
 from edge.model.verify import answers, first_series, integers_of
 from edge.recording import Recording
@@ -16,7 +17,6 @@ from edge.touch.contact import FeatureSeries
 from train.dataset import DataSet
 from train.evaluate import finest
 from train.parts import part
-from train.vectors import Floats
 
 TRIALS = 24
 """Trials whose frames a golden file holds."""

@@ -18,6 +18,7 @@ from onnx import helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
@@ -26,7 +27,6 @@ from export.build import OPSET, Builder, project, widened
 from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
 from train.pipeline import ContactClassifier, Space
 from train.stopping import SequentialClassifier
-from train.vectors import Booleans, Floats, Integers
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)

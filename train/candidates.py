@@ -8,12 +8,13 @@ from itertools import product
 
 import numpy as np
 
+from edge.arrays import Integers
 from train.agreement import products
 from train.feature_sets import expand
 from train.pipeline import Choice
 from train.projection import KINDS
 from train.search import NEIGHBOURS, SHRINKAGES, SearchGrid
-from train.vectors import Integers, Labels
+from train.vectors import Labels
 
 PLAIN = (
     ("paper",),

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from edge.arrays import Booleans, Floats, Integers
 from train.agreement import families
 from train.candidates import Candidate, costs, features_of, places_of
 from train.dataset import DataSet
@@ -26,7 +27,7 @@ from train.labels import NO_CONTACT
 from train.pipeline import Choice, Choices
 from train.progress import bar
 from train.stopping import Early, held_out
-from train.vectors import Booleans, Floats, Integers, Labels, Vectors
+from train.vectors import Labels, Vectors
 
 EARLY_SHARES = (0.25, 0.5, 0.75)
 """Parts of the full window at which the settings of the earlier decision points are

@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.projection import Grid, Spectrum, on_grid
 from train.scaling import centred_and_scaled, finite
 from train.threads import single_thread
-from train.vectors import Booleans, Floats, Integers, Strings
+from train.vectors import Strings
 
 MAX_COMPONENTS = 20
 MAX_K = 20

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.files import read_bytes
 from edge.recording import LARGEST_BYTES, Recording, load
@@ -33,7 +34,7 @@ from train.feature_sets import axes, moves, unit
 from train.kernels import MOST_TOUCHES, kernel_table
 from train.labels import completed, labels_of, shared_tasks
 from train.progress import bar
-from train.vectors import Booleans, Floats, Labels, Strings, Vectors
+from train.vectors import Labels, Strings, Vectors
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.statistics import wilson
 from train.crossval import votes_right
@@ -33,7 +34,7 @@ from train.pipeline import Choice, columns_of, how_often, types_of
 from train.scaling import centred_and_scaled, finite
 from train.search import Decomposition, SearchGrid
 from train.threads import single_thread
-from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
+from train.vectors import Labels, Strings, Vectors
 
 FOLDS = 10
 SEED = 2012

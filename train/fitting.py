@@ -12,6 +12,7 @@ import numpy as np
 from joblib import cpu_count
 from scipy.spatial.distance import cdist
 
+from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.tools.slips import slips
@@ -34,7 +35,7 @@ from train.mix import Mixing, mix
 from train.pipeline import Choice, ContactClassifier
 from train.settings import Settings
 from train.stopping import FEWEST, Early, SequentialClassifier
-from train.vectors import Booleans, Floats, Labels, Vectors
+from train.vectors import Labels, Vectors
 
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by

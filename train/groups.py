@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from edge.arrays import Integers
 from edge.recording import Recording
 from train.agreement import families
 from train.dataset import DataSet
 from train.evaluate import FOLDS, SEED, finest, group_folds, stratified_folds
 from train.search import SearchGrid
-from train.vectors import Integers, Labels, Strings
+from train.vectors import Labels, Strings
 
 FEWEST_GROUPS = 3
 """Objects that a class needs before entire objects can be left out."""

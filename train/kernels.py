@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from edge.arrays import Integers
 from edge.touch.kernels import (
     BITS,
     KernelTable,
@@ -11,7 +12,6 @@ from edge.touch.kernels import (
     convolved,
     shifted,
 )
-from train.vectors import Integers
 
 MOST_TOUCHES = 500
 """Touches that are enough for a table."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from train.choose import Chosen, decided_together, promised
 from train.dataset import DataSet
@@ -31,7 +32,7 @@ from train.groups import FEWEST_GROUPS, TRIAL, fold_count
 from train.labels import ENOUGH
 from train.pipeline import Choice
 from train.search import SearchGrid
-from train.vectors import Booleans, Floats, Integers, Labels, Vectors
+from train.vectors import Labels, Vectors
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""

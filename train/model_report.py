@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from sklearn.metrics import precision_recall_fscore_support
 
+from edge.arrays import Integers
 from edge.model.model import Model
 from edge.tools.explanation import Explanation, Space, explain
 from train.draw.explanation import MOST_NEAR, Case, draw_case
@@ -25,7 +26,7 @@ from train.report.score import interval, percent
 from train.report.section import Figure, Row, Section, Table, counted
 from train.report.summary import Prices, accuracy, candidates, names, warnings
 from train.report.work import Workers
-from train.vectors import Integers, Strings, Vectors
+from train.vectors import Strings, Vectors
 
 QUARTERS = 4
 """The learning curve has a point for each of these parts of the training trials."""

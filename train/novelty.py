@@ -27,9 +27,10 @@ from joblib import Parallel, delayed
 from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import Novelty
 from train.threads import single_thread
-from train.vectors import Booleans, Floats, Integers, Strings
+from train.vectors import Strings
 
 NOVELTY_RATES = (0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)
 TAIL = 0.1

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from edge.arrays import Floats
 from edge.touch.doubts import LIMIT_TOLERANCE
 from train.dataset import DataSet
-from train.vectors import Floats
 
 MOST_DEVIATIONS = 20.0
 """No trial of the simulated and recorded sets that we know lies so far outside."""

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 from scipy.special import expit
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.model.agreement import agreed
 from edge.tools.teaching import nearest_of_label
@@ -24,15 +25,7 @@ from edge.touch.features import FEATURES
 from train.agreement import factors_of
 from train.projection import Projection
 from train.scaling import finite
-from train.vectors import (
-    Booleans,
-    Floats,
-    Integers,
-    Labels,
-    Strings,
-    Vectors,
-    widths_of,
-)
+from train.vectors import Labels, Strings, Vectors, widths_of
 
 
 def vote(labels: Integers) -> Integers:

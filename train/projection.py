@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from train.scaling import centred_and_scaled, column_means
-from train.vectors import Booleans, Floats, Integers
 
 FEATURE_BITS = 22
 """Bits of the largest scaled difference from the mean in training."""

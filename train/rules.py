@@ -32,8 +32,8 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import beta
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import TEST_SHARE, StoppingRule
-from train.vectors import Booleans, Floats, Integers
 
 RISK = 0.1
 """Probability that a certificate is wrong."""

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 from edge.touch.measures import feature
-from train.vectors import Booleans, Floats, Integers, widths_of
+from train.vectors import widths_of
 
 SCALINGS = ("none", "I", "II", "III", "IV", "V")
 """No scaling, and Methods I to V of the paper's Eqs. 1 to 5."""

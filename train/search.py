@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
+from edge.arrays import Floats, Integers
 from train.pipeline import Choice
 from train.projection import Spectrum
-from train.vectors import Floats, Integers
 
 COMPONENTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20)
 SHRINKAGES = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from edge.arrays import Integers
 from train.candidates import Candidate
 from train.choose import Chosen, EarlySettings
 from train.pipeline import Choice, Choices
-from train.vectors import Integers
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from joblib import Parallel, delayed
 from scipy.optimize import brentq
 from scipy.special import expit
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.model.info import (
     NOVELTY_RATE,
@@ -49,7 +50,7 @@ from train.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
 from train.pipeline import Choices, ContactClassifier, columns_of, types_of
 from train.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
-from train.vectors import Booleans, Floats, Integers, Strings, Vectors
+from train.vectors import Strings, Vectors
 
 FEWEST = 20
 """Trials that calibration needs."""

@@ -7,12 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Floats
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Booleans = NDArray[np.bool_]
 Strings = NDArray[np.str_]
 
 Labels = Mapping[str, Strings]

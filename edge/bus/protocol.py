@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes
 from edge.errors import EdgeError
 
 
@@ -148,7 +148,7 @@ class Message:
     """One message: bytes to a chip, or a buffer for bytes from it."""
 
     address: int
-    buffer: NDArray[np.uint8]
+    buffer: Bytes
     read: bool = False
 
 
@@ -157,7 +157,7 @@ def write(address: int, data: bytes | Sequence[int]) -> Message:
     return Message(address, np.frombuffer(bytes(data), dtype=np.uint8).copy())
 
 
-def read(address: int, into: NDArray[np.uint8] | int) -> Message:
+def read(address: int, into: Bytes | int) -> Message:
     """A message of bytes from a chip, into the given array or a new one."""
     buffer = np.zeros(into, dtype=np.uint8) if isinstance(into, int) else into
     if buffer.dtype != np.uint8 or not buffer.flags.carray:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from itertools import cycle
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes
 from edge.bus.protocol import Bus, fetch, read, send, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
@@ -94,7 +94,7 @@ class AD7147(Chip):
         bus: Bus,
         address: int,
         *,
-        into: NDArray[np.uint8] | int = 2 * STAGES,
+        into: Bytes | int = 2 * STAGES,
     ) -> None:
         """Identify the chip.
 
@@ -127,7 +127,7 @@ class AD7147(Chip):
         return Traits(2 * STAGES, highest=0xFFFE, rest=REST, defaults=defaults)
 
     @staticmethod
-    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+    def parse(data: Bytes, spec: ChipSpec) -> Parsed:
         """12 big-endian words a chip.
 
         No converting stage reads 0: a chip without settings serves it, or converts stage 0

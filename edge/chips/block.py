@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes, Counts
 from edge.bus.crc import crc16, sealed
 from edge.bus.protocol import Bus, fetch, read, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Option, Parsed, Traits
@@ -43,7 +43,7 @@ def data_bytes(taxels: int, bits: int) -> int:
     return (taxels * bits + 7) // 8
 
 
-def pack(values: NDArray[np.uint16], bits: int) -> bytes:
+def pack(values: Counts, bits: int) -> bytes:
     """Taxels as bytes on the wire, highest bit first; the inverse of `unpack`.
 
     Args:
@@ -54,7 +54,7 @@ def pack(values: NDArray[np.uint16], bits: int) -> bytes:
     return np.packbits(digits[:, 16 - bits :]).tobytes()
 
 
-def unpack(data: NDArray[np.uint8], taxels: int, bits: int) -> NDArray[np.uint16]:
+def unpack(data: Bytes, taxels: int, bits: int) -> Counts:
     """Taxels (n, taxels) from their bytes (n, data_bytes)."""
     digits = np.zeros((len(data), taxels, 16), dtype=np.uint8)
     packed = np.unpackbits(data, axis=1, count=taxels * bits)
@@ -98,7 +98,7 @@ class Block(Chip):
         *,
         taxels: int,
         bits: int = 16,
-        into: NDArray[np.uint8] | None = None,
+        into: Bytes | None = None,
     ) -> None:
         """Check that the microcontroller serves the taxels of the skin file.
 
@@ -127,7 +127,7 @@ class Block(Chip):
         raise self.wrong("not a microcontroller that serves frames")
 
     @classmethod
-    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
+    def of(cls, bus: Bus, spec: ChipSpec, into: Bytes) -> Self:
         """The driver of a skin's chip, which reads frames into these bytes."""
         bits = spec.option("bits")
         return cls(bus, spec.address, taxels=len(spec.taxels), bits=bits, into=into)
@@ -142,7 +142,7 @@ class Block(Chip):
         return Traits(size, full - 1, rest=min(REST, full // 2), defaults=defaults)
 
     @staticmethod
-    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+    def parse(data: Bytes, spec: ChipSpec) -> Parsed:
         """Taxels of n microcontrollers, and whether the CRC of their frame holds.
 
         Args:

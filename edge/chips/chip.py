@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
+from edge.arrays import Booleans, Bytes, Counts
 from edge.bus.protocol import Bus, BusError, read, write
 
 ADDRESSES = range(0x08, 0x78)
@@ -23,7 +21,7 @@ MOST_TAXELS = 4000
 """A frame of 16-bit taxels then stays under the 8192 bytes of one message."""
 UNUSED = -1
 """A stage without a taxel."""
-Parsed = tuple[NDArray[np.uint16], NDArray[np.bool_]]
+Parsed = tuple[Counts, Booleans]
 """Values (n, taxels) of n chips, and which of them are intact, (n, taxels)."""
 
 
@@ -114,7 +112,7 @@ class Chip(ABC):
         bus: Bus,
         address: int,
         *,
-        into: NDArray[np.uint8] | int,
+        into: Bytes | int,
     ) -> None:
         self.bus = bus
         self.address = address
@@ -122,7 +120,7 @@ class Chip(ABC):
         self.frame = bus.prepare(pointer, read(address, into))
 
     @classmethod
-    def of(cls, bus: Bus, spec: ChipSpec, into: NDArray[np.uint8]) -> Self:
+    def of(cls, bus: Bus, spec: ChipSpec, into: Bytes) -> Self:
         """The driver of a skin's chip, which reads frames into these bytes."""
         return cls(bus, spec.address, into=into)
 
@@ -133,7 +131,7 @@ class Chip(ABC):
 
     @staticmethod
     @abstractmethod
-    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+    def parse(data: Bytes, spec: ChipSpec) -> Parsed:
         """Values and intact taxels of n equal chips from their bytes; a pure function.
 
         Args:

@@ -8,8 +8,8 @@ filter).
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes
 from edge.bus.protocol import Bus, fetch, read, send, write
 from edge.chips.chip import Chip, ChipSpec, Defaults, Parsed, Traits
 
@@ -58,7 +58,7 @@ class MPR121(Chip):
         bus: Bus,
         address: int,
         *,
-        into: NDArray[np.uint8] | int = 2 * ELECTRODES,
+        into: Bytes | int = 2 * ELECTRODES,
     ) -> None:
         """Identify the chip as far as that is possible without a reset.
 
@@ -89,7 +89,7 @@ class MPR121(Chip):
         return Traits(2 * ELECTRODES, SATURATED - 1, rest=600, defaults=defaults)
 
     @staticmethod
-    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+    def parse(data: Bytes, spec: ChipSpec) -> Parsed:
         """12 words a chip, low byte first, 10 bits used.
 
         A word with one of the upper six bits set is damaged. A stopped chip serves 0, and

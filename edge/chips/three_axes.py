@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes, Counts
 from edge.chips.block import THREE_AXES, Block, data_bytes, unpack
 from edge.chips.chip import MOST_TAXELS, Chip, ChipSpec, Option, Parsed, Traits
 from edge.config import ConfigTable
@@ -47,13 +47,13 @@ class ThreeAxisBlock(Block):
         return Traits(size, (1 << BITS) - 1, rest=ZERO)
 
     @staticmethod
-    def parse(data: NDArray[np.uint8], spec: ChipSpec) -> Parsed:
+    def parse(data: Bytes, spec: ChipSpec) -> Parsed:
         """Normal values of n microcontrollers, and which of them are intact."""
         _, intact = Block.parse(data, spec)
         return axes(data, len(spec.taxels))[:, :, 0], intact
 
 
-def axes(data: NDArray[np.uint8], taxels: int) -> NDArray[np.uint16]:
+def axes(data: Bytes, taxels: int) -> Counts:
     """(n, taxels, 3) raw values of n frames (n, bytes): normal, along, around."""
     numbers = unpack(data[:, 2:-2], AXES * taxels, BITS)
     return (numbers ^ ZERO).astype(np.uint16).reshape(len(data), taxels, AXES)

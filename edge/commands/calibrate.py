@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.commands.options import add_skin, within
 from edge.commands.output import LOG, Output, counted
 from edge.commands.source import open_skin
@@ -68,7 +68,7 @@ class Measurement:
     """
 
     calibration: TaxelCalibration
-    valid: NDArray[np.int64]
+    valid: Integers
     frames: int
 
 
@@ -108,7 +108,7 @@ class Sums:
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.n, self._total, self._squares = np.zeros((3, *shape), dtype=np.int64)
 
-    def add(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
+    def add(self, raw: Counts, valid: Booleans) -> None:
         """Add the values of a frame."""
         # Squares of 16 bits over 2**31 frames still fit 63 bits.
         values = np.where(valid, raw, 0).astype(np.int64)
@@ -116,7 +116,7 @@ class Sums:
         self._total += values
         self._squares += values * values
 
-    def mean_and_deviation(self) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
+    def mean_and_deviation(self) -> tuple[Counts, Floats]:
         """Rounded means and sample standard deviations; 0 where nothing was read.
 
         Squared deviations are summed about the rounded mean in whole numbers, so that a
@@ -134,9 +134,9 @@ class Sums:
 
 def unusable(
     file: SkinFile,
-    baseline: NDArray[np.uint16],
-    share: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+    baseline: Counts,
+    share: Floats,
+) -> Booleans:
     """(rows, cols), True for working taxels without a usable rest value.
 
     They were valid in less than `MIN_SHARE` of the frames, or rest at an end of the
@@ -159,7 +159,7 @@ def unusable(
     return np.asarray((served & bad).reshape(baseline.shape) & file.layout.alive)
 
 
-def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
+def noisiest_taxels(noise: Floats) -> list[tuple[int, int]]:
     """Taxels (row, col) that vary far more than the others, the worst first."""
     limit = NOISY * float(np.median(noise)) + NOISY_COUNTS
     return sorted(places(noise > limit), key=lambda taxel: -noise[taxel])
@@ -167,7 +167,7 @@ def noisiest_taxels(noise: NDArray[np.float64]) -> list[tuple[int, int]]:
 
 def moved_together(
     file: SkinFile,
-    baseline: NDArray[np.uint16],
+    baseline: Counts,
     former: TaxelCalibration | None,
 ) -> list[tuple[int, int]]:
     """Taxels (row, col) that rest as if they were touched.
@@ -197,7 +197,7 @@ def _apart(former: TaxelCalibration | None) -> str:
     return "beyond the others" if former is None else "off the former calibration"
 
 
-def standing_out(file: SkinFile, baseline: NDArray[np.uint16]) -> NDArray[np.int64]:
+def standing_out(file: SkinFile, baseline: Counts) -> Integers:
     """Counts (rows, cols) by which working taxels rest beyond the usual differences to
     others of their kind, in the direction of a touch.
 

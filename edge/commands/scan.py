@@ -8,8 +8,8 @@ The exit status is 1 if a chip does not answer or a taxel has no valid value.
 import argparse
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans
 from edge.commands.options import add_skin
 from edge.commands.output import Output
 from edge.commands.source import chip_event, open_skin
@@ -27,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_skin(parser)
 
 
-def skin_map(served: list[int], invalid: NDArray[np.bool_]) -> str:
+def skin_map(served: list[int], invalid: Booleans) -> str:
     """One line per row: `#` if a taxel is valid, `.` if not, blank without a chip."""
     marks = np.full(invalid.shape, " ")
     marks.flat[served] = np.where(invalid.flat[served], ".", "#")

@@ -5,12 +5,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
+from edge.arrays import Counts
 from edge.chips.chip import ChipSpec
 
-Sense = Callable[[float], NDArray[np.uint16]]
+Sense = Callable[[float], Counts]
 """Raw values (taxels,) that a fake chip senses at a time in seconds."""
 
 

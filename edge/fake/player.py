@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Counts, Floats, Integers
 from edge.bus.protocol import Message
 from edge.chips import kinds
 from edge.chips.chip import MOST_TAXELS, UNUSED, ChipSpec
@@ -27,9 +28,6 @@ from edge.skin.wiring import BusSpec
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
-Counts = NDArray[np.uint16]
-"""Counts or raw values of taxels."""
-Integers = NDArray[np.int64]
 WIRE_FRAMES = 20
 """Frames whose bits are counted together, as some transactions are rare."""
 NOISE_FRAMES = 97
@@ -88,7 +86,7 @@ class Playback:
         """Shear (rows, cols, 2) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].shear
 
-    def at(self, t: float) -> NDArray[np.float64] | None:
+    def at(self, t: float) -> Floats | None:
         """Joint angles (dof,) at `t`; None where the recording has none."""
         return self._frames[self._index(t)].joints
 

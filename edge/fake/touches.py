@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge import demo
+from edge.arrays import Floats
 from edge.fake.player import calibrated
 from edge.recording import Recording, load
 from edge.skin.decoder import taxel_map
 from edge.skin.file import SkinFile
 from edge.touch.layout import SkinLayout
 
-Floats = NDArray[np.float64]
 PITCH_M = 0.01
 """Assumed pitch of a skin whose own is unknown."""
 STRENGTH = (0.8, 1.25)

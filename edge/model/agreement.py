@@ -3,10 +3,10 @@ with them."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from edge.arrays import Array
 
 Factors = Mapping[str, Sequence[int]]
 """{factor: the index of its label for each label of the product}. A product, such as
@@ -17,8 +17,8 @@ softness."""
 def agreed(
     task: str,
     factors: Factors,
-    distances: Mapping[str, NDArray[Any]],
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    distances: Mapping[str, Array],
+) -> tuple[dict[str, Array], dict[str, Array]]:
     """The nearest answer in which a product and its factors agree.
 
     An answer's distance is the sum of its three labels' distances.

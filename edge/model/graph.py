@@ -10,8 +10,8 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array
 from edge.errors import InputError
 from edge.model.onnx_file import Contents, Message, Node, messages, text_of
 
@@ -27,7 +27,6 @@ TENSORS = {
 """{type of a TensorProto: its name in ONNX Runtime}."""
 Declared = tuple[str, list[int | None]]
 """Type and shape of an input or output."""
-Array = NDArray[Any]
 Attributes = Mapping[str, int]
 
 

@@ -9,9 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from edge.arrays import Floats
 from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
@@ -287,7 +285,7 @@ class ModelInfo:
         self,
         series: FeatureSeries,
         window_s: float | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """The model's `feature_vector` of a contact, by default at the full window."""
         window_s = window_s or self.window_s
         return feature_vector(

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from edge.arrays import Array, Floats, Integers
 from edge.errors import InputError, OutOfRange, printable
 from edge.files import read_bytes
 from edge.model import onnx_file
@@ -53,11 +54,11 @@ class Decision(NamedTuple):
     label: str
     confidence: float | None
     votes: float
-    scores: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    neighbours: NDArray[np.int64]
+    scores: Floats
+    distances: Floats
+    neighbours: Integers
     tie: bool
-    label_distances: NDArray[np.float64] | None = None
+    label_distances: Floats | None = None
     out_of_range: bool = False
     novelty: float = 0.0
 
@@ -172,9 +173,9 @@ class Model:
 
     def run(
         self,
-        vectors: NDArray[np.float64],
+        vectors: Floats,
         decision_point: int | None = None,
-    ) -> dict[str, NDArray[Any]]:
+    ) -> dict[str, Array]:
         """The graph's outputs for vectors (n, width).
 
         Args:
@@ -190,7 +191,7 @@ class Model:
             raise InputError(
                 f"{self.path}: has the decision points 0 to {last}, not {point}"
             )
-        inputs: dict[str, NDArray[Any]] = {"features": vectors}
+        inputs: dict[str, Array] = {"features": vectors}
         if self.info.decision_points_s:
             inputs["decision_point"] = np.array([point], dtype=np.int64)
         try:
@@ -252,7 +253,7 @@ class Model:
         point: int,
         label: int,
         distances: Any,
-        answers: Mapping[str, NDArray[Any]],
+        answers: Mapping[str, Array],
     ) -> Decision:
         """A task's decision.
 
@@ -300,7 +301,7 @@ class Model:
             f"{self.path}: cannot be run ({reason}); copy or export it again"
         )
 
-    def _refusal(self, x: NDArray[np.float64]) -> OutOfRange:
+    def _refusal(self, x: Floats) -> OutOfRange:
         """The error for a vector that the graph answers with label -1."""
         finite = np.isfinite(x)
         if finite.all():

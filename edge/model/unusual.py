@@ -3,14 +3,15 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from edge.arrays import Floats
 
 PREFIXES = ("log_", "sqrt_", "relative_")
 """Of features' names, which say nothing to a person."""
 
 
 def unusual(
-    vector: NDArray[np.float64],
+    vector: Floats,
     widths: Sequence[int],
     usual: Mapping[str, Sequence[float]],
 ) -> str | None:

@@ -30,8 +30,8 @@ from itertools import chain, pairwise, starmap
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Floats, Integers
 from edge.errors import InputError
 from edge.files import parsing
 from edge.model.model import Model
@@ -47,7 +47,7 @@ OUT_OF_RANGE = "out_of_range"
 OF_ALL_TASKS = ("novelty", OUT_OF_RANGE)
 """Outputs that belong to no task."""
 
-Line = tuple[str, NDArray[Any], NDArray[Any], float]
+Line = tuple[str, Array, Array, float]
 """A quantity to compare: name, seen, expected, bound."""
 
 
@@ -85,7 +85,7 @@ def first_series(
     return first_contact(recording, model.info.tracker(recording.layout))
 
 
-def integers_of(series: FeatureSeries) -> NDArray[np.int64]:
+def integers_of(series: FeatureSeries) -> Integers:
     """(n, m) all whole numbers: peak, area, sums, those of the zones, the cells."""
     cells = [c for c in (series.taxels, series.kernel_cells) if c is not None]
     return np.column_stack(
@@ -121,7 +121,7 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
     return checks if second is None else [*checks, second]
 
 
-def second_opinion(model: Model, arrays: Mapping[str, NDArray[Any]]) -> Check | None:
+def second_opinion(model: Model, arrays: Mapping[str, Array]) -> Check | None:
     """Compare the model's engine with the graph in numpy, to the last bit.
 
     Returns:
@@ -153,9 +153,7 @@ def _answered_key(key: str) -> str:
     return key
 
 
-def _trials(
-    arrays: dict[str, NDArray[Any]], meta: dict[str, Any]
-) -> Iterator[Recording]:
+def _trials(arrays: dict[str, Array], meta: dict[str, Any]) -> Iterator[Recording]:
     keys = [key for key in ("t", "frames", "joints", "valid", "shear") if key in arrays]
     for first, end in pairwise(arrays["start"].tolist()):
         if not 0 <= first < end <= len(arrays["t"]):
@@ -166,7 +164,7 @@ def _trials(
 
 def _path(
     model: Model,
-    arrays: dict[str, NDArray[Any]],
+    arrays: dict[str, Array],
     meta: dict[str, Any],
     bounds: dict[str, float],
 ) -> Iterator[Line]:
@@ -199,7 +197,7 @@ def _path(
 def _graph(
     model: Model,
     name: str,
-    arrays: dict[str, NDArray[Any]],
+    arrays: dict[str, Array],
     bounds: dict[str, float],
 ) -> Iterator[Line]:
     """The graph's outputs for the stored vectors."""
@@ -219,9 +217,7 @@ def _graph(
         yield key, answer, arrays[key], bound
 
 
-def _comparable(
-    model: Model, arrays: Mapping[str, NDArray[Any]]
-) -> dict[str, NDArray[Any]]:
+def _comparable(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
     """`answers` without `out_of_range` where the golden file, an older one, lacks it.
 
     Models of that time gave the size of the excess, which not every engine rounds
@@ -234,9 +230,7 @@ def _comparable(
     }
 
 
-def answers(
-    model: Model, arrays: Mapping[str, NDArray[Any]]
-) -> dict[str, NDArray[Any]]:
+def answers(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
     """{key: the graph's output} for the vectors of a golden file, each at its decision
     point."""
     outputs = _outputs(model, arrays["vectors"])
@@ -251,9 +245,9 @@ def answers(
 
 def _named(
     model: Model,
-    outputs: Mapping[str, NDArray[Any]],
+    outputs: Mapping[str, Array],
     prefix: str,
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, Array]:
     """Outputs as a golden file names them; the prefix tells its two kinds of vectors
     apart."""
     ends = (*OUTPUTS, "label_distances") if model.info.has_label_distances else OUTPUTS
@@ -269,9 +263,9 @@ def _named(
 
 def _outputs(
     model: Model,
-    vectors: NDArray[np.float64],
+    vectors: Floats,
     decision_point: int | None = None,
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, Array]:
     """The graph's outputs for vectors (n, width), asked one by one as on the board."""
     vectors = np.ascontiguousarray(vectors, np.float64)
     rows = range(len(vectors))
@@ -283,7 +277,7 @@ def renew(
     path: str | os.PathLike[str],
     target: str | os.PathLike[str],
     model: Model,
-    vectors: NDArray[np.float64],
+    vectors: Floats,
 ) -> None:
     """Write a golden file of a model whose neighbours were changed.
 
@@ -305,8 +299,8 @@ def renew(
 
 def compared(
     name: str,
-    values: NDArray[Any],
-    expected: NDArray[Any],
+    values: Array,
+    expected: Array,
     bound: float,
 ) -> Check:
     """Compare a quantity, whose first axis is the rows; see the module for the

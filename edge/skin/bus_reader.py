@@ -13,9 +13,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import groupby
 
-import numpy as np
-from numpy.typing import NDArray
-
+from edge.arrays import Bytes
 from edge.bus.protocol import (
     Adapter,
     Bus,
@@ -86,7 +84,7 @@ class Slot:
     """
 
     spec: ChipSpec
-    row: NDArray[np.uint8]
+    row: Bytes
     chip: Chip = field(init=False)
     state: State = State.STARTING
     error: BusError | None = None
@@ -153,7 +151,7 @@ class BusReader:
         self,
         bus: Adapter,
         spec: BusSpec,
-        rows: Iterable[NDArray[np.uint8]],
+        rows: Iterable[Bytes],
         reading: Reading,
     ) -> None:
         """Take the bus over; nothing is sent yet.

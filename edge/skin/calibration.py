@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans
 from edge.errors import InputError
 from edge.files import read_text
 from edge.skin.decoder import dead_band
@@ -91,6 +91,6 @@ def deaf_taxels(skin: SkinFile) -> list[tuple[int, int]]:
     return places((band >= threshold) & skin.layout.alive)
 
 
-def places(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def places(mask: Booleans) -> list[tuple[int, int]]:
     """(row, col) of the taxels of a mask (rows, cols)."""
     return [(row, col) for row, col in np.argwhere(mask).tolist()]

@@ -8,6 +8,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from edge.arrays import Booleans, Bytes, Counts, Floats, Integers
 from edge.chips.chip import UNUSED, ChipSpec
 from edge.skin.bus_reader import NEVER, Slot
 from edge.skin.file import Signal, SkinFile
@@ -44,9 +45,9 @@ class TaxelMap:
     stage: NDArray[np.intp]
     chip: NDArray[np.intp]
     sign: NDArray[np.int32]
-    lowest: NDArray[np.int64]
-    highest: NDArray[np.int64]
-    served: NDArray[np.bool_]
+    lowest: Integers
+    highest: Integers
+    served: Booleans
 
 
 def taxel_map(file: SkinFile) -> TaxelMap:
@@ -75,7 +76,7 @@ def taxel_map(file: SkinFile) -> TaxelMap:
     return TaxelMap(stage, chip_of, sign, lowest, highest, served)
 
 
-def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+def repeat_chance(noise: Floats) -> Floats:
     """The chance that a taxel's next reading is the same whole number.
 
     Args:
@@ -89,7 +90,7 @@ def repeat_chance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.where(variance < COARSE, coarse, fine))
 
 
-def stuck_limits(file: SkinFile) -> NDArray[np.int64]:
+def stuck_limits(file: SkinFile) -> Integers:
     """(chips,) equal readings in a row after which a chip is stuck.
 
     Only of a chip whose calibrated noise shows in whole counts, and of one whose bytes
@@ -123,7 +124,7 @@ class Decoder:
         """Map stages to taxels."""
         sizes = [chip.traits.frame_bytes for chip in file.chips]
         ends = np.cumsum(sizes, dtype=np.int64)
-        self._starts: NDArray[np.int64] = ends - sizes
+        self._starts: Integers = ends - sizes
         self._bytes = np.zeros(ends[-1], dtype=np.uint8)
         self._before = self._bytes.copy()
         self.rows = np.split(self._bytes, ends[:-1])
@@ -138,9 +139,7 @@ class Decoder:
         self.values = self._raw.take(self.taxels.stage)
         self.times = np.full(len(self.values), NEVER)
 
-    def _grouped(
-        self, chips: Sequence[ChipSpec]
-    ) -> list[tuple[ChipSpec, NDArray[np.uint8]]]:
+    def _grouped(self, chips: Sequence[ChipSpec]) -> list[tuple[ChipSpec, Bytes]]:
         """Neighbours of one kind, options and number of taxels, which one call parses:
         one of them, and the bytes (n, frame_bytes) of all."""
         groups = []
@@ -160,7 +159,7 @@ class Decoder:
         slots: Sequence[Slot],
         began: float,
         oldest: float,
-    ) -> NDArray[np.bool_]:
+    ) -> Booleans:
         """Parse the bytes of all chips into `values` and `times`.
 
         A chip that was read and serves damaged bytes, values that no touch reaches, or
@@ -199,7 +198,7 @@ class Decoder:
         self._raw[:-1] = np.concatenate(values, axis=None)
         self._intact[:-1] = np.concatenate(intact, axis=None)
 
-    def _stuck(self, fresh: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _stuck(self, fresh: Booleans) -> Booleans:
         """Which chips have served the same bytes for too long.
 
         Args:
@@ -251,13 +250,13 @@ class Baseline:
         """(n,) raw counts of the baseline."""
         return (self._now + (1 << (SCALE_BITS - 1))) >> SCALE_BITS
 
-    def above(self, raw: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    def above(self, raw: Counts) -> Counts:
         """Counts above the baseline (n,), 0 to 65535, by sign and dead band."""
         counts = (raw.astype(np.int32) - self.counts) * self._sign
         counts *= counts >= self._dead
         return np.asarray(np.minimum(counts, 65535), dtype=np.uint16)
 
-    def follow(self, raw: NDArray[np.uint16], valid: NDArray[np.bool_]) -> None:
+    def follow(self, raw: Counts, valid: Booleans) -> None:
         """Follow the drift of the `valid` taxels by a step; call it while nothing
         touches."""
         error = (raw.astype(np.int32) << SCALE_BITS) - self._now

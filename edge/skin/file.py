@@ -7,8 +7,8 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Counts, Floats
 from edge.chips.chip import ChipSpec, Defaults
 from edge.config import ConfigTable, parse_toml
 from edge.errors import InputError
@@ -76,11 +76,11 @@ class TaxelCalibration:
             None on a skin of one axis.
     """
 
-    baseline: NDArray[np.uint16]
-    noise: NDArray[np.float64]
+    baseline: Counts
+    noise: Floats
     taken: datetime | None = None
-    shear_baseline: NDArray[np.uint16] | None = None
-    shear_noise: NDArray[np.float64] | None = None
+    shear_baseline: Counts | None = None
+    shear_noise: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ def _array(
     key: str,
     layout: SkinLayout,
     numbers: str,
-) -> NDArray[np.float64]:
+) -> Floats:
     """A value for each taxel, from 0 to 65535."""
     try:
         array = np.array(table.get(key), dtype=np.float64)

@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 from types import FrameType
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from edge.arrays import Floats
 from edge.clock import Clock
 from edge.skin.skin import Skin
 from edge.touch.frame import Frame
@@ -24,7 +22,7 @@ STOP_S = 0.05
 class JointSource(Protocol):
     """A source of joint angles."""
 
-    def at(self, t: float) -> NDArray[np.float64] | None:
+    def at(self, t: float) -> Floats | None:
         """Angles (dof,) in radians at a time of the loop's clock; None where
         unknown."""
 

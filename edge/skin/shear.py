@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from edge.arrays import Booleans, Bytes, Counts
 from edge.chips.chip import UNUSED
 from edge.chips.three_axes import ZERO, axes
 from edge.skin.decoder import Baseline
@@ -16,7 +17,7 @@ LARGEST = 32767
 class SignedBaseline(Baseline):
     """The rest values of axes on which a force has two directions."""
 
-    def away(self, raw: NDArray[np.uint16]) -> NDArray[np.int16]:
+    def away(self, raw: Counts) -> NDArray[np.int16]:
         """Counts away from the baseline (n,); 0 within the dead band."""
         counts = raw.astype(np.int32) - self.counts
         counts *= np.abs(counts) >= self._dead
@@ -30,7 +31,7 @@ class ShearReader:
         raw: (taxels, 2) values of the last frame; of a taxel without a chip at rest.
     """
 
-    def __init__(self, file: SkinFile, rows: Sequence[NDArray[np.uint8]]) -> None:
+    def __init__(self, file: SkinFile, rows: Sequence[Bytes]) -> None:
         """Take the chips' buffers, in the file's order."""
         self._chips = []
         for chip, data in zip(file.chips, rows, strict=True):
@@ -38,7 +39,7 @@ class ShearReader:
             self._chips.append((data, len(chip.taxels), stages, chip.served))
         self._shape = file.layout.shape
         self.raw = np.full((file.layout.rows * file.layout.cols, 2), ZERO, np.uint16)
-        rest: NDArray[np.uint16] = self.raw  # the middle of the range
+        rest: Counts = self.raw  # the middle of the range
         noise: ArrayLike = 0.0
         calibration = file.calibration
         if calibration is not None and calibration.shear_baseline is not None:
@@ -48,7 +49,7 @@ class ShearReader:
         rate_hz = file.reading.rate_hz
         self._baseline = SignedBaseline(file.signal, rate_hz, rest.ravel(), noise)
 
-    def read(self, valid: NDArray[np.bool_], *, settled: bool) -> NDArray[np.int16]:
+    def read(self, valid: Booleans, *, settled: bool) -> NDArray[np.int16]:
         """The frame's shear (rows, cols, 2); 0 of taxels that are not valid.
 
         Args:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Counts
 from edge.bus.protocol import Adapter
 from edge.chips.chip import ChipSpec
 from edge.clock import Clock, SystemClock
@@ -226,11 +226,11 @@ class Skin:
         list(self._threads.map(BusReader.read, self.readers, deadlines))
         return self._assemble(t)
 
-    def raw(self) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+    def raw(self) -> tuple[Counts, Booleans]:
         """The last frame's raw values (rows, cols), and which of them are valid."""
         return self._decoder.values.reshape(self.layout.shape), self._valid
 
-    def raw_shear(self) -> NDArray[np.uint16] | None:
+    def raw_shear(self) -> Counts | None:
         """The last frame's raw shear (rows, cols, 2) of a skin of three axes."""
         if self._shear is None:
             return None

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Integers
 from edge.touch.active import Region
 from edge.touch.frame import Frame
 
@@ -15,7 +15,7 @@ SHORTEST = 0.2
 """Arrows are left out below this part of the frame's longest one."""
 
 
-def region_shear(frame: Frame, regions: Sequence[Region]) -> NDArray[np.int64] | None:
+def region_shear(frame: Frame, regions: Sequence[Region]) -> Integers | None:
     """(rows, cols, 2) shear of the taxels in contact; None on a skin of one axis."""
     if frame.shear is None:
         return None
@@ -25,7 +25,7 @@ def region_shear(frame: Frame, regions: Sequence[Region]) -> NDArray[np.int64] |
     return np.asarray(frame.shear.astype(np.int64) * touched[:, :, None])
 
 
-def characters(shear: NDArray[np.int64]) -> list[list[str]]:
+def characters(shear: Integers) -> list[list[str]]:
     """An arrow, or an empty text, for each column of each two rows of taxels."""
     lines = []
     longest = np.hypot(shear[..., 0], shear[..., 1]).max()

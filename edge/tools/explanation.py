@@ -7,16 +7,15 @@ nearer feature f brings the touch to the trial than its mean would.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Booleans, Floats, Integers
 from edge.files import parsing
 from edge.model.graph import Graph
 from edge.model.model import Model
 
-Floats = NDArray[np.float64]
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
 """Multiples of the change at which two trials become equally near. A further trial on
 the way may take less, several votes more."""
@@ -36,12 +35,12 @@ class Space(NamedTuple):
             off.
     """
 
-    columns: NDArray[np.int64]
+    columns: Integers
     mean: Floats
     gain: Floats
     weights: Floats
     rows: Floats
-    labels: NDArray[np.int64]
+    labels: Integers
     reach: float = np.inf
     limit: float = np.inf
 
@@ -65,7 +64,7 @@ class Space(NamedTuple):
             )
             last = len(model.decision_points_s) - 1
 
-            def value(name: str) -> NDArray[Any]:
+            def value(name: str) -> Array:
                 return graph.run([name], {"decision_point": np.array([last])})[0]
 
             unit = value(graph.makers[f"{task}_distances"].inputs[1])
@@ -245,7 +244,7 @@ class _Touch:
         label = int(self.space.labels[row])
         return Near(row, label, distance, self.pulls(self.space.rows[row]))
 
-    def nearest(self, among: NDArray[np.bool_]) -> int:
+    def nearest(self, among: Booleans) -> int:
         """The nearest training trial of some (n,)."""
         return int(np.where(among, self.squares, np.inf).argmin())
 

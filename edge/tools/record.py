@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Floats
 from edge.classifier import Classifier
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
@@ -167,12 +167,12 @@ def recording(frames: list[Frame], meta: dict[str, Any]) -> Recording:
     )
 
 
-def _stacked(frames: list[Frame], field: str) -> NDArray[Any]:
+def _stacked(frames: list[Frame], field: str) -> Array:
     """A field of all frames, along the first axis."""
     return np.array([getattr(frame, field) for frame in frames])
 
 
-def _angles(frames: list[Frame]) -> NDArray[np.float64] | None:
+def _angles(frames: list[Frame]) -> Floats | None:
     """(n, dof) joint angles; None where no frame has any."""
     measured = [frame.joints for frame in frames if frame.joints is not None]
     if not measured:

@@ -1,11 +1,10 @@
 """A model file with other constants and other metadata."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array
 from edge.model.graph import TYPES
 from edge.model.onnx_file import (
     GRAPH,
@@ -20,7 +19,7 @@ from edge.model.onnx_file import (
 
 def rewritten(
     data: bytes,
-    constants: Mapping[str, NDArray[Any]],
+    constants: Mapping[str, Array],
     metadata: Mapping[str, str],
 ) -> bytes:
     """A model's bytes with other values of some constants, and other metadata."""
@@ -39,7 +38,7 @@ def rewritten(
 
 
 def _constants_changed(
-    graph: memoryview, constants: Mapping[str, NDArray[Any]]
+    graph: memoryview, constants: Mapping[str, Array]
 ) -> Iterator[bytes | memoryview]:
     kinds = {np.dtype(kind): number for number, kind in TYPES.items()}
     for number, value, unchanged in fields_of(graph):

@@ -12,19 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Booleans, Floats, Integers
 from edge.errors import InputError, about, printable
 from edge.files import parsing
-from edge.model.graph import Array, Graph, coordinates_of
+from edge.model.graph import Graph, coordinates_of
 from edge.model.info import METADATA_KEY, ModelInfo, Task
 from edge.model.metadata import to_json
 from edge.model.model import Model
 from edge.model.onnx_file import Node
 from edge.tools.rewriting import rewritten
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Labels = Mapping[str, str]
 """{task: label} of a trial."""
 NOVELTY_COLUMNS = "columns of novelty"
@@ -228,7 +226,7 @@ def _far_outside(name: str) -> InputError:
     )
 
 
-def within_reach(graph: Graph, task: str, z: Floats) -> NDArray[np.bool_]:
+def within_reach(graph: Graph, task: str, z: Floats) -> Booleans:
     """(m,) which trials at coordinates z (points, m, components) may become rows.
 
     Squared distances add up exactly, as long as no row is longer than the longest row

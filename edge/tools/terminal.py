@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Bytes, Floats
 from edge.commands.output import counted
 from edge.skin.loop import Stop
 from edge.touch.active import Region
@@ -21,7 +21,7 @@ from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 from edge.touch.region import find_regions
 
-Colours = NDArray[np.uint8]
+Colours = Bytes
 """Numbers in the 256-colour palette."""
 CLEAR = "\x1b[2J"
 HOME = "\x1b[H"
@@ -67,7 +67,7 @@ def skin_colours(
     return colours, regions
 
 
-def _shades(palette: Sequence[int], share: NDArray[np.float64]) -> Colours:
+def _shades(palette: Sequence[int], share: Floats) -> Colours:
     """A palette's colour for each share from 0 to 1; others get the colour of the
     nearer end."""
     steps = np.clip(share, 0.0, 1.0) * (len(palette) - 1)

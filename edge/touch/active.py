@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+
+from edge.arrays import Array, Booleans
 
 MOST_STEPS = 32
 """Steps of one taxel that a flood takes; more would cost as much as labelling all."""
@@ -36,11 +37,11 @@ class Grid:
         self._rows = [row << (i * self.stride) for i in range(rows)]
         self._columns = [column << i for i in range(cols)]
 
-    def pack(self, active: NDArray[np.bool_]) -> int:
+    def pack(self, active: Booleans) -> int:
         """The set of a bool array (rows, stride) whose last column is False."""
         return int.from_bytes(np.packbits(active, None, "little").tobytes(), "little")
 
-    def unpack(self, bits: int) -> NDArray[np.bool_]:
+    def unpack(self, bits: int) -> Booleans:
         """The set as a bool array (rows, cols)."""
         size = self.rows * self.stride
         packed = np.frombuffer(bits.to_bytes((size + 7) // 8, "little"), dtype=np.uint8)
@@ -145,7 +146,7 @@ class Region:
         return rows / self.area, cols / self.area
 
     @cached_property
-    def mask(self) -> NDArray[np.bool_]:
+    def mask(self) -> Booleans:
         """(rows, cols), True on the region's taxels."""
         return self._grid.unpack(self.bits)
 
@@ -170,10 +171,10 @@ class ActiveTaxels:
 
     def __init__(
         self,
-        counts: NDArray[Any],
-        threshold: int | NDArray[Any],
+        counts: Array,
+        threshold: int | Array,
         *,
-        valid: NDArray[np.bool_] | None = None,
+        valid: Booleans | None = None,
         wraps: bool = True,
     ) -> None:
         """Take the arguments of `edge.touch.region.find_regions`."""

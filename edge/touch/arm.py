@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from edge.arrays import Floats
 from edge.config import ConfigTable, read_toml, shown
 from edge.errors import InputError, about
 
@@ -96,7 +97,7 @@ class Chain:
             fixed = fixed @ _transform(joint.translate, ZERO)
         self._tip: list[list[float]] = fixed[:3].tolist()
 
-    def pose(self, q: ArrayLike) -> NDArray[np.float64]:
+    def pose(self, q: ArrayLike) -> Floats:
         """Pose of the tip in the base's frame.
 
         Rotations follow Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2. It is
@@ -254,7 +255,7 @@ def _check_joint(joint: Joint) -> None:
         )
 
 
-def _transform(xyz: Vector, rpy: Vector) -> NDArray[np.float64]:
+def _transform(xyz: Vector, rpy: Vector) -> Floats:
     """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y,
     z."""
     cr, cp, cy = map(math.cos, rpy)

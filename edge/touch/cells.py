@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Integers
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -39,12 +40,12 @@ class Cells:
         self._alive = np.flatnonzero(self._pooled(layout.alive))
         self.count = len(self._alive)
 
-    def read(self, frame: Frame) -> NDArray[np.int64]:
+    def read(self, frame: Frame) -> Integers:
         """(count,) sums of a frame."""
         counts = frame.counts if frame.valid is None else frame.counts * frame.valid
         return self._pooled(counts).take(self._alive)
 
-    def _pooled(self, counts: NDArray[np.generic]) -> NDArray[np.int64]:
+    def _pooled(self, counts: NDArray[np.generic]) -> Integers:
         lines = np.add.reduceat(counts.astype(np.int64), self._rows, axis=0)
         return np.asarray(np.add.reduceat(lines, self._cols, axis=1))
 

@@ -9,12 +9,13 @@ connectivity algorithm, 1982). The rounds are few, and each is linear in the run
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Integers = NDArray[np.intp]
+from edge.arrays import Array, Booleans, Integers
+
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -27,22 +28,22 @@ class Components:
         labels: (runs,) component of each run, from 0 in the order of first taxels.
     """
 
-    starts: Integers
-    lengths: Integers
-    labels: Integers
+    starts: Indices
+    lengths: Indices
+    labels: Indices
 
     @cached_property
-    def of_taxel(self) -> Integers:
+    def of_taxel(self) -> Indices:
         """(taxels,) component of each active taxel, by rising index."""
         return self.labels.repeat(self.lengths)
 
     @cached_property
-    def areas(self) -> Integers:
+    def areas(self) -> Indices:
         """(components,) taxels of each."""
         return np.bincount(self.of_taxel)
 
 
-def components_of(active: NDArray[np.bool_], wraps: bool) -> Components:
+def components_of(active: Booleans, wraps: bool) -> Components:
     """The components of active taxels.
 
     Args:
@@ -73,7 +74,7 @@ def components_of(active: NDArray[np.bool_], wraps: bool) -> Components:
     return Components(starts, ends - starts, labels)
 
 
-def _roots(count: int, first: Integers, second: Integers) -> Integers:
+def _roots(count: int, first: Indices, second: Indices) -> Indices:
     """(count,) the lowest member of the component of each member.
 
     Args:
@@ -100,9 +101,9 @@ def _roots(count: int, first: Integers, second: Integers) -> Integers:
 
 def _peaks(
     components: Components,
-    active: NDArray[np.bool_],
-    counts: NDArray[Any],
-) -> NDArray[np.int64]:
+    active: Booleans,
+    counts: Array,
+) -> Integers:
     """(components,) the largest count of each."""
     peaks = np.full(len(components.areas), counts.min(), dtype=np.int64)
     np.maximum.at(peaks, components.of_taxel, counts[active[:, :-1]])
@@ -110,8 +111,8 @@ def _peaks(
 
 
 def all_of(
-    active: NDArray[np.bool_],
-    counts: NDArray[Any],
+    active: Booleans,
+    counts: Array,
     wraps: bool,
 ) -> list[tuple[int, int]]:
     """Taxels, as the bits of `edge.touch.active.Grid`, and peak of each component.
@@ -132,11 +133,11 @@ def all_of(
 
 
 def largest_of(
-    active: NDArray[np.bool_],
-    counts: NDArray[Any],
+    active: Booleans,
+    counts: Array,
     wraps: bool,
-    previous: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+    previous: Booleans,
+) -> Booleans:
     """The taxels of the component that `edge.touch.region.largest_region` returns.
 
     Args:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Counts, Floats, Integers
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.feature import OF_PAPER, PAPER, Feature
@@ -59,20 +60,20 @@ class FeatureSeries:
             None.
     """
 
-    t: NDArray[np.float64]
-    peak: NDArray[np.int64]
-    area: NDArray[np.int64]
-    sums: NDArray[np.int64]
-    motion: NDArray[np.float64]
-    same: NDArray[np.bool_]
-    beside: NDArray[np.bool_]
+    t: Floats
+    peak: Integers
+    area: Integers
+    sums: Integers
+    motion: Floats
+    same: Booleans
+    beside: Booleans
     layout: SkinLayout
     ended: bool = False
-    zones: dict[str, NDArray[np.int64]] = field(default_factory=dict)
-    force_motion: NDArray[np.float64] | None = None
-    taxels: NDArray[np.int64] | None = None
-    kernel_cells: NDArray[np.int64] | None = None
-    joints: NDArray[np.float64] | None = None
+    zones: dict[str, Integers] = field(default_factory=dict)
+    force_motion: Floats | None = None
+    taxels: Integers | None = None
+    kernel_cells: Integers | None = None
+    joints: Floats | None = None
 
     def felt(self, window_s: float) -> Self:
         """The frames in which the contact is felt, up to the end of the window.
@@ -195,13 +196,13 @@ class Contact:
         self.late = False
         self.missing_taxels = False
         self.missing_pose = False
-        self.joints: NDArray[np.float64] | None = None
+        self.joints: Floats | None = None
         self._measurer = measurer
         self._rows: list[dict[str, Any]] = []
         """One dict per frame, keyed like `FeatureSeries`; `counted` (m,) holds the whole
         numbers of region and zones."""
         self._starts: dict[str, Vector] = {}
-        self._before: NDArray[np.uint16] | None = None
+        self._before: Counts | None = None
         """The counts of the last frame."""
 
     def add(
@@ -291,7 +292,7 @@ class Contact:
         self,
         name: str,
         centroid: tuple[float, float],
-        joints: NDArray[np.float64] | None,
+        joints: Floats | None,
     ) -> float:
         """Distance from where this centroid was first seen; NaN without a pose."""
         position = self._located(centroid, joints)
@@ -303,7 +304,7 @@ class Contact:
     def _located(
         self,
         centroid: tuple[float, float],
-        joints: NDArray[np.float64] | None,
+        joints: Floats | None,
     ) -> Vector | None:
         """Where a point of the skin lies; None if an arm's angles are not known."""
         point = self.layout.position(*centroid)

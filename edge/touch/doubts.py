@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from edge.arrays import Booleans, Floats
 
 if TYPE_CHECKING:
     from edge.touch.contact import FeatureSeries
@@ -69,14 +70,14 @@ def frame_doubts(
     return doubts
 
 
-def _median(values: NDArray[np.float64]) -> float:
+def _median(values: Floats) -> float:
     """numpy's own would import numpy.ma, in the midst of the first decision."""
     ordered = np.sort(values)
     middle = len(ordered) // 2
     return float(0.5 * (ordered[middle] + ordered[~middle]))
 
 
-def _longest_run(t: NDArray[np.float64], repeated: NDArray[np.bool_]) -> float:
+def _longest_run(t: Floats, repeated: Booleans) -> float:
     """Longest time in which each frame repeats the one before it."""
     changed = t[~repeated]
     if not len(changed):
@@ -85,7 +86,7 @@ def _longest_run(t: NDArray[np.float64], repeated: NDArray[np.bool_]) -> float:
     return float((t - began).max())
 
 
-def _beyond(angles: NDArray[np.float64], limits: Limits) -> bool:
+def _beyond(angles: Floats, limits: Limits) -> bool:
     """Whether a joint angle lies beyond its limits."""
     for column, limit in zip(angles.T, limits, strict=False):
         if limit is None:

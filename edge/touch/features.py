@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Floats
 from edge.errors import InputError, OutOfRange
 from edge.touch.contact import FeatureSeries, feature_types
 from edge.touch.feature import PAPER, Feature, not_measured
@@ -66,7 +66,7 @@ def feature_vector(
     samples: int = SAMPLES,
     features: Sequence[str] = FEATURES,
     tables: Mapping[str, KernelTable] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """The features of the window from onset to onset + window, one after another.
 
     >>> import edge
@@ -147,13 +147,13 @@ class _Course:
         return self.series.layout.counts_per_newton or 1.0
 
     @cached_property
-    def _zones(self) -> dict[str, dict[str, NDArray[Any]]]:
+    def _zones(self) -> dict[str, dict[str, Array]]:
         from edge.touch import zones  # the paper's features need none
 
         series = self.series
         return zones.quantities_of(series.zones, series.force_motion, series.layout)
 
-    def block(self, group: tuple[Feature, ...], samples: int) -> NDArray[np.float64]:
+    def block(self, group: tuple[Feature, ...], samples: int) -> Floats:
         """Values of features of one kind, one after another."""
         first = group[0]
         if first.kernels:
@@ -178,8 +178,8 @@ class _Course:
     def _sampled(
         self,
         group: tuple[Feature, ...],
-        times: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+        times: Floats,
+    ) -> Floats:
         """(rows, times) features of one value a frame, or of one wide feature."""
         first = group[0]
         t = self.series.t
@@ -203,7 +203,7 @@ class _Course:
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled
 
-    def _measured(self, feature: Feature) -> NDArray[Any]:
+    def _measured(self, feature: Feature) -> Array:
         """(n,) or (n, values) of a feature in every frame; NaN where it cannot be
         known."""
         series = self.series
@@ -225,10 +225,10 @@ class _Course:
 
 
 def _resample(
-    times: NDArray[np.float64],
-    t: NDArray[np.float64],
-    values: NDArray[Any],
-) -> NDArray[np.float64]:
+    times: Floats,
+    t: Floats,
+    values: Array,
+) -> Floats:
     """Values (..., n) at the increasing times `t`, interpolated to `times`.
 
     They never overshoot their neighbours. The fraction of a step is computed before it

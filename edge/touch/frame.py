@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Counts, Floats
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:
@@ -15,14 +17,14 @@ class Frame:
 
     t: float
     """Seconds on a clock that never goes back."""
-    counts: NDArray[np.uint16]
+    counts: Counts
     """(rows, cols), above baseline."""
-    valid: NDArray[np.bool_] | None = None
+    valid: Booleans | None = None
     """(rows, cols), which taxels could be read; None where all could."""
-    times: NDArray[np.float64] | None = None
+    times: Floats | None = None
     """(rows, cols), when each taxel was read, in seconds; None where all were read at
     `t`."""
-    joints: NDArray[np.float64] | None = None
+    joints: Floats | None = None
     """(dof,) radians at `t`; None where unknown."""
     shear: NDArray[np.int16] | None = None
     """(rows, cols, 2) tangential counts along the rows and around the columns; None on

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Floats
 from edge.errors import InputError
 from edge.touch.frame import Frame
 
@@ -38,7 +38,7 @@ class JointAngles:
     def __init__(self, count: int) -> None:
         self.count = count
 
-    def read(self, frame: Frame) -> NDArray[np.float64]:
+    def read(self, frame: Frame) -> Floats:
         """(count,) angles of a frame; NaN where they are not known.
 
         Raises:

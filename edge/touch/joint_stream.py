@@ -24,9 +24,9 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from edge.address import parse_address
+from edge.arrays import Floats
 from edge.config import parse_json
 from edge.errors import InputError
 from edge.files import refusing
@@ -83,7 +83,7 @@ class Joints:
         self._names = names
         self._now = now
         self._rest = b""
-        self._poses: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=64)
+        self._poses: deque[tuple[float, Floats]] = deque(maxlen=64)
         self._recent: deque[float] = deque(maxlen=RECENT)
         """Arrival minus t of the last lines."""
         self._ended = False
@@ -92,7 +92,7 @@ class Joints:
         self.problem = ""
         """The fault of the last of them."""
 
-    def at(self, t: float) -> NDArray[np.float64] | None:
+    def at(self, t: float) -> Floats | None:
         """Angles (dof,) at a time of the loop's clock, or None where unknown.
 
         They are interpolated between two lines; after the last line its angles hold for

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.cells import KERNEL_CELLS, Cells
@@ -93,7 +94,7 @@ class KernelTable:
 
 
 @lru_cache
-def convolution_of_bias(biases: int) -> NDArray[np.int64]:
+def convolution_of_bias(biases: int) -> Integers:
     """(biases,) the convolution that each bias belongs to, from the number of
     biases."""
     repeats = np.repeat(BIASES[biases], len(WEIGHTS))
@@ -101,7 +102,7 @@ def convolution_of_bias(biases: int) -> NDArray[np.int64]:
 
 
 @lru_cache
-def _inside() -> NDArray[np.bool_]:
+def _inside() -> Booleans:
     """(convolutions, samples) whether a sample counts.
 
     Every other kernel counts only where all its taps lie inside the window; the rest
@@ -115,7 +116,7 @@ def _inside() -> NDArray[np.bool_]:
 
 
 @lru_cache
-def _samples_of_bias(biases: int) -> NDArray[np.int64]:
+def _samples_of_bias(biases: int) -> Integers:
     """(biases,) how many samples count, from the number of biases."""
     samples = np.count_nonzero(_inside(), axis=1)
     return np.asarray(samples[convolution_of_bias(biases)])
@@ -136,7 +137,7 @@ def _mixes(channels: int) -> NDArray[np.float32]:
     return mixes
 
 
-def shifted(channels: NDArray[np.int64], shifts: Sequence[int]) -> NDArray[np.int32]:
+def shifted(channels: Integers, shifts: Sequence[int]) -> NDArray[np.int32]:
     """Channels (c, samples) times powers of two, cut off at the largest number of
     `BITS` bits."""
     by = np.array(shifts)[:, None]
@@ -160,7 +161,7 @@ def convolved(channels: NDArray[np.int32]) -> NDArray[np.int32]:
     return results.reshape(CONVOLUTIONS, SAMPLES)
 
 
-def shares(channels: NDArray[np.int64], table: KernelTable) -> NDArray[np.float64]:
+def shares(channels: Integers, table: KernelTable) -> Floats:
     """(biases,) share of the samples at which each kernel's result is above its bias.
 
     Args:
@@ -181,7 +182,7 @@ def shares_of(
     window_s: float,
     name: str,
     tables: Mapping[str, KernelTable],
-) -> NDArray[np.float64]:
+) -> Floats:
     """The `shares` of a feature in a contact's window, by its table.
 
     Raises:
@@ -197,7 +198,7 @@ def kernel_channels(
     series: FeatureSeries,
     window_s: float,
     name: str,
-) -> NDArray[np.int64]:
+) -> Integers:
     """(channels, `edge.touch.SAMPLES`) numbers to which a feature's kernels are
     applied.
 
@@ -212,7 +213,7 @@ def kernel_channels(
     Raises:
         InputError: the feature was not measured.
     """
-    rows: NDArray[np.int64] | None = series.kernel_cells
+    rows: Integers | None = series.kernel_cells
     if name == "zone_kernels":
         complete = len(series.zones) == len(ZONES)
         zones = [sums[:, :ZONE_WIDTH] for sums in series.zones.values()]

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans
 from edge.config import ConfigTable
 from edge.errors import InputError, about
 
@@ -75,7 +75,7 @@ class SkinLayout:
             )
 
     @cached_property
-    def alive(self) -> NDArray[np.bool_]:
+    def alive(self) -> Booleans:
         """(rows, cols), False on the dead taxels."""
         alive = np.ones(self.rows * self.cols, dtype=np.bool_)
         alive[list(self.dead)] = False

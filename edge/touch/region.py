@@ -1,19 +1,17 @@
 """Contact regions of a frame: threshold, connected components, the largest one."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Booleans
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 
 
 def find_regions(
-    counts: NDArray[Any],
-    threshold: int | NDArray[Any],
+    counts: Array,
+    threshold: int | Array,
     *,
-    valid: NDArray[np.bool_] | None = None,
+    valid: Booleans | None = None,
     wraps: bool = True,
 ) -> list[Region]:
     """All regions of connected taxels above the threshold.
@@ -41,10 +39,10 @@ def find_regions(
 
 
 def largest_region(
-    counts: NDArray[Any],
-    threshold: int | NDArray[Any],
+    counts: Array,
+    threshold: int | Array,
     *,
-    valid: NDArray[np.bool_] | None = None,
+    valid: Booleans | None = None,
     wraps: bool = True,
     previous: Region | None = None,
 ) -> Region | None:
@@ -65,9 +63,9 @@ def largest_region(
 
 
 def _active(
-    counts: NDArray[Any],
-    threshold: int | NDArray[Any],
-    valid: NDArray[np.bool_] | None,
+    counts: Array,
+    threshold: int | Array,
+    valid: Booleans | None,
     wraps: bool,
 ) -> ActiveTaxels:
     """The active taxels of arrays that suit one another."""

@@ -7,11 +7,10 @@ counts alone.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Array, Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout
 
@@ -23,9 +22,9 @@ the zone's other numbers."""
 
 def sums(
     shear: NDArray[np.int16] | None,
-    mask: NDArray[np.bool_],
+    mask: Booleans,
     columns: slice,
-    turned: NDArray[np.int64],
+    turned: Integers,
 ) -> list[int]:
     """The `WIDTH` whole numbers of a zone.
 
@@ -48,7 +47,7 @@ def sums(
     return [along, around, int(rows @ by_row[:, 1]), int(turned @ by_column[:, 0])]
 
 
-def quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:
+def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
     """{quantity: (n,)} of a zone's shear; everything is 0 where the zone is empty.
 
     `shear_along`, `shear_around` and `shear_size` are the components and the length of
@@ -76,11 +75,11 @@ def quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray
 
 
 def _twist(
-    force: NDArray[np.int64],
-    moment: NDArray[np.int64],
-    places: NDArray[np.int64],
-    shear: NDArray[np.int64],
-) -> NDArray[np.float64]:
+    force: Integers,
+    moment: Integers,
+    places: Integers,
+    shear: Integers,
+) -> Floats:
     """A moment (n,) about the centroid `places / force`, from that about the origin.
 
     The difference is taken in whole numbers, so nothing cancels.

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from edge.arrays import Counts, Floats
 
 QUIET_S = 0.1
 """The time from the start of a recording that is taken to lie before the contact."""
@@ -15,7 +14,7 @@ contact."""
 HIGHEST = 65534
 
 
-def noise(t: NDArray[np.float64], frames: NDArray[np.uint16]) -> int:
+def noise(t: Floats, frames: Counts) -> int:
     """The largest count in the first `QUIET_S`; of slow recordings this is one
     frame."""
     return int(frames[t < t[0] + QUIET_S].max(initial=0))
@@ -28,8 +27,8 @@ def above(level: float, margin: float = MARGIN) -> tuple[int, int]:
 
 
 def doubt(
-    t: NDArray[np.float64],
-    frames: NDArray[np.uint16],
+    t: Floats,
+    frames: Counts,
     skin: dict[str, Any],
     onset: int,
 ) -> str | None:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Booleans, Integers
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
@@ -134,7 +134,7 @@ class ContactTracker:
         """The contacts that only the end of the stream confirms."""
         return []
 
-    def _active(self, frame: Frame, valid: NDArray[np.bool_] | None) -> ActiveTaxels:
+    def _active(self, frame: Frame, valid: Booleans | None) -> ActiveTaxels:
         return ActiveTaxels(
             frame.counts,
             self.layout.threshold_counts,
@@ -262,7 +262,7 @@ class StillTaxels:
             self._next_s = frame.t + CHECK_S
             self._look(frame, active)
 
-    def _take_back(self, frame: Frame, active: NDArray[np.bool_]) -> None:
+    def _take_back(self, frame: Frame, active: Booleans) -> None:
         change = np.abs(frame.counts - self._levels)
         most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
         self.touched = bool((self.aside & (change > most)).any())
@@ -280,11 +280,11 @@ class StillTaxels:
         if still.any() and not self.touched:
             self._set_aside(frame, still)
 
-    def _near(self, frame: Frame, counts: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _near(self, frame: Frame, counts: Integers) -> Booleans:
         most = np.maximum(0.5 * self._threshold, STILL_SHARE * counts)
         return np.asarray(np.abs(frame.counts - counts) <= most)
 
-    def _set_aside(self, frame: Frame, taxels: NDArray[np.bool_]) -> None:
+    def _set_aside(self, frame: Frame, taxels: Booleans) -> None:
         np.copyto(self._levels, frame.counts, where=taxels & ~self.aside)
         self.aside = self.aside | taxels
 

@@ -1,11 +1,10 @@
 """Transforms and summaries of a feature's samples."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from edge.arrays import Array, Floats
 from edge.touch.feature import Feature
 from edge.touch.layout import SkinLayout
 
@@ -35,10 +34,10 @@ def _floor(feature: Feature, layout: SkinLayout) -> float:
 
 
 def transformed(
-    values: NDArray[Any],
+    values: Array,
     group: Sequence[Feature],
     layout: SkinLayout,
-) -> NDArray[Any]:
+) -> Array:
     """Samples (rows, times) after the transforms of their features, which are of one
     kind."""
     floors = np.array([[_floor(feature, layout)] for feature in group])
@@ -50,11 +49,11 @@ def transformed(
 
 
 def _transformed(
-    values: NDArray[np.float64],
+    values: Floats,
     transform: str,
-    floors: NDArray[np.float64],
+    floors: Floats,
     wide: bool,
-) -> NDArray[np.float64]:
+) -> Floats:
     """A transform of samples (rows, times); `wide` rows are those of one feature."""
     if transform == "log":
         above = values + floors
@@ -68,10 +67,10 @@ def _transformed(
 
 
 def summarised(
-    values: NDArray[np.float64],
+    values: Floats,
     summary: str,
     step_s: float,
-) -> NDArray[Any]:
+) -> Array:
     """A summary of samples (rows, times) that are `step_s` apart."""
     if summary == "rate":
         return np.asarray(np.gradient(values, step_s, axis=1))

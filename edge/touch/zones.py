@@ -4,11 +4,11 @@ make."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Array, Floats, Integers
 from edge.touch.active import ActiveTaxels, Region, best_cut
 from edge.touch.feature import Feature
 from edge.touch.layout import SkinLayout
@@ -83,7 +83,7 @@ class Zones:
                 row += self._shear_sums(shear, mask, half, turned)
         return row
 
-    def split(self, rows: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    def split(self, rows: Integers) -> dict[str, Integers]:
         """{zone: (n, width)} of the numbers (n, zones * width) of frames."""
         return dict(
             zip(self.names, np.split(rows, len(self.names), axis=1), strict=True)
@@ -91,10 +91,10 @@ class Zones:
 
 
 def quantities_of(
-    zones: Mapping[str, NDArray[np.int64]],
-    force_motion: NDArray[np.float64] | None,
+    zones: Mapping[str, Integers],
+    force_motion: Floats | None,
     layout: SkinLayout,
-) -> dict[str, dict[str, NDArray[Any]]]:
+) -> dict[str, dict[str, Array]]:
     """{zone: {quantity: (n,)}} of a `FeatureSeries`."""
     values = {zone: quantities(sums, layout) for zone, sums in zones.items()}
     if "skin" in values and force_motion is not None:
@@ -103,7 +103,7 @@ def quantities_of(
     return values
 
 
-def quantities(sums: NDArray[np.int64], layout: SkinLayout) -> dict[str, NDArray[Any]]:
+def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
     """{quantity: (n,)} of a zone, from its whole numbers, those of shear included.
 
     The centroid of an empty zone is NaN, everything else of it 0.

@@ -12,6 +12,7 @@ from matplotlib import style
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
+from edge.arrays import Floats
 from edge.classifier import Classifier
 from edge.errors import InputError, about
 from edge.events import Decided
@@ -25,7 +26,6 @@ from edge.writing import write_whole
 from train.arms import arm_of
 from train.dataset import contacts
 from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
-from train.vectors import Floats
 
 MOST = 6
 """More columns would not be readable at the width of a page."""

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from edge.arrays import Floats
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
-from train.vectors import Floats
 
 DEPTH_M = 0.12
 STANDS_M = 0.15

@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from edge.arrays import Floats
 from edge.errors import InputError
 from edge.model.info import ModelInfo
 from edge.writing import write_whole
@@ -15,7 +16,6 @@ from train.draw.recording import PLAIN_TEXT, UNITS
 from train.draw.sketch import link_positions
 from train.report.section import counted
 from train.touch_map import Touch, TouchMap
-from train.vectors import Floats
 
 VIEWS = ((0, 1, "from above"), (0, 2, "from the side"))
 MARKERS = "osD^vP*X<>ph"

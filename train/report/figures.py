@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 from sklearn.metrics import confusion_matrix
 
+from edge.arrays import Floats, Integers
 from train.evaluate import Result
 from train.report.section import Figure
-from train.vectors import Floats, Integers, Strings
+from train.vectors import Strings
 
 STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#1f5fa8", "o", "-"),

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.touch.features import FEATURES
 from train.crossval import MAX_COMPONENTS, accuracies, neighbours
 from train.evaluate import Result, evaluate
 from train.pipeline import vote
 from train.search import SearchGrid
-from train.vectors import Booleans, Floats, Integers, Labels, Strings, Vectors
+from train.vectors import Labels, Strings, Vectors
 
 
 def percent(share: float) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from edge.arrays import Floats
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.contact import FeatureSeries
@@ -15,7 +16,6 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector
 from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.track import ContactTracker
-from train.vectors import Floats
 
 
 def follow(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.neighbors import NearestNeighbors
 
+from edge.arrays import Floats, Integers
 from edge.errors import printable
 from edge.touch import measures
 from train import outliers
@@ -21,7 +22,6 @@ from train.pipeline import Choice, squared_distances
 from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
 from train.report.score import interval
 from train.report.section import Row, Table, counted
-from train.vectors import Floats, Integers
 
 MISSING_SHARE = 0.02
 """Share of recordings without a contact above which the thresholds get a warning."""

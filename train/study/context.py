@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from edge.arrays import Floats
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.dataset import DataSet
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
-from train.vectors import Floats, Labels
+from train.vectors import Labels
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
+from edge.arrays import Floats, Integers
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
 from train.crossval import MAX_COMPONENTS, MAX_K
 from train.evaluate import Result, finest, group_folds, stratified_folds
@@ -19,7 +20,7 @@ from train.report.section import Row, Section, Table
 from train.search import SearchGrid
 from train.study.context import Context
 from train.study.sweeps import by_task
-from train.vectors import Floats, Integers, Labels
+from train.vectors import Labels
 
 PAPER = "the paper's method"
 SEARCHED = "the paper's method, best of its grid"

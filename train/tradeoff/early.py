@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import Stopping, StoppingRule
 from train.dataset import DataSet
 from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
@@ -14,7 +15,6 @@ from train.groups import TRIAL, groupable
 from train.report.score import paired
 from train.report.work import Workers
 from train.rules import Course, candidates
-from train.vectors import Booleans, Floats, Integers
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from edge.arrays import Booleans
 from edge.touch.measures import SHEAR, feature
 from train.choose import Chosen
 from train.dataset import DataSet
@@ -19,7 +20,6 @@ from train.report.work import Workers
 from train.tradeoff.choices import WINDOWS_S, Points, chosen, unseen
 from train.tradeoff.early import StoppingComparison, compare_stopping, soonest_s
 from train.tradeoff.wires import microcontroller
-from train.vectors import Booleans
 
 LEVELS = (0.8, 0.9, 0.95)
 """Accuracies for which the time is told."""
