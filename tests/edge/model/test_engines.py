@@ -19,7 +19,7 @@ from tests.export.test_graph import describe, fit, hard_set
 from train.pipeline import Choice
 
 MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
-RANDOM = int(os.environ.get("RANDOM_MODELS", "40"))
+RANDOM = int(os.environ.get("RANDOM_MODELS", "100"))
 """Random models of the test; RANDOM_MODELS=1000 tries as many."""
 
 
