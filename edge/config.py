@@ -22,10 +22,10 @@ _repr = reprlib.Repr()
 _repr.maxstring = _repr.maxother = 60
 
 
-def shown(value: object) -> str:
+def short_text(value: object) -> str:
     """A short text of a value for an error message, however large the value is.
 
-    >>> shown([1] * 1000)
+    >>> short_text([1] * 1000)
     '[1, 1, 1, 1, 1, 1, ...]'
     """
     try:
@@ -102,7 +102,7 @@ class ConfigTable:
     100.0
     >>> table.flag("verify_mux", True)
     True
-    >>> table.done()
+    >>> table.refuse_unknown()
     """
 
     def __init__(self, raw: object, where: str, prefix: str = "") -> None:
@@ -120,20 +120,22 @@ class ConfigTable:
         if not isinstance(raw, Mapping):
             name = prefix.rstrip(".: ") or ("" if ": " in where else "the file")
             thing = f"{where}: {name}" if name else where
-            raise InputError(f"{thing} must be a table, not {shown(raw)}")
+            raise InputError(f"{thing} must be a table, not {short_text(raw)}")
         self.raw = raw
         self.where = where
         self.prefix = prefix
         self._taken: list[str] = []
 
-    def called(self, key: str) -> str:
+    def key_name(self, key: str) -> str:
         """The name of a key in errors."""
         return f"{self.where}: {self.prefix}{key}"
 
     def fail(self, key: str, expected: str, value: object = REQUIRED) -> InputError:
         """Build the error for a bad value."""
         value = self.raw.get(key) if value is REQUIRED else value
-        return InputError(f"{self.called(key)} must be {expected}, not {shown(value)}")
+        return InputError(
+            f"{self.key_name(key)} must be {expected}, not {short_text(value)}"
+        )
 
     def has(self, key: str) -> bool:
         """Whether a key is given; null counts as absent."""
@@ -145,7 +147,7 @@ class ConfigTable:
         if self.has(key):
             return self.raw[key]
         if default is REQUIRED:
-            raise InputError(f"{self.called(key)} is missing")
+            raise InputError(f"{self.key_name(key)} is missing")
         return default
 
     def whole(
@@ -262,12 +264,12 @@ class ConfigTable:
             type(self)(x, self.where, f"{item} {i}: ") for i, x in enumerate(entries)
         ]
 
-    def done(self) -> None:
+    def refuse_unknown(self) -> None:
         """Refuse the keys that were never asked for."""
         unknown = [key for key in self.raw if key not in self._taken]
         if not unknown:
             return
-        key = shown(unknown[0])[1:-1]
+        key = short_text(unknown[0])[1:-1]
         if self.prefix.endswith("."):
             sentence = f"unknown key {self.prefix}{key}"
         else:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Counts, Floats
-from edge.config import parse_json, shown
+from edge.config import parse_json, short_text
 from edge.errors import InputError, about
 from edge.files import open_regular, parsing
 from edge.touch.frame import Frame
@@ -320,7 +320,7 @@ def load_meta(name: str, arrays: dict[str, Array]) -> dict[str, Any]:
         )
     meta = parse_json(raw.item(), f"{name}: meta")
     if not isinstance(meta, dict):
-        raise InputError(f"{name}: meta must be a JSON object, not {shown(meta)}")
+        raise InputError(f"{name}: meta must be a JSON object, not {short_text(meta)}")
     return meta
 
 

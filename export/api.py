@@ -158,7 +158,7 @@ def measure(fitted: Fitted) -> list[tuple[float, float]]:
 
 def _measured(fitted: Fitted, candidate: int) -> tuple[float, float]:
     choices = {task: chosen.picks[candidate] for task, chosen in fitted.chosen.items()}
-    dataset, vectors = fitted.taken(choices.values())
+    dataset, vectors = fitted.selection(choices.values())
     classifier = ContactClassifier.of(choices, vectors)
     of_candidate = replace(
         fitted,

@@ -84,7 +84,7 @@ class Fitted:
         their own."""
         return None if self.sequential is None else self.sequential.early
 
-    def taken(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
+    def selection(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
         """The trials, and their vectors, with the features and labels that some
         settings of the tasks take."""
         tasks = set(self.chosen)

@@ -145,7 +145,7 @@ def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
     for chosen in fitted.chosen.values():
         for by_task in chosen.by_fold:
             choices += by_task.values()
-    _, vectors = fitted.taken(choices)
+    _, vectors = fitted.selection(choices)
     answers = {}
     cases = []
     for task, chosen in fitted.chosen.items():

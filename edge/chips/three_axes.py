@@ -68,6 +68,6 @@ def three_axes(kind: type[Chip], table: ConfigTable) -> type[Chip]:
     if kind is Block:
         return ThreeAxisBlock
     raise InputError(
-        f"{table.called('kind')} is {kind.name}, which gives one axis; axes = 3 needs "
+        f"{table.key_name('kind')} is {kind.name}, which gives one axis; axes = 3 needs "
         'kind = "block"'
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from edge.config import ConfigTable, parse_json, shown
+from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError
 from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, Task
 from edge.touch.contact import feature_types
@@ -28,7 +28,7 @@ def from_json(text: str, name: str) -> ModelInfo:
         meta = ConfigTable(parse_json(text, where), where)
         if meta.whole("format") != FORMAT:
             raise InputError(
-                f"{where} is of format {shown(meta.raw['format'])}, but this "
+                f"{where} is of format {short_text(meta.raw['format'])}, but this "
                 f"edge-classify reads {FORMAT}"
             )
         info = _read(meta)
@@ -93,7 +93,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         several=meta.number("several", 1.0, low=0.0, high=1.0),
         taught=meta.whole("taught", 0, allowed=range(1 << 31)),
     )
-    tracking.done()
+    tracking.refuse_unknown()
     return info
 
 
@@ -115,7 +115,7 @@ def _task(table: ConfigTable) -> Task:
         no_contact=table.text("no_contact") if table.has("no_contact") else None,
         factors={factor: factors.wholes(factor) for factor in factors.raw},
     )
-    table.done()
+    table.refuse_unknown()
     return task
 
 

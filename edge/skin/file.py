@@ -133,7 +133,7 @@ def parse(text: str, where: str = "skin") -> SkinFile:
     name = skin.text("name", Path(where).stem or "skin")
     for key in fields(SkinLayout):
         skin.has(key.name)
-    skin.done()
+    skin.refuse_unknown()
     layout = SkinLayout.from_dict(skin.raw, where=where)
     signals = top.table("signal", {})
     sign = signals.whole("sign", allowed=(1, -1)) if signals.has("sign") else None
@@ -149,7 +149,7 @@ def parse(text: str, where: str = "skin") -> SkinFile:
         calibration = _calibration(top.table("calibration"), layout, chips)
     named = top.table("labels", {})
     labels = {task: named.texts(task) for task in named.raw}
-    top.done()
+    top.refuse_unknown()
     return SkinFile(name, layout, buses, signal, reading, calibration, where, labels)
 
 
@@ -176,7 +176,7 @@ def _signal(table: ConfigTable, layout: SkinLayout, defaults: Defaults) -> Signa
         saturation_counts=table.whole("saturation_counts", 65535, counts[1:]),
         dead=tuple(taxel_at(table, "dead", entry, layout) for entry in dead),
     )
-    table.done()
+    table.refuse_unknown()
     return signal
 
 
@@ -188,7 +188,7 @@ def _reading(table: ConfigTable) -> Reading:
         recheck_frames=table.whole("recheck_frames", 4, range(1, 100_001)),
         stuck_frames=table.whole("stuck_frames", 100, range(2, 1_000_001)),
     )
-    table.done()
+    table.refuse_unknown()
     return reading
 
 
@@ -206,13 +206,13 @@ def _calibration(
     if layout.axes:
         shear_rest = _array(table, "shear_baseline", layout, "pairs").astype(np.uint16)
         shear_noise = _array(table, "shear_noise", layout, "pairs")
-    table.done()
+    table.refuse_unknown()
     for chip in chips:
         highest = max(baseline.flat[chip.served], default=0)
         if highest > chip.traits.highest:
             # The skin had other chips when it was calibrated.
             raise InputError(
-                f"{table.called('baseline')} is {highest} for a taxel of a "
+                f"{table.key_name('baseline')} is {highest} for a taxel of a "
                 f"{chip.kind.name}, which tells at most {chip.traits.highest}; delete "
                 "[calibration], and calibrate again"
             )
@@ -236,7 +236,7 @@ def _array(
         allowed &= array == np.floor(array)
     if array.shape != shape or not allowed.all():
         raise InputError(
-            f"{table.called(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
+            f"{table.key_name(key)} must be {layout.rows} rows of {layout.cols} {numbers} "
             "from 0 to 65535; delete [calibration], and calibrate again"
         )
     return array

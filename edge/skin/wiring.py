@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from edge.bus import tca9548a
 from edge.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
 from edge.chips.kinds import KINDS, driver
-from edge.config import ConfigTable, shown
+from edge.config import ConfigTable, short_text
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout
 
@@ -60,13 +60,13 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     if serial and len(chips) > 1:
         raise InputError(
-            f"{table.called('chips')} has {len(chips)}; a serial port has one"
+            f"{table.key_name('chips')} has {len(chips)}; a serial port has one"
         )
     specs = tuple(_chip(chip, table, layout, sign, serial) for chip in chips)
     options = {name for spec in specs for name in spec.kind.options}
     for key in ("mux", "block", *options):
         table.has(key)
-    table.done()
+    table.refuse_unknown()
     return BusSpec(device, specs, clock_hz, serial)
 
 
@@ -81,7 +81,7 @@ def _port(table: ConfigTable) -> tuple[str, int]:
     port = table.text("serial")
     if table.has("device"):
         raise InputError(
-            f"{table.called('device')} is an I2C bus; give it or serial, not both"
+            f"{table.key_name('device')} is an I2C bus; give it or serial, not both"
         )
     return port, table.whole("baud", 115_200, range(1_200, 20_000_001))
 
@@ -95,7 +95,7 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
         raise table.fail("device", form)
     if isinstance(device, str) and SERIAL_PORT.fullmatch(device):
         raise InputError(
-            f"{table.called('device')} {device} is a serial port, not an I2C bus; "
+            f"{table.key_name('device')} {device} is a serial port, not an I2C bus; "
             "write serial = "
             f'"{device}" instead, with kind = "block"'
         )
@@ -131,7 +131,9 @@ def _chip(
         mux = table.whole("mux", allowed=tca9548a.ADDRESSES, form="#04x")
         channel = table.whole("channel", allowed=range(tca9548a.CHANNELS))
     elif table.has("channel"):
-        raise InputError(f"{table.called('channel')} needs mux, the address of the mux")
+        raise InputError(
+            f"{table.key_name('channel')} needs mux, the address of the mux"
+        )
     options = {
         name: table.whole(name, option.default, option.allowed)
         for name, option in kind.options.items()
@@ -141,7 +143,7 @@ def _chip(
     if sign is None:
         sign = kind.traits(len(taxels), options).defaults.sign
     sign = table.whole("sign", sign, (1, -1))
-    table.done()
+    table.refuse_unknown()
     return ChipSpec(kind, address, taxels, mux, channel, sign, options)
 
 
@@ -151,11 +153,11 @@ def _address(table: ConfigTable, kind: type[Chip], serial: bool) -> int:
         return table.whole("address", allowed=kind.addresses, form="#04x")
     if not kind.serial:
         raise InputError(
-            f"{table.called('kind')} is {kind.name}; a serial port carries block only"
+            f"{table.key_name('kind')} is {kind.name}; a serial port carries block only"
         )
     if table.has("address"):
         raise InputError(
-            f"{table.called('address')} has no meaning on a serial port; leave it out"
+            f"{table.key_name('address')} has no meaning on a serial port; leave it out"
         )
     return 0
 
@@ -167,13 +169,13 @@ def _check_taxels(
 ) -> None:
     if kind.stages is not None and len(taxels) != kind.stages:
         raise InputError(
-            f"{table.called('taxels')} names {len(taxels)} taxels, but an "
+            f"{table.key_name('taxels')} names {len(taxels)} taxels, but an "
             f"{kind.name.upper()} has {kind.stages} stages; write [] for a stage "
             "without a taxel"
         )
     if not 1 <= len(taxels) <= MOST_TAXELS:
         raise InputError(
-            f"{table.called('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
+            f"{table.key_name('taxels')} names {len(taxels)} taxels; a chip serves 1 to "
             f"{MOST_TAXELS}"
         )
 
@@ -185,7 +187,7 @@ def _taxels(table: ConfigTable, layout: SkinLayout) -> tuple[int, ...]:
     is_rectangle = all([table.has("first"), table.has("block")])
     if not (listed or is_rectangle):
         raise InputError(
-            f"{table.called('taxels')} is missing; give it, or first and block"
+            f"{table.key_name('taxels')} is missing; give it, or first and block"
         )
     key = "taxels" if listed else "first"
     taxels = table.get("taxels") if listed else _rectangle(table, layout)
@@ -224,7 +226,7 @@ def taxel_at(
     row, col = table.pair(key, value)
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
         raise InputError(
-            f"{table.called(key)} names taxel [{shown(row)}, {shown(col)}], which lies "
+            f"{table.key_name(key)} names taxel [{short_text(row)}, {short_text(col)}], which lies "
             f"outside of {layout.rows} x {layout.cols}"
         )
     return row, col

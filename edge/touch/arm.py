@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from edge.arrays import Floats
-from edge.config import ConfigTable, read_toml, shown
+from edge.config import ConfigTable, read_toml, short_text
 from edge.errors import InputError, about
 
 Vector = tuple[float, float, float]
@@ -209,7 +209,7 @@ class Chain:
         ]
         base = table.text("base", "base")
         tip = table.text("tip", "tip")
-        table.done()
+        table.refuse_unknown()
         with about(where):
             chain = cls(joints, base, tip)
         return chain
@@ -275,7 +275,7 @@ def _joint_from(table: ConfigTable, index: int) -> Joint:
     if table.has("name"):
         # The joints of a URDF have no order, so an error names the joint and not its
         # number.
-        table.prefix = f"joint {shown(name)}: "
+        table.prefix = f"joint {short_text(name)}: "
     steps = {key: _vector(table, key) for key in STEPS if table.has(key)}
     limits = None
     for key, unit in (("limits", 1.0), ("limits_deg", math.pi / 180.0)):
@@ -289,7 +289,7 @@ def _joint_from(table: ConfigTable, index: int) -> Joint:
         limits=limits,
         **steps,
     )
-    table.done()
+    table.refuse_unknown()
     return joint
 
 

@@ -89,7 +89,7 @@ class KernelTable:
         biases = KERNELS[name]
         shifts = table.numbers("shifts", channels, low=-48, high=BITS)
         limits = table.numbers("biases", biases, low=-(2**BIAS_BITS), high=2**BIAS_BITS)
-        table.done()
+        table.refuse_unknown()
         return cls(tuple(map(int, shifts)), tuple(map(int, limits)))
 
 

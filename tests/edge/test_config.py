@@ -8,7 +8,7 @@ from edge.config import (
     parse_json,
     parse_toml,
     read_toml,
-    shown,
+    short_text,
 )
 from edge.errors import InputError
 
@@ -70,7 +70,10 @@ def mistake(check):
             "a.npz: meta.arm must be a table, not 7",
         ),
         (lambda t: t.tables("n", "bus"), "read.n must be a list of tables, not 7"),
-        (lambda t: (t.whole("n"), t.done()), "unknown key read.a; allowed: n"),
+        (
+            lambda t: (t.whole("n"), t.refuse_unknown()),
+            "unknown key read.a; allowed: n",
+        ),
     ],
 )
 def test_each_mistake_is_one_sentence(check, sentence):
@@ -83,7 +86,7 @@ def test_what_is_right_is_taken_as_it_is():
     assert table.text("t") == "x"
     assert table.numbers("l") == (1.0, 2.5)
     assert table.whole("null", 3) == 3  # JSON's null is as good as none
-    table.done()
+    table.refuse_unknown()
 
 
 def test_a_table_in_a_list_is_called_by_its_number():
@@ -92,7 +95,7 @@ def test_a_table_in_a_list_is_called_by_its_number():
     with pytest.raises(
         InputError, match="f: bus 0: unknown key device; allowed: clock"
     ):
-        bus.done()
+        bus.refuse_unknown()
 
 
 @pytest.mark.parametrize(
@@ -132,5 +135,5 @@ def test_what_is_not_toml_is_one_sentence(text, reason, tmp_path):
 
 
 def test_a_value_is_shown_short():
-    assert len(shown("x" * 100_000)) < 80
-    assert len(shown([[1] * 100] * 100)) < 200
+    assert len(short_text("x" * 100_000)) < 80
+    assert len(short_text([[1] * 100] * 100)) < 200

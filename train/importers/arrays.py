@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
 
-from edge.config import shown
+from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
@@ -192,7 +192,7 @@ def _frames(arrays: Arrays, axis: int | None, time: str | None) -> int:
     if len(shared) == 1:
         return int(shared.pop())
     raise InputError(
-        f"which axis is the time? The arrays are {shown(sizes)}; give --axis, or name "
+        f"which axis is the time? The arrays are {short_text(sizes)}; give --axis, or name "
         "those to be used by --taxels and --joints"
     )
 
@@ -309,7 +309,7 @@ def _entries(arrays: Arrays) -> Arrays:
         raise InputError(EMPTY)
     if len(set(sizes.values())) != 1:
         raise InputError(
-            f"its arrays have {shown(sizes)} trials; leave out the arrays that do not "
+            f"its arrays have {short_text(sizes)} trials; leave out the arrays that do not "
             "have one entry for each trial"
         )
     return entries

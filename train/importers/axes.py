@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import shown
+from edge.config import short_text
 from edge.errors import InputError
 from train.importers.reading import Table, numbered
 
@@ -157,7 +157,7 @@ def parted(table: Table, normal: str) -> Parted:
     odd = axes.index[axes.isna().any(axis=1)]
     if len(odd):
         raise InputError(
-            f"{table.where}: {shown(sorted(odd)[:3])} lacks one of the axes x, y, z; "
+            f"{table.where}: {short_text(sorted(odd)[:3])} lacks one of the axes x, y, z; "
             "leave --axes out, or mend the names"
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
@@ -201,7 +201,7 @@ def _three_by_three(table: Table) -> pd.DataFrame:
     if (table.named and not is_array) or len(threes) != 1:
         raise InputError(
             f"{table.where}: no columns are named by an axis, such as s1_x, s1_y and "
-            f"s1_z; it has {shown(table.names)}"
+            f"s1_z; it has {short_text(table.names)}"
         )
     names = np.reshape(threes[0], (-1, 3))
     stem = threes[0][0].rpartition(".")[0]

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import shown
+from edge.config import short_text
 from edge.errors import InputError
 from train.importers.axes import lettered
 from train.importers.reading import Table, numbered, numbers_of, require_converted
@@ -129,7 +129,9 @@ def _term(table: Table, term: str) -> list[str]:
             last = places.index(ends[-1])
             if first <= last:
                 return names[first : last + 1]
-    raise InputError(f"{table.where}: has no column {term[:40]}; it has {shown(names)}")
+    raise InputError(
+        f"{table.where}: has no column {term[:40]}; it has {short_text(names)}"
+    )
 
 
 def meaning(table: Table, options: argparse.Namespace) -> Meaning:
@@ -235,7 +237,7 @@ def _running(table: Table, rest: Sequence[str]) -> tuple[list[str], tuple[int, .
         three = ", or --axes xyz for taxels of three axes" * any(map(lettered, rest))
         raise InputError(
             f"{table.where}: no columns are named as taxels, such as s1 to s16; name them "
-            f"by --taxels{three}, among {shown(list(rest))}"
+            f"by --taxels{three}, among {short_text(list(rest))}"
         )
     return grids[0]
 

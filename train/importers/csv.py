@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from edge.commands.options import within
 from edge.commands.output import counted
-from edge.config import ConfigTable, shown
+from edge.config import ConfigTable, short_text
 from edge.errors import InputError, about
 from edge.files import parsing
 from edge.recording import Recording
@@ -259,7 +259,7 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
     data = read_labels(path)
     if "trial" not in data or not data["trial"].isin(trials).any():
         raise InputError(
-            f"{path}: needs a column trial with names such as {shown(trials)}"
+            f"{path}: needs a column trial with names such as {short_text(trials)}"
         )
     require_filled(path, data, "trial")
     repeated = data["trial"][data["trial"].duplicated()]
@@ -478,7 +478,7 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
         ]
         if further:
             raise InputError(
-                f"{where}: {task} changes, from {shown(first)} to {shown(further[0])}"
+                f"{where}: {task} changes, from {short_text(first)} to {short_text(further[0])}"
             )
         if first:
             labels[str(task)] = first
@@ -594,8 +594,8 @@ def _compare(trial: Measured, first: Measured) -> None:
         )
     if taxels != first_taxels:
         raise InputError(
-            f"{path}: its taxels are {shown(taxels)}, and those of {first_path} "
-            f"{shown(first_taxels)}"
+            f"{path}: its taxels are {short_text(taxels)}, and those of {first_path} "
+            f"{short_text(first_taxels)}"
         )
     if unit != first_unit:
         raise InputError(

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.config import ConfigTable, shown
+from edge.config import ConfigTable, short_text
 from edge.errors import InputError
 from edge.files import parsing, read_text
 from edge.recording import Recording
@@ -151,7 +151,7 @@ def _episodes(path: Path, options: argparse.Namespace) -> Iterator[Episode]:
         for column in ("episode_index", "timestamp", options.taxels, options.joints):
             if column is not None and column not in data.columns:
                 raise InputError(
-                    f"{file}: has no column {column}; it has {shown(table.names)}"
+                    f"{file}: has no column {column}; it has {short_text(table.names)}"
                 )
         for column in {"episode_index", "task_index"} & set(table.names):
             data[column] = indices(table, column)

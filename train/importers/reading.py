@@ -24,7 +24,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.output import counted
-from edge.config import shown
+from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 
@@ -505,7 +505,7 @@ def require_converted(table: Table, name: str, converted: pd.Series, kind: str) 
     if bad.any():
         cell = str(column[bad].iloc[0])
         raise InputError(
-            f"{table.where}: {shown(cell)} in column {name} is {kind} ({place_of(bad)})"
+            f"{table.where}: {short_text(cell)} in column {name} is {kind} ({place_of(bad)})"
         )
 
 

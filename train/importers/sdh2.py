@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.config import shown
+from edge.config import short_text
 from edge.errors import InputError
 from edge.files import open_regular, parsing
 from edge.recording import Recording
@@ -227,5 +227,7 @@ def _number(
 ) -> float:
     text = parent.findtext(name) or "nan"
     if not low <= float(text) <= high:
-        raise ValueError(f"its {name} must be {low:g} to {high:g}, not {shown(text)}")
+        raise ValueError(
+            f"its {name} must be {low:g} to {high:g}, not {short_text(text)}"
+        )
     return float(text)

@@ -33,7 +33,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.output import counted
-from edge.config import ConfigTable, shown
+from edge.config import ConfigTable, short_text
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
@@ -397,7 +397,7 @@ class Log:
             why = f"; it {reasons[0]}" if reasons else ""
             raise InputError(
                 f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
-                f"{sorted(self._topics[kind])}, not {shown(name)}{why}"
+                f"{sorted(self._topics[kind])}, not {short_text(name)}{why}"
             )
         return name
 

@@ -116,7 +116,7 @@ def from_dict(table: Mapping[str, Any], where: str = "scene") -> Scene:
         **_effects(top.table("effects", {})),
         objects=_objects(top, seed, labels["push_n"], skin, spread),
     )
-    top.done()
+    top.refuse_unknown()
     _check_places(scene, where)
     _check_spread(scene, where)
     if scene.recording_bytes > LARGEST_BYTES:
@@ -166,7 +166,7 @@ def _steps(table: SceneTable, rate_hz: float) -> dict[str, float]:
         ratio = frame / out[name]
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6 * ratio:
             raise table.fail(name, f"an even part of a frame's {frame:g} s")
-    table.done()
+    table.refuse_unknown()
     return out
 
 
@@ -180,7 +180,7 @@ def _arm(table: SceneTable) -> dict[str, Any]:
     for joint in chain.joints:
         if joint.kind == "prismatic":
             raise InputError(
-                f"{table.called('chain')}: joint {joint.name!r} slides; the "
+                f"{table.key_name('chain')}: joint {joint.name!r} slides; the "
                 "simulator's arms only turn: make it fixed"
             )
     out: dict[str, Any] = {"arm": chain}
@@ -193,7 +193,7 @@ def _arm(table: SceneTable) -> dict[str, Any]:
         count = chain.dof if table.has(key) or default else 0
         above_0 = field == "stiffness"
         out[field] = table.numbers(key, count, default, low=0.0, open_low=above_0)
-    table.done()
+    table.refuse_unknown()
     return out
 
 
@@ -248,7 +248,7 @@ def _motion(
     covered = last_m <= PLACE_M <= skin.row0_z_m
     usual_m = PLACE_M if covered else 0.5 * (last_m + skin.row0_z_m)
     place_m = table.number("place_m", usual_m, last_m, skin.row0_z_m)
-    table.done()
+    table.refuse_unknown()
     start, rate = (tuple(map(math.radians, degrees)) for degrees in (start, rate))
     stroke_s = min(travel_s, _stops_s(chain, start, rate))
     if lead.high >= stroke_s:
@@ -295,7 +295,7 @@ def _skin(table: SceneTable) -> tuple[Cylinder, Value]:
     taxel = table.value("taxel_n_m", schema.TAXEL)
     if table.has("axes"):
         settings["axes"] = table.whole("axes", 1, (1, 3))
-    table.done()
+    table.refuse_unknown()
     skin = Cylinder.from_dict(settings, where=table.where)
     if not skin.wraps:
         raise table.fail("wraps", "true: the skin is a cylinder")
@@ -348,7 +348,7 @@ def _object(table: SceneTable, spread: dict[str, float]) -> SceneObject:
     values = _object_values(table, family, differs)
     _check_needs(table, movable)
     _check_friction(table, values)
-    table.done()
+    table.refuse_unknown()
     keys = differs.union(filter(table.has, OBJECT))
     return SceneObject(name, family, conditions, values, frozenset(keys))
 
@@ -397,7 +397,7 @@ def _effects(table: SceneTable) -> dict[str, Any]:
         for name, info in EFFECTS.items()
         if info.settings and table.has(name)
     }
-    table.done()
+    table.refuse_unknown()
     add = (*add, *(name for name in settings if name not in add))
     for name in set(add) & set(leave_out):
         raise table.fail("leave_out", f"a list without {name}, which effects.add adds")
@@ -431,7 +431,7 @@ def draw_family(
     defaults = schema.keys_of(family)
     del defaults["friction_kinetic"]  # which kinetic_part gives
     keys = set(filter(table.has, defaults))
-    table.done()
+    table.refuse_unknown()
     # The draws follow the order of the file.
     ranges = {key: table.value(key, OBJECT[key]) for key in table.raw if key in keys}
     usual = {key: value for key, value in defaults.items() if value is not None}

@@ -42,7 +42,7 @@ class SceneTable(ConfigTable):
     def fields(self, fields: Mapping[str, Field]) -> dict[str, float]:
         """The numbers of a table that may have no other keys."""
         out = {key: self.field(key, field) for key, field in fields.items()}
-        self.done()
+        self.refuse_unknown()
         return out
 
     def value(self, key: str, field: Field, default: object = None) -> Value:
