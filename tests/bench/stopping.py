@@ -326,7 +326,7 @@ def measure(data, quick, jobs):
             row["when sure, at that time"] = cell(at(first.curves[SURE], seconds))
             at_own_time.append(row)
         for rule in first.ours.certified:
-            row = {"task": task, "at most wrong": f"{rule.asked:g}"}
+            row = {"task": task, "at most wrong": f"{rule.error:g}"}
             row["certified in folds"] = f"{rule.folds} of {FOLDS}"
             row["wrong"] = f"{rule.wrong:.1%}"
             row["unknown"] = f"{rule.unknown:.1%}"
