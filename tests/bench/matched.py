@@ -12,6 +12,7 @@ import numpy as np
 
 from tests.bench import mujoco_touch, tables
 from tests.bench.mujoco_touch import LEAD_S, RATE_HZ, THRESHOLD_COUNTS, Thing, Touch
+from tests.bench.program import start
 from train.simulate.convergence import kinds
 from train.simulate.engine import readings, run_physics
 from train.simulate.scene import from_dict
@@ -111,7 +112,7 @@ def measured(frames, shear, force, moved_m):
     }
 
 
-def main():
+def measure():
     """Print the four touches, a row a quantity."""
     rows = []
     for name, touch in SCENES.items():
@@ -134,4 +135,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    start(measure, __doc__)
