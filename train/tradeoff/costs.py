@@ -119,11 +119,11 @@ def _fewer_trials(dataset: DataSet) -> Iterator[Change]:
     y = {task: dataset.labels(task) for task in dataset.tasks}
     count = len(dataset.trials)
     for folds in PARTS:
-        kept = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
-        remaining = len(kept.trials)
+        sample = dataset.part(stratified_folds(y[finest(y)], folds) == 0)
+        remaining = len(sample.trials)
         if remaining >= FEWEST:
             price = f"{counted(count - remaining, 'recording')} fewer"
-            yield Change(f"{remaining} of {count} trials", price, kept, fewer=True)
+            yield Change(f"{remaining} of {count} trials", price, sample, fewer=True)
 
 
 def hits(dataset: DataSet, choices: Mapping[str, Chosen]) -> dict[str, Hits]:

@@ -2,6 +2,7 @@
 rest."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -95,9 +96,8 @@ def test_a_skin_that_is_touched_is_refused(skin, make_touch, tmp_path, measured)
     assert measured(touched, "--force")[0] == 0
 
 
-UNUSABLE = pytest.mark.parametrize(
-    ("value", "share", "sentence"),
-    [
+@pytest.fixture(
+    params=[
         (
             20946,
             0.4,
@@ -106,38 +106,27 @@ UNUSABLE = pytest.mark.parametrize(
         ),
         (0, 1.0, "was valid in 30 of 30 frames and rests at 0"),
         (65535, 1.0, "rests at 65535; check the chips"),
-    ],
+    ]
 )
-"""Values and shares of a taxel that cannot be calibrated, and the sentence on it."""
+def unusable_taxel(request, monkeypatch):
+    """Lets the measurement of a taxel give a value that is of no use, or is valid in a
+    share of the frames alone; and the sentence on it."""
+    value, share, sentence = request.param
+
+    def spoiled(*arguments):
+        result = measure(*arguments)
+        result.calibration.baseline[0, 2] = value
+        result.valid[0, 2] = share * result.frames
+        return result
+
+    return partial(monkeypatch.setattr, calibrate, "measure", spoiled), sentence
 
 
-@pytest.fixture
-def spoil(monkeypatch):
-    """Let the measurement of a taxel give a value, valid in a share of the frames."""
-
-    def patch(value, share):
-        def spoiled(*arguments):
-            result = measure(*arguments)
-            result.calibration.baseline[0, 2] = value
-            result.valid[0, 2] = share * result.frames
-            return result
-
-        monkeypatch.setattr(calibrate, "measure", spoiled)
-
-    return patch
-
-
-@UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values(
-    skin,
-    quiet,
-    measured,
-    spoil,
-    value,
-    share,
-    sentence,
+    skin, quiet, measured, unusable_taxel
 ):
-    spoil(value, share)
+    spoil, sentence = unusable_taxel
+    spoil()
     for options in ((), ("--force",)):
         status, _, err = measured(quiet, *options)
         assert status == 2
@@ -145,19 +134,13 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
         assert sentence in err
 
 
-@UNUSABLE
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
-    skin,
-    quiet,
-    measured,
-    spoil,
-    value,
-    share,
-    sentence,
+    skin, quiet, measured, unusable_taxel
 ):
+    spoil, sentence = unusable_taxel
     assert measured(quiet)[0] == 0
     before = skin.read_text()
-    spoil(value, share)
+    spoil()
     status, _, err = measured(quiet)
     assert status == 2
     assert sentence in err
