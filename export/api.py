@@ -20,11 +20,11 @@ from edge.touch.track import DEBOUNCE
 from edge.writing import write_whole
 from export import golden
 from export.graph import to_onnx
-from train.dataset import DataSet
+from train.data.dataset import DataSet
+from train.data.groups import TRIAL
+from train.data.labels import NO_CONTACT
 from train.fitting import Fitted
-from train.groups import TRIAL
-from train.labels import NO_CONTACT
-from train.pipeline import ContactClassifier
+from train.model.pipeline import ContactClassifier
 from train.report.summary import names
 
 CALLS = 60

@@ -1,4 +1,4 @@
-"""Nodes and constants of an ONNX graph, and the projection of `train.projection` as its
+"""Nodes and constants of an ONNX graph, and the projection of `train.model.projection` as its
 nodes."""
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from onnx import TensorProto, numpy_helper
 
 from edge.arrays import Floats, Integers
-from train.projection import MOST_STEPS, Projection
+from train.model.projection import MOST_STEPS, Projection
 
 OPSET = 18
 
@@ -203,7 +203,7 @@ def project(
     columns: Sequence[Integers],
 ) -> tuple[str, str]:
     """Nodes that take features (n, p) to whole coordinates; see
-    `train.projection.Projection`.
+    `train.model.projection.Projection`.
 
     Decision points that take the same columns share nodes. Of several such nodes, those
     of the decision point asked for count.

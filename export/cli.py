@@ -22,15 +22,15 @@ from edge.touch import measures
 from edge.touch.features import SAMPLES, WINDOW_S
 from edge.writing import check_writable
 from export.api import measure, save
-from train.dataset import read
-from train.decision_points import MOST_TRIALS
-from train.feature_sets import SETS
+from train.choose.decision_points import MOST_TRIALS
+from train.data.dataset import read
+from train.data.feature_sets import SETS
+from train.data.groups import LEAVE_OUT, TRIAL
 from train.fitting import Fitted, fit
-from train.groups import LEAVE_OUT, TRIAL
-from train.projection import KINDS
+from train.model.projection import KINDS
+from train.model.scaling import SCALINGS
+from train.model.stopping import FEWEST
 from train.report.summary import summary
-from train.scaling import SCALINGS
-from train.stopping import FEWEST
 from train.tradeoff import front as fronts
 
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
@@ -194,7 +194,7 @@ def run(arguments: argparse.Namespace) -> int:
     if held_out:
         print(held_out_text(Model(path), former, held_out), file=sys.stderr)
     if arguments.report:
-        from train.model_report import write  # loads matplotlib
+        from train.report.model_report import write  # loads matplotlib
 
         print(write(arguments.out, fitted, Model(path), prices, arguments.jobs))
     return 0

@@ -14,9 +14,9 @@ from edge.model.verify import answers, first_series, integers_of
 from edge.recording import Recording
 from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
-from train.dataset import DataSet
-from train.evaluate import finest
-from train.parts import part
+from train.data.dataset import DataSet
+from train.data.folds import finest
+from train.data.parts import part
 
 TRIALS = 24
 """Trials whose frames a golden file holds."""

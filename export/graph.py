@@ -24,9 +24,9 @@ from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
 from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
-from train.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
-from train.pipeline import ContactClassifier, Space
-from train.stopping import SequentialClassifier
+from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
+from train.model.pipeline import ContactClassifier, Space
+from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
 LARGEST = float(np.finfo(np.float64).max)
@@ -46,7 +46,7 @@ def _squares(
 
     Those to `absent` trials (rows,), which have no label for the task, are infinite.
 
-    All are whole numbers below 2^53 (`train.projection.coordinate_bits`), so that |b|^2
+    All are whole numbers below 2^53 (`train.model.projection.coordinate_bits`), so that |b|^2
     - 2 b.z cancels nothing. Of more coordinates than the `components` of a decision
     point the others count as 0: the tasks of a space share its rows.
     """
@@ -227,7 +227,7 @@ def _out_of_range(build: Builder, excesses: Sequence[str], output: str) -> None:
 
 def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     """Nodes that score how unlike all training trials features (n, p) are; see
-    `train.novelty`."""
+    `train.model.novelty`."""
     points = space.points
     means = build.by_decision_point_small([p.mean for p in points])
     centred = build.node("Sub", x, means)
@@ -263,7 +263,7 @@ def _label_distances(
     labels: Integers,
     classes: int,
 ) -> str:
-    """Name of `train.pipeline.label_distances` (n, labels) of squared distances (n,
+    """Name of `train.model.pipeline.label_distances` (n, labels) of squared distances (n,
     rows)."""
     rows, most, is_vote, counts = (
         build.constant(table, f"{name} of {task}")

@@ -3,8 +3,8 @@
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases.models import describe
-from train.evaluate import stratified_folds
-from train.stopping import SequentialClassifier
+from train.data.folds import stratified_folds
+from train.model.stopping import SequentialClassifier
 
 
 def fitted_model(path, info, choices, X, y, early=None):

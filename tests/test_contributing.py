@@ -18,7 +18,7 @@ from edge import cli
 from edge.recording import load
 from tests.conftest import ROOT
 from train.__main__ import main
-from train.feature_sets import SETS
+from train.data.feature_sets import SETS
 from train.report.section import Section, Table
 from train.study import run as study
 

@@ -80,10 +80,14 @@ TOUCH = [
     f"edge.touch.{s}" for s in "frame layout active measures track features".split()
 ]
 """The way of a touch: a frame becomes a region, a contact, a vector."""
+FITTING = [f"train.{room}" for room in "data model choose fitting report".split()]
+"""The rooms of the workstation, from the bottom."""
 OF_A_FRAME = {"edge.touch.frame", "edge.touch.layout"}
 """The skin makes these, and later stages pass them on."""
 STAGES = [
-    (way[i], way[i + 1 :]) for way in (PACKAGES, FRAME, TOUCH) for i in range(len(way))
+    (way[i], way[i + 1 :])
+    for way in (PACKAGES, FRAME, TOUCH, FITTING)
+    for i in range(len(way))
 ]
 
 

@@ -8,8 +8,8 @@ from edge.touch.features import WINDOW_S
 from tests.bench import tables
 from tests.conftest import ROOT
 from tests.hard_cases.registry import CASES
-from train.decision_points import STEPS_S
-from train.rules import RISK, TEST_SHARE, upper_limit
+from train.choose.decision_points import STEPS_S
+from train.model.rules import RISK, TEST_SHARE, upper_limit
 
 PAGES = ("README.md", "docs/recipes.md")
 FIGURE = re.compile(

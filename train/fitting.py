@@ -18,10 +18,12 @@ from edge.recording import Recording
 from edge.tools.slips import slips
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
-from train import thresholds
-from train.candidates import Candidate, Fixed, candidates, features_of
-from train.choose import Choosing, Chosen
-from train.dataset import (
+from train.choose.candidates import Candidate, Fixed, candidates, features_of
+from train.choose.choose import Choosing, Chosen
+from train.choose.decision_points import MOST_TRIALS, usual_points
+from train.choose.settings import Settings
+from train.data import thresholds
+from train.data.dataset import (
     DataSet,
     Measurement,
     Recordings,
@@ -29,13 +31,11 @@ from train.dataset import (
     load_trials,
     read,
 )
-from train.decision_points import MOST_TRIALS, usual_points
-from train.groups import LEAVE_OUT, Divisions, kinds_of
+from train.data.groups import LEAVE_OUT, Divisions, kinds_of
+from train.data.vectors import Labels, Vectors
 from train.mix import Mixing, mix
-from train.pipeline import Choice, ContactClassifier
-from train.settings import Settings
-from train.stopping import FEWEST, Early, SequentialClassifier
-from train.vectors import Labels, Vectors
+from train.model.pipeline import Choice, ContactClassifier
+from train.model.stopping import FEWEST, Early, SequentialClassifier
 
 LEAK = 0.5
 """Warn of a leak if a nearest neighbour on the first frame beats the majority class by
@@ -187,7 +187,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     """Choose and fit every task of some recordings.
 
     Options you pass are held fixed. The others are chosen for each task among the
-    candidates of `train.choose`: the features and projection of the smallest model
+    candidates of `train.choose.choose`: the features and projection of the smallest model
     within one standard error of the best in cross-validation, with the scaling,
     shrinkage, components and k that are best there.
 
@@ -196,7 +196,7 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
             features.
         features: names of sets and of single features.
         projection: `pca` or `lda`.
-        scaling: one of `train.scaling.SCALINGS`.
+        scaling: one of `train.model.scaling.SCALINGS`.
         components: principal components.
         k: neighbours.
         window_s: seconds from onset. Where None it is `WINDOW_S`, or twice that and so

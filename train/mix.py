@@ -17,22 +17,15 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
-from train.choose import Chosen, decided_together, promised
-from train.dataset import DataSet
-from train.evaluate import (
-    AnswerTable,
-    Rule,
-    evaluate,
-    finest,
-    fold_numbers,
-    group_folds,
-    stratified_folds,
-)
-from train.groups import FEWEST_GROUPS, TRIAL, fold_count
-from train.labels import ENOUGH
-from train.pipeline import Choice
-from train.search import SearchGrid
-from train.vectors import Labels, Vectors
+from train.choose.choose import Chosen, decided_together, promised
+from train.choose.evaluate import AnswerTable, Rule, evaluate, fold_numbers
+from train.choose.search import SearchGrid
+from train.data.dataset import DataSet
+from train.data.folds import finest, group_folds, stratified_folds
+from train.data.groups import FEWEST_GROUPS, TRIAL, fold_count
+from train.data.labels import ENOUGH
+from train.data.vectors import Labels, Vectors
+from train.model.pipeline import Choice
 
 FEWEST_OWN = 3
 """The owner's trials with a label for a task from which on it is fitted."""

@@ -77,7 +77,7 @@ class Task:
 class Novelty:
     """When a contact is unlike everything in training.
 
-    The graph scores every contact in a space of its own (`train.novelty`).
+    The graph scores every contact in a space of its own (`train.model.novelty`).
 
     Attributes:
         task: with most labels. It names no label for an unknown contact: a new object
@@ -154,7 +154,7 @@ class StoppingRule:
 
 @dataclass(frozen=True)
 class Stopping:
-    """The calibration of one task's early decisions, which `train.stopping` makes.
+    """The calibration of one task's early decisions, which `train.model.stopping` makes.
 
     Attributes:
         slopes, intercepts, doubts: of each decision point: the probability that the

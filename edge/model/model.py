@@ -46,7 +46,7 @@ class Decision(NamedTuple):
             these it is the distance of the nearest answer with this label in which they
             agree.
         out_of_range: the features lie so far outside those of the training trials that
-            the model cut them off; see `train.projection.Grid`.
+            the model cut them off; see `train.model.projection.Grid`.
         novelty: how unlike all training trials the features are (see
             `edge.model.info.Novelty`), of a model with decision points.
     """

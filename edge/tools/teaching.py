@@ -231,7 +231,7 @@ def within_reach(graph: Graph, task: str, z: Floats) -> Booleans:
 
     Squared distances add up exactly, as long as no row is longer than the longest row
     of training may be: half of what the coordinates of a query are clipped at, see
-    `train.projection.coordinate_bits`.
+    `train.model.projection.coordinate_bits`.
     """
     nodes = graph.path(coordinates_of(graph, task))
     clips = [node for node in nodes if node.operator == "Clip"]

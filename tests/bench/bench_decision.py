@@ -13,7 +13,7 @@ from sklearn.preprocessing import StandardScaler
 from threadpoolctl import threadpool_limits
 
 from tests.hard_cases.models import Ours, session
-from train.pipeline import Choice
+from train.model.pipeline import Choice
 
 TARGETS = {140: (1 / 10, 1 / 20), 1000: (1 / 50, 1 / 15), 10000: (1 / 100, 1 / 4)}
 """{training rows: largest time of ours, over those of skl2onnx's graph and of

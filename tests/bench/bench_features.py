@@ -11,8 +11,8 @@ from edge.touch.features import WINDOW_S, feature_vector
 from edge.touch.first_contact import first_contact
 from edge.touch.kernels import BIASES, kernel_channels
 from edge.touch.track import ContactTracker
-from train.feature_sets import SETS
-from train.kernels import kernel_table
+from train.data.feature_sets import SETS
+from train.data.kernels import kernel_table
 
 WHOLE = "moments contact kernels zone_kernels joints"
 """Sets that the default model may take together."""

@@ -5,7 +5,7 @@ data set is drawn from them and fitted as a quick export would fit it, with the 
 of features, projection and neighbours. Its promises are judged on all trials that were
 not drawn: these have streams of their own, as those of another seed have.
 
-A certified error may be exceeded in one data set of ten (`train.rules.RISK`), counted
+A certified error may be exceeded in one data set of ten (`train.model.rules.RISK`), counted
 over all sets, also those whose request was refused. Of the few sets that certify an
 error close to the lowest that the trials can reach, more than a tenth exceed it,
 because only lucky sets certify it. The row "the smallest" counts the smallest error
@@ -35,16 +35,16 @@ from edge.touch.features import SAMPLES, WINDOW_S
 from tests.bench import tables
 from tests.bench.program import start
 from tests.bench.shifts import SCENE
-from train.candidates import candidates
-from train.dataset import DataSet, Measurement, load_trials
-from train.feature_sets import expand
+from train.choose.candidates import candidates
+from train.data.dataset import DataSet, Measurement, load_trials
+from train.data.feature_sets import expand
+from train.data.parts import part
 from train.fitting import fit
-from train.parts import part
+from train.model.rules import RISK
+from train.model.stopping import answers, unlike
 from train.report.work import Workers
-from train.rules import RISK
 from train.simulate import scene as scenes
 from train.simulate.run import write
-from train.stopping import answers, unlike
 from train.tradeoff.front import NAMES, ParetoFront
 
 POINTS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)

@@ -15,7 +15,7 @@ from scipy.stats import sem, t
 
 from tests.bench import tables
 from tests.bench.program import start
-from train.dataset import read
+from train.data.dataset import read
 from train.report.figures import legend, picture
 from train.report.work import Workers
 from train.simulate import run, scene

@@ -22,7 +22,7 @@ from edge.events import Decided
 from edge.model.model import Model
 from tests.bench import tables
 from tests.bench.program import start
-from train.parts import part
+from train.data.parts import part
 from train.progress import bar
 from train.simulate import scene as scenes
 from train.simulate.run import simulate

@@ -45,11 +45,11 @@ from edge.model.info import StoppingRule
 from edge.touch.features import FEATURES, SAMPLES
 from tests.bench import tables
 from tests.bench.program import start
-from train.dataset import read
-from train.evaluate import finest, stratified_folds
-from train.feature_sets import expand
+from train.data.dataset import read
+from train.data.feature_sets import expand
+from train.data.folds import finest, stratified_folds
+from train.model.rules import NEVER, THRESHOLDS
 from train.report.work import Workers
-from train.rules import NEVER, THRESHOLDS
 from train.tradeoff.choices import WINDOWS_S as DECISION_POINTS_S
 from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, compare_stopping

@@ -18,7 +18,7 @@ from edge.model.verify import first_series
 from edge.recording import load
 from edge.saving import save_arrays
 from export import golden
-from train.dataset import Measurement, load_trials
+from train.data.dataset import Measurement, load_trials
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 TOUCHES = (

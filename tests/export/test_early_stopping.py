@@ -27,9 +27,9 @@ from tests.conftest import PAPER, export, save_touches
 from tests.edge.model.test_engines import assert_same_bits, hostile
 from tests.hard_cases.models import session
 from tests.sequential import fitted_model
-from train.dataset import load_trials
-from train.pipeline import Choice
-from train.stopping import Early
+from train.data.dataset import load_trials
+from train.model.pipeline import Choice
+from train.model.stopping import Early
 
 LABELS = {"t": np.array(["a", "b", "c"] * 15), "u": np.array(["x", "y", "y"] * 15)}
 """Labels of 45 trials for two tasks."""

@@ -9,7 +9,7 @@ from edge.errors import InputError
 from edge.model.metadata import to_json
 from edge.model.model import Model
 from tests.conftest import export
-from train.dataset import Measurement, load_trials
+from train.data.dataset import Measurement, load_trials
 
 SIX = "skin_force right_length left_width skin_slant skin_area contact_area_rate@10".split()
 

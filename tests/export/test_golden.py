@@ -8,7 +8,7 @@ import pytest
 from edge.model.model import Model
 from export.golden import trials_of, trimmed
 from tests.conftest import export
-from train.dataset import load_trials
+from train.data.dataset import load_trials
 
 
 @pytest.fixture(scope="module")

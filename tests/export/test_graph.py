@@ -16,8 +16,8 @@ from export.graph import to_onnx
 from tests.hard_cases import exact
 from tests.hard_cases.models import describe, features, labels_for, session, shipped
 from tests.sequential import fitted_model
-from train.pipeline import Choice, ContactClassifier, vote
-from train.scaling import SCALINGS
+from train.model.pipeline import Choice, ContactClassifier, vote
+from train.model.scaling import SCALINGS
 
 
 def fit(X, choices, labels=5, lack=()):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from train.projection import MOST_STEPS
+from train.model.projection import MOST_STEPS
 
 
 def by_element(function, values):
@@ -55,7 +55,7 @@ def rounded(values, scale=Fraction(1)):
 
 
 def projected(vectors, p):
-    """Whole coordinates of vectors by the rule of `train.projection`.
+    """Whole coordinates of vectors by the rule of `train.model.projection`.
 
     The difference from the mean and its product with the gain are rounded once each, as
     IEEE 754 says; all that follows is in Python's whole numbers.

@@ -27,9 +27,9 @@ from tests.hard_cases.neighbours import (
     near_duplicates,
     offset_data,
 )
-from train.dataset import load_trials
+from train.data.dataset import load_trials
 from train.fitting import Fitted
-from train.pipeline import Choice, ContactClassifier
+from train.model.pipeline import Choice, ContactClassifier
 
 
 def seam(recording):

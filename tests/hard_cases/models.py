@@ -17,7 +17,7 @@ from edge.model.info import Task
 from edge.model.model import Model
 from export.graph import to_onnx
 from tests.hard_cases import exact
-from train.pipeline import Choice, ContactClassifier
+from train.model.pipeline import Choice, ContactClassifier
 
 USUAL = Choice("none", 6, 5)
 

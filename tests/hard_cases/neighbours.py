@@ -15,8 +15,8 @@ from tests.hard_cases.models import (
     usual_neighbours,
     usual_pipeline,
 )
-from train.pipeline import Choice
-from train.projection import FEWEST_UNITS
+from train.model.pipeline import Choice
+from train.model.projection import FEWEST_UNITS
 from train.report.summary import coarseness
 
 MANY = 1400

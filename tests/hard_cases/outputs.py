@@ -17,10 +17,10 @@ from tests.hard_cases import exact
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from tests.hard_cases.models import exported, features, one_by_one
 from tests.hard_cases.neighbours import near_duplicates, offset_data
-from train.evaluate import stratified_folds
-from train.novelty import CLIP, FARTHEST, STEP_BITS
-from train.pipeline import Choice
-from train.stopping import SequentialClassifier
+from train.data.folds import stratified_folds
+from train.model.novelty import CLIP, FARTHEST, STEP_BITS
+from train.model.pipeline import Choice
+from train.model.stopping import SequentialClassifier
 
 POINTS_S = (0.4, 0.8, 1.2)
 LDA = {"projection": "lda", "shrinkage": 0.1}

@@ -25,9 +25,9 @@ from tests.hard_cases.models import (
     usual_pipeline,
 )
 from train.__main__ import parser
-from train.crossval import neighbours
-from train.pipeline import Choice, ContactClassifier
-from train.projection import Projection
+from train.choose.crossval import neighbours
+from train.model.pipeline import Choice, ContactClassifier
+from train.model.projection import Projection
 
 BAD = (float("nan"), float("inf"), float("-inf"))
 

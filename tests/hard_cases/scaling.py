@@ -6,8 +6,8 @@ from scipy.linalg import hadamard
 
 from tests.hard_cases.cases import SEEDS, Case, Ladder, decades, powers_of_ten
 from tests.hard_cases.models import features
-from train.projection import CLOSE_EIGENVALUES, Projection, principal_axes
-from train.scaling import SCALINGS
+from train.model.projection import CLOSE_EIGENVALUES, Projection, principal_axes
+from train.model.scaling import SCALINGS
 
 METHODS = st.sampled_from(SCALINGS)
 

@@ -9,8 +9,9 @@ import pytest
 import train
 from edge.recording import Recording
 from edge.saving import save
-from train.dataset import Measurement, load_trials
-from train.evaluate import VARIANCE, stratified_folds
+from train.choose.evaluate import VARIANCE
+from train.data.dataset import Measurement, load_trials
+from train.data.folds import stratified_folds
 from train.fitting import _leaks, windows_of
 
 PAPER = {"features": ["paper"], "projection": "pca", "scaling": "IV", "jobs": 1}

@@ -9,8 +9,8 @@ import train
 from edge.errors import InputError
 from edge.saving import save
 from edge.statistics import wilson
-from train.pipeline import Choice, ContactClassifier
-from train.projection import Projection
+from train.model.pipeline import Choice, ContactClassifier
+from train.model.projection import Projection
 
 GIVEN = {
     "features": ["max_force", "contact_area"],

@@ -27,9 +27,9 @@ from edge.saving import save
 from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
 from train import former_recordings
+from train.data.thresholds import count_felt, proposed
 from train.importers import names
 from train.progress import bar, say
-from train.thresholds import count_felt, proposed
 
 LOG = logging.getLogger(__name__)
 ZERO_FRAMES = 3

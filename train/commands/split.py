@@ -17,9 +17,9 @@ from edge.saving import save
 from edge.touch.contact import Contact
 from edge.touch.track import ContactTracker
 from train import former_recordings
-from train.dataset import read
-from train.labels import labels_of
-from train.parts import part
+from train.data.dataset import read
+from train.data.labels import labels_of
+from train.data.parts import part
 from train.progress import bar, say
 
 LEAD_S = 0.25

@@ -10,9 +10,9 @@ import argparse
 
 from tqdm import tqdm
 
-from train.dataset import read
+from train.data.dataset import read
+from train.data.thresholds import count_contacts, proposed
 from train.progress import bar
-from train.thresholds import count_contacts, proposed
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -23,8 +23,8 @@ from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
-from train.arms import arm_of
-from train.dataset import contacts
+from train.data.arms import arm_of
+from train.data.dataset import contacts
 from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
 
 MOST = 6

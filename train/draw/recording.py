@@ -22,8 +22,8 @@ from edge.touch.layout import SkinLayout
 from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
-from train.arms import arm_of
-from train.dataset import with_thresholds
+from train.data.arms import arm_of
+from train.data.dataset import with_thresholds
 from train.draw.sketch import draw_side
 
 FRAMES = 6

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure as Canvas
 from sklearn.metrics import confusion_matrix
 
 from edge.arrays import Floats, Integers
-from train.evaluate import Result
+from train.choose.evaluate import Result
+from train.data.vectors import Strings
 from train.report.section import Figure
-from train.vectors import Strings
 
 STROKES: tuple[tuple[str, str, Any], ...] = (
     ("#1f5fa8", "o", "-"),

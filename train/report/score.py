@@ -8,11 +8,11 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.features import FEATURES
-from train.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.evaluate import Result, evaluate
-from train.pipeline import vote
-from train.search import SearchGrid
-from train.vectors import Labels, Strings, Vectors
+from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
+from train.choose.evaluate import Result, evaluate
+from train.choose.search import SearchGrid
+from train.data.vectors import Labels, Strings, Vectors
+from train.model.pipeline import vote
 
 
 def percent(share: float) -> float:
@@ -55,7 +55,7 @@ def nested(
     features: Sequence[str],
     widths: Sequence[int] | None = None,
 ) -> dict[str, Result]:
-    """Each task's nested accuracy over a grid; see `train.evaluate`.
+    """Each task's nested accuracy over a grid; see `train.choose.evaluate`.
 
     Args:
         X: (n, p) feature vectors.

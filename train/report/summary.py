@@ -11,15 +11,15 @@ from sklearn.neighbors import NearestNeighbors
 from edge.arrays import Floats, Integers
 from edge.errors import printable
 from edge.touch import measures
-from train import outliers
-from train.choose import Chosen
-from train.dataset import DataSet
-from train.feature_sets import SETS, expand, moves
+from train.choose.choose import Chosen
+from train.data import outliers
+from train.data.dataset import DataSet
+from train.data.feature_sets import SETS, expand, moves
+from train.data.groups import TRIAL
+from train.data.labels import NO_CONTACT
 from train.fitting import Fitted
-from train.groups import TRIAL
-from train.labels import NO_CONTACT
-from train.pipeline import Choice, squared_distances
-from train.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
+from train.model.pipeline import Choice, squared_distances
+from train.model.projection import CLOSE_EIGENVALUES, FEWEST_UNITS
 from train.report.score import interval
 from train.report.section import Row, Table, counted
 

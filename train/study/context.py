@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 from edge.arrays import Floats
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
-from train.dataset import DataSet
+from train.data.dataset import DataSet
+from train.data.vectors import Labels
 from train.report.work import Workers
 from train.simulate.scene_model import Scene
-from train.vectors import Labels
 
 
 @dataclass(frozen=True)

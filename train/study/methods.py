@@ -11,16 +11,17 @@ from sklearn.model_selection import PredefinedSplit, cross_val_predict
 
 from edge.arrays import Floats, Integers
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S
-from train.crossval import MAX_COMPONENTS, MAX_K
-from train.evaluate import Result, finest, group_folds, stratified_folds
-from train.feature_sets import SETS
+from train.choose.crossval import MAX_COMPONENTS, MAX_K
+from train.choose.evaluate import Result
+from train.choose.search import SearchGrid
+from train.data.feature_sets import SETS
+from train.data.folds import finest, group_folds, stratified_folds
+from train.data.vectors import Labels
 from train.report import figures
 from train.report.score import grid_search, interval, majority, nested, percent, score
 from train.report.section import Row, Section, Table
-from train.search import SearchGrid
 from train.study.context import Context
 from train.study.sweeps import by_task
-from train.vectors import Labels
 
 PAPER = "the paper's method"
 SEARCHED = "the paper's method, best of its grid"
@@ -135,7 +136,7 @@ def section(context: Context) -> Section:
             "The paper's method is PCA and k-NN on its three features, unscaled. The "
             "best of its grid is the accuracy that its grid search maximised with "
             "leave-one-out, so it is too high. The other k-NN methods scale their "
-            "features by the paper's Method IV; `train/feature_sets.py` lists the "
+            "features by the paper's Method IV; `train/data/feature_sets.py` lists the "
             "features. Extra trees have default settings.",
         ],
         [Table("methods", title, rows)],

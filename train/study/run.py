@@ -10,8 +10,8 @@ from pathlib import Path
 
 from edge.errors import InputError
 from train.cluster import on_cluster
-from train.dataset import DataSet, Measurement, load_trials
-from train.feature_sets import expand
+from train.data.dataset import DataSet, Measurement, load_trials
+from train.data.feature_sets import expand
 from train.progress import bar
 from train.report.page import write
 from train.report.section import Section, counted

@@ -8,15 +8,15 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.features import FEATURES
 from edge.touch.layout import SkinLayout
-from train.evaluate import Result
+from train.choose.evaluate import Result
+from train.data.vectors import Labels
+from train.model.scaling import SCALINGS
 from train.report import figures
 from train.report.score import grid_search, score
 from train.report.section import Row, Section, Table
 from train.report.skins import coarser, follow, vectors
-from train.scaling import SCALINGS
 from train.study.context import Context
 from train.study.paper import papers
-from train.vectors import Labels
 
 WINDOWS_S = tuple(tenths / 10 for tenths in (*range(1, 12), *range(12, 21, 2)))
 SUBSETS = tuple(names for size in (1, 2, 3) for names in combinations(FEATURES, size))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from train.evaluate import finest
+from train.data.folds import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table

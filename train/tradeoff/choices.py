@@ -6,13 +6,13 @@ from typing import Any
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.candidates import candidates, features_of
-from train.choose import Chosen
-from train.dataset import DataSet, Measurement, Recordings, load_trials
-from train.evaluate import Result
-from train.feature_sets import expand
+from train.choose.candidates import candidates, features_of
+from train.choose.choose import Chosen
+from train.choose.evaluate import Result
+from train.data.dataset import DataSet, Measurement, Recordings, load_trials
+from train.data.feature_sets import expand
+from train.data.groups import TRIAL, kinds_of
 from train.fitting import FitOptions, fit, trials_of, windows_of
-from train.groups import TRIAL, kinds_of
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""

@@ -11,10 +11,10 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose import Chosen
-from train.dataset import DataSet, Recordings
-from train.evaluate import finest, stratified_folds
-from train.parts import part
+from train.choose.choose import Chosen
+from train.data.dataset import DataSet, Recordings
+from train.data.folds import finest, stratified_folds
+from train.data.parts import part
 from train.report.score import paired, points
 from train.report.section import Row, Section, Table, counted
 from train.report.skins import coarser

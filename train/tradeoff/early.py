@@ -8,13 +8,14 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.model.info import Stopping, StoppingRule
-from train.dataset import DataSet
-from train.evaluate import Promise, Result, finest, group_folds, stratified_folds
+from train.choose.evaluate import Promise, Result
+from train.data.dataset import DataSet
+from train.data.folds import finest, group_folds, stratified_folds
+from train.data.groups import TRIAL, groupable
 from train.fitting import fit
-from train.groups import TRIAL, groupable
+from train.model.rules import Course, candidates
 from train.report.score import paired
 from train.report.work import Workers
-from train.rules import Course, candidates
 
 ERRORS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 FOLDS = 5

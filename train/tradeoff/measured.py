@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from train.evaluate import Result
+from train.choose.evaluate import Result
+from train.data.vectors import Labels
 from train.report.section import Row
 from train.tradeoff.board import Board
 from train.tradeoff.choices import Points
 from train.tradeoff.commands import Commands
 from train.tradeoff.early import StoppingComparison
 from train.tradeoff.shear import Compared
-from train.vectors import Labels
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.writing import write_whole
-from train.dataset import DataSet, read
-from train.groups import LEAVE_OUT
+from train.data.dataset import DataSet, read
+from train.data.groups import LEAVE_OUT
 from train.report.page import write
 from train.report.section import Row, Section, counted
 from train.report.work import Workers

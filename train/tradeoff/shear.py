@@ -10,9 +10,9 @@ import numpy as np
 
 from edge.arrays import Booleans
 from edge.touch.measures import SHEAR, feature
-from train.choose import Chosen
-from train.dataset import DataSet
-from train.groups import LEAVE_OUT, TRIAL
+from train.choose.choose import Chosen
+from train.data.dataset import DataSet
+from train.data.groups import LEAVE_OUT, TRIAL
 from train.report.figures import PHONE, STROKES, legend, picture
 from train.report.score import paired, percent, points
 from train.report.section import Figure, Row, Section, Table

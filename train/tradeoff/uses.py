@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from train.evaluate import Result
+from train.choose.evaluate import Result
 from train.tradeoff.choices import WINDOWS_S
 from train.tradeoff.early import FOLDS, Certified, StoppingComparison
 from train.tradeoff.measured import Measured

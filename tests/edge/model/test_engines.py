@@ -16,7 +16,7 @@ from edge.model.model import Model
 from export.graph import to_onnx
 from tests.conftest import ROOT
 from tests.export.test_graph import describe, fit, hard_set
-from train.pipeline import Choice
+from train.model.pipeline import Choice
 
 MODELS = [demo.MODEL, ROOT / "tests" / "golden" / "model.onnx"]
 RANDOM = int(os.environ.get("RANDOM_MODELS", "100"))

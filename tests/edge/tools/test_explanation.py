@@ -10,7 +10,7 @@ import pytest
 from edge.model.model import Model
 from edge.tools.explanation import Change, Explanation, Near, Space, explain
 from tests.sequential import fitted_model
-from train.pipeline import Choice
+from train.model.pipeline import Choice
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 

@@ -1,7 +1,7 @@
 """The command that proposes thresholds."""
 
 from edge.saving import save
-from tests.train.test_thresholds import noisy, weaker
+from tests.train.data.test_thresholds import noisy, weaker
 from train.__main__ import main
 
 

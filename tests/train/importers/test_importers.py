@@ -12,7 +12,7 @@ from edge.errors import InputError
 from edge.recording import load
 from edge.touch.arm import Chain
 from train.__main__ import main
-from train.dataset import Measurement, load_trials
+from train.data.dataset import Measurement, load_trials
 from train.importers import sdh2
 
 MASK = "\n".join(["011110"] * 5 + ["111111"] * 8)

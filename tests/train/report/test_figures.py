@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from train.evaluate import Result
+from train.choose.evaluate import Result
 from train.report import figures
 from train.report.figures import PHONE, STROKES, bars, confusion
 

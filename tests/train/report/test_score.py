@@ -4,9 +4,10 @@ baselines."""
 import numpy as np
 import pytest
 
-from tests.train.test_evaluate import trials
-from train.crossval import accuracies, neighbours
-from train.evaluate import stratified_folds
+from tests.train.choose.test_evaluate import trials
+from train.choose.crossval import accuracies, neighbours
+from train.choose.search import SearchGrid
+from train.data.folds import stratified_folds
 from train.report.score import (
     Result,
     grid_search,
@@ -19,7 +20,6 @@ from train.report.score import (
     score,
     transfer,
 )
-from train.search import SearchGrid
 
 ONE = ("max_force",)
 

@@ -9,7 +9,7 @@ import pytest
 import train
 from edge.recording import load
 from edge.saving import save
-from train.pipeline import ContactClassifier
+from train.model.pipeline import ContactClassifier
 from train.report.summary import (
     LEAK,
     coarseness,

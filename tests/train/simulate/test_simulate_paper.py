@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from train.dataset import load_trials
+from train.data.dataset import load_trials
 from train.report.score import grid_search
 from train.simulate import scene as scenes
 from train.simulate.convergence import measure

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.dataset import load_trials
+from train.data.dataset import load_trials
 from train.report.skins import follow, vectors
 from train.simulate import scene as scenes
 from train.simulate.run import simulate, write

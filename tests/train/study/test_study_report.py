@@ -12,7 +12,7 @@ from edge.saving import save
 from tests import browser
 from tests.conftest import save_touches
 from train.__main__ import main
-from train.evaluate import Result
+from train.choose.evaluate import Result
 from train.study import methods
 from train.study.paper import (
     comparison,

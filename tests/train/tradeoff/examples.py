@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from train.choose import Chosen
-from train.evaluate import Promise
-from train.pipeline import Choice
+from train.choose.choose import Chosen
+from train.choose.evaluate import Promise
+from train.model.pipeline import Choice
 from train.tradeoff.commands import Commands
 from train.tradeoff.measured import Measured
 

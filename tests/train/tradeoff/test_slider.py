@@ -7,7 +7,7 @@ import pytest
 
 from tests.browser import chromium
 from tests.train.tradeoff.examples import chosen, measured
-from train.evaluate import Promise
+from train.choose.evaluate import Promise
 from train.report.page import write
 from train.report.section import Section
 from train.tradeoff.front import ParetoFront

@@ -22,9 +22,9 @@ from tests import browser
 from tests.conftest import export, rows_of, save_touches
 from tests.train.tradeoff.examples import chosen, measured
 from train.commands.tradeoff import cost
-from train.dataset import Recordings, read
-from train.parts import part
-from train.rules import Course
+from train.data.dataset import Recordings, read
+from train.data.parts import part
+from train.model.rules import Course
 from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff import run as running
 from train.tradeoff.breakaway import breakaway_times

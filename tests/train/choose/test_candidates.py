@@ -1,0 +1,133 @@
+"""The candidates, and their order of cost."""
+
+import numpy as np
+import pytest
+
+from tests.train.model.test_agreement import TASKS
+from train.choose.candidates import (
+    EARLY_WITH_JOINTS,
+    PLAIN,
+    WITH_JOINTS,
+    WITH_SHEAR,
+    Fixed,
+    candidates,
+    costs,
+)
+from train.data.feature_sets import expand
+from train.model.pipeline import Choice
+
+
+def test_the_discriminants_of_all_tasks_side_by_side_are_tried_but_not_for_drawn_things():
+    """Category is left out, as its factors are there."""
+    together = ("mobility", "object", "softness")
+    y = {task: np.tile(labels, 2) for task, labels in TASKS.items()}
+    y["object"] = np.arange(8).astype(str)
+    plain, drawn = (
+        {
+            grid.targets
+            for candidate in candidates(y, drawn=d)
+            for grid in candidate.grids
+        }
+        for d in (False, True)
+    )
+    assert plain == {(), ("mobility", "softness"), together}
+    assert together not in drawn
+
+
+def test_factors_that_a_trial_of_the_product_lacks_are_not_set_side_by_side():
+    """A thing whose category is of its own, such as `liquid`, has no softness and no
+    mobility."""
+    y = {
+        task: np.append(labels, "")
+        for task, labels in TASKS.items()
+        if task != "object"
+    }
+    y["category"][-1] = "liquid"
+    targets = {grid.targets for candidate in candidates(y) for grid in candidate.grids}
+    assert ("mobility", "softness") not in targets
+
+
+def test_features_of_joints_are_candidates_where_recordings_have_them():
+    assert {candidate.sets for candidate in candidates(TASKS)} == set(PLAIN)
+    with_joints = candidates(TASKS, joints=True)
+    assert {c.sets for c in with_joints if c.full} == set(WITH_JOINTS)
+    assert {c.sets for c in with_joints if c.early} == set(EARLY_WITH_JOINTS)
+    assert len(candidates(TASKS, joints=True, quick=True)) == 3
+
+
+def test_features_of_shear_are_candidates_where_recordings_have_it():
+    plain = {c.sets for c in candidates(TASKS, joints=True)}
+    sheared = {c.sets for c in candidates(TASKS, joints=True, shear=True)}
+    assert sheared - plain == {(*sets, "joints") for sets in WITH_SHEAR}
+    assert plain <= sheared
+    without_joints = {c.sets for c in candidates(TASKS, shear=True)}
+    assert without_joints == {*PLAIN, *WITH_SHEAR}
+    quick = {c.sets for c in candidates(TASKS, shear=True, quick=True)}
+    assert quick == {*PLAIN[:3], *WITH_SHEAR}
+
+
+def test_simulated_things_of_several_kinds_are_decided_without_shear():
+    drawn = {c.sets for c in candidates(TASKS, shear=True, drawn=True)}
+    assert drawn == {("contact",)}
+
+
+def test_every_feature_set_but_the_papers_is_tried_with_both_projections():
+    combinations = {
+        (candidate.sets, candidate.projection) for candidate in candidates(TASKS)
+    }
+    usual = {(sets, kind) for sets in PLAIN for kind in ("pca", "lda")}
+    assert combinations == usual - {(("paper",), "lda")}
+
+
+def test_settings_that_are_fixed_are_held():
+    (candidate,) = candidates(TASKS, Fixed(["paper"], "pca", "V", 3, 2))
+    (grid,) = candidate.grids
+    assert candidate.name == "paper"
+    assert grid.features == expand(["paper"])
+    assert grid.projection == "pca"
+    assert grid.scaling == "V"
+    assert grid.components == (3,)
+    assert grid.neighbours == (2,)
+
+
+def numbers_of(of_candidates):
+    """The least shrinkage, and the most directions and components of candidates."""
+    grids = [grid for candidate in of_candidates for grid in candidate.grids]
+    return {
+        "shrinkage": np.min([grid.shrinkages for grid in grids]),
+        "directions": {grid.most_directions for grid in grids},
+        "components": np.max([grid.components for grid in grids]),
+    }
+
+
+@pytest.mark.parametrize(
+    ("joints", "sets"), [(False, ("contact",)), (True, ("contact", "joints"))]
+)
+def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried(joints, sets):
+    (candidate,) = candidates(TASKS, joints=joints, drawn=True)
+    assert candidate.sets == sets
+    assert candidate.projection == "lda"
+    numbers = numbers_of([candidate])
+    assert numbers == {"shrinkage": 0.3, "directions": {10}, "components": 10}
+
+
+def test_of_other_things_less_shrinkage_and_all_directions_are_tried():
+    numbers = numbers_of(candidates(TASKS))
+    assert numbers["shrinkage"] < 0.3
+    assert numbers["directions"] == {None}
+
+
+def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
+    choices = [
+        Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),
+        Choice("IV", 3, 5, "lda", 1.0, ("a", "b")),
+        Choice("IV", 3, 1, "lda", 0.1, ("a",)),
+        Choice("I", 2, 1, "pca", 0.1, ("a",)),
+        Choice("IV", 20, 1, "pca", 0.1, ("a",)),
+    ]
+    assert costs(choices, {"a": 10, "b": 11}).tolist() == [1, 1, 0, 2, 2]
+
+
+def test_of_equally_many_weights_those_listed_first_are_cheaper():
+    choices = [Choice("IV", 1, 1, "lda", features=(name,)) for name in ("b", "a", "c")]
+    assert costs(choices, {"a": 5, "b": 5, "c": 4}).tolist() == [1, 2, 0]

@@ -1,0 +1,236 @@
+"""The choice of settings and of the window."""
+
+from dataclasses import replace
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import train
+from edge.saving import save
+from edge.statistics import wilson
+from train.choose.candidates import candidates, features_of
+from train.choose.choose import Choosing, Chosen, decided_together
+from train.choose.evaluate import AnswerTable, Promise
+from train.data.dataset import Measurement, load_trials
+from train.data.feature_sets import expand
+from train.data.groups import Divisions, Groups
+from train.data.parts import part
+from train.data.vectors import Vectors
+from train.model.pipeline import Choice, ContactClassifier, vote
+
+EARLY = ("contact", "contact joints", "sqrt_joints")
+TWO = ("max_force", "contact_area")
+
+
+def early_settings(make_touch, folder, arm, k):
+    """The settings before the full window, where those of the full window take k
+    neighbours."""
+    for kind, seed in product(("hard", "soft"), range(6)):
+        touch = make_touch(kind=kind, seed=seed, arm=arm, labels={"softness": kind})
+        save(folder / f"{kind}-{seed}.npz", touch)
+    early = [c for c in candidates({}, joints=arm) if c.name in EARLY]
+    dataset = load_trials([folder], Measurement(features_of(early)))
+    y = {"softness": dataset.labels("softness")}
+    choosing = Choosing(dataset, y, early, Divisions.of(dataset, y), samples=40)
+    chosen = {"softness": SimpleNamespace(choice=Choice("IV", 1, k))}
+    return choosing.early(1.2, chosen)
+
+
+def test_decision_points_before_the_full_window_have_settings_where_joints_are_known(
+    make_touch, tmp_path
+):
+    settings = early_settings(make_touch, tmp_path, arm=True, k=3)
+    early = settings.settings
+    assert early.until_s == 1.2
+    assert early.choices["softness"].features == expand(["contact", "joints"])
+    assert len(early.by_fold) == 10
+    # The number of neighbours is that of the full window, as the graph has one.
+    assert {c["softness"].k for c in (early.choices, *early.by_fold)} == {3}
+    assert settings.settings_of_known == early
+
+
+def test_without_joints_they_have_the_settings_of_the_full_window(make_touch, tmp_path):
+    assert early_settings(make_touch, tmp_path, arm=False, k=3) is None
+
+
+@pytest.fixture
+def settled():
+    """The function that gives a task's settings, and those chosen without each fold, of
+    two candidates: one right on other trials of known objects, the other on new
+    objects."""
+    near = Choice("IV", 1, 1, "lda")
+    far = Choice("IV", 1, 3, "lda")
+    choices = {"t": [near, far]}
+    folds = np.arange(12) % 3
+    right = np.repeat([[True], [False]], 12, axis=1)
+    trials = AnswerTable(folds, choices, {"t": np.stack([right] * 3)})
+    unseen = AnswerTable(folds // 2, choices, {"t": np.stack([~right] * 2)})
+    objects = Groups("object", folds.astype(str), frozenset({"t"}), unseen.folds)
+    dataset = SimpleNamespace(
+        names=("max_force",),
+        widths=lambda samples: (1,),
+        untouched_labels=lambda t: (),
+    )
+
+    def settle(grouped):
+        divisions = Divisions(folds, (), objects if grouped else None)
+        choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
+        chosen, without = choosing._settle("t", trials, unseen if grouped else trials)
+        return {
+            "chosen": chosen.choice.k,
+            "without a fold": [choice.k for choice in without],
+            "accuracy": chosen.accuracy.accuracy,
+            "by trial": chosen.by_trial.accuracy,
+            "known": chosen.choice_of_known and chosen.choice_of_known.k,
+        }
+
+    return settle
+
+
+def test_settings_are_chosen_by_left_out_trials(settled):
+    assert settled(grouped=False) == {
+        "chosen": 1,
+        "without a fold": [1, 1, 1],
+        "accuracy": 1.0,
+        "by trial": 1.0,
+        "known": None,
+    }
+
+
+def test_settings_of_groups_are_chosen_by_left_out_groups_also_without_a_fold(settled):
+    assert settled(grouped=True) == {
+        "chosen": 3,
+        "without a fold": [3, 3, 3],
+        "accuracy": 1.0,
+        "by trial": 0.0,
+        "known": 1,
+    }
+
+
+@pytest.fixture(scope="module")
+def agreeing():
+    """Trials of a category that is the pair of two other tasks' labels, the settings of
+    each task, and folds."""
+    rng = np.random.default_rng(1)
+    places = rng.integers(0, 2, (2, 60))
+    mobility = np.array(["f", "m"])[places[0]]
+    softness = np.array(["r", "s"])[places[1]]
+    category = np.char.add(softness, mobility)
+    y = {"mobility": mobility, "softness": softness, "category": category}
+    X = rng.normal(size=(60, 6))
+    X[:, 0] += mobility == "m"
+    X[:, 3] += softness == "s"
+    choices = {task: Choice("IV", 2, 3, "lda") for task in y}
+    return Vectors(X, y, TWO, (3, 3)), choices, np.arange(60) % 5
+
+
+@pytest.fixture(scope="module")
+def hits(agreeing):
+    """{task: whether models without a trial's fold name its label}, and the same of
+    category where it is decided by itself."""
+    vectors, choices, folds = agreeing
+    right = {task: np.zeros(60, dtype=bool) for task in (*choices, "alone")}
+    for fold in range(5):
+        test = folds == fold
+        X = vectors.X[test]
+        model = ContactClassifier.of(choices, vectors.part(~test))
+        answers = {task: decision.labels for task, decision in model.decide(X).items()}
+        near = model.nearest("category", model.squares("category", X))
+        answers["alone"] = vote(model.labels_["category"][near])
+        for task, labels in answers.items():
+            of_task = "category" if task == "alone" else task
+            named = model.classes_[of_task][labels]
+            right[task][test] = named == vectors.y[of_task][test]
+    return right
+
+
+def test_tasks_that_agree_are_scored_as_they_are_decided_together(agreeing, hits):
+    vectors, choices, folds = agreeing
+    none_right = Promise(0, 60, hits=np.zeros(60, dtype=bool))
+    chosen = {
+        task: Chosen(choice, none_right, none_right, "trial")
+        for task, choice in choices.items()
+    }
+    plans = {"trial": (folds, [choices] * 5)}
+    for task, settings in decided_together(chosen, vectors, plans).items():
+        assert (settings.accuracy.hits == hits[task]).all()
+        assert settings.accuracy.right == hits[task].sum()
+        assert settings.by_trial.right == hits[task].sum()
+        assert settings.by_fold == (choices,) * 5
+
+
+def test_a_category_is_right_where_both_of_its_factors_are(hits):
+    of_factors = hits["mobility"] & hits["softness"]
+    assert (hits["category"] == of_factors).all()
+    assert (hits["category"] != hits["alone"]).any()
+
+
+FEW = {
+    "features": ["max_force"],
+    "projection": "pca",
+    "scaling": "none",
+    "k": 1,
+    "jobs": 1,
+}
+
+
+def touches(make_touch, folder, seconds, late_s):
+    """Touches of two kinds that differ from `late_s` after onset on."""
+    for seed in range(20):
+        labels = {"kind": "ab"[seed % 2]}
+        touch = make_touch(seed=seed, seconds=seconds, arm=False, labels=labels)
+        touch = part(touch, slice(None, None, 4))
+        frames = np.minimum(touch.frames, 700)
+        frames[touch.t > 0.2 + late_s] //= 1 + seed % 2
+        save(folder / f"{seed}.npz", replace(touch, frames=frames))
+    return str(folder)
+
+
+@pytest.fixture(scope="module")
+def late(make_touch, tmp_path_factory):
+    """A model of touches that differ from 1.8 s on."""
+    return train.fit(
+        touches(make_touch, tmp_path_factory.mktemp("late"), 6.0, 1.8), **FEW
+    )
+
+
+def test_the_window_is_the_shortest_that_tells_what_longer_ones_do(late):
+    assert late.window_s == 2.4
+    (note,) = [note for note in late.notes if "the window is" in note]
+    assert "the window is 2.4 s" in note
+    assert "100% at 2.4 s, 100% at 4.8 s" in note
+
+
+def test_accuracies_are_those_at_the_chosen_window(late):
+    settings = late.chosen["kind"]
+    for result in (settings.accuracy, settings.by_trial, *settings.candidates):
+        assert result.accuracy == 1.0
+        assert result.interval == wilson(8, 8)
+
+
+def test_a_longer_window_has_no_more_decision_points(late):
+    points = late.sequential.decision_points_s
+    assert points[-1] == 2.4
+    assert len(points) <= 12
+
+
+def test_touches_that_differ_early_are_told_in_the_usual_window(make_touch, tmp_path):
+    early = train.fit(touches(make_touch, tmp_path, 6.0, 0.4), **FEW)
+    assert early.window_s == 1.2
+
+
+@pytest.mark.parametrize(
+    "words", [{"window_s": 1.2}, {"decision_points_s": (0.6, 1.2)}]
+)
+def test_a_window_that_is_given_is_kept(words, make_touch, tmp_path):
+    fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **words)
+    assert fitted.window_s == 1.2
+    assert not any("the window is" in note for note in fitted.notes)
+
+
+def test_touches_that_last_little_longer_than_the_window_are_told_in_it(
+    make_touch, tmp_path
+):
+    assert train.fit(touches(make_touch, tmp_path, 2.0, 1.8), **FEW).window_s == 1.2

@@ -1,0 +1,273 @@
+"""Nested accuracy against doing it the long way with the exported estimators."""
+
+from dataclasses import replace
+from itertools import product
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from edge.errors import InputError
+from edge.statistics import wilson
+from train.choose.evaluate import (
+    AnswerTable,
+    Promise,
+    Result,
+    Rule,
+    averaged,
+    evaluate,
+    fits,
+)
+from train.choose.search import SearchGrid
+from train.data.folds import group_folds, stratified_folds
+from train.data.vectors import Vectors
+from train.model.pipeline import Choice, ContactClassifier
+
+TWO = ("max_force", "contact_area")
+GRIDS = (
+    SearchGrid("IV", "lda", shrinkages=(1.0, 0.01), neighbours=(1, 3)),
+    SearchGrid("none", "pca", components=(1, 4, 30), neighbours=(1, 3)),
+    SearchGrid("IV", "pca", ("contact_area",), components=(2,), neighbours=(5,)),
+)
+
+
+def trials(n=36, seed=0):
+    """Two feature types of which both tell a little."""
+    rng = np.random.default_rng(seed)
+    y = np.array(["a", "b", "c"])[np.arange(n) % 3]
+    X = rng.normal(size=(n, 12))
+    X[:, :6] += np.where(y == "a", 1.0, 0.0)[:, None]
+    X[:, 6:] = X[:, 6:] * 50 + np.where(y == "b", 60.0, 0.0)[:, None]
+    return Vectors(X, {"t": y}, TWO)
+
+
+def told_right(choice, vectors, train, test):
+    """Whether the classifier that is exported tells the tests; both are masks."""
+    model = ContactClassifier.of({"t": choice}, vectors.part(train))
+    labels = model.decide(vectors.X[test])["t"].labels
+    return model.classes_["t"][labels] == vectors.y["t"][test]
+
+
+def assert_exported(table, fold, vectors, train, test):
+    """The candidates' answers by a fit without a fold are those of the classifier that
+    is exported."""
+    answers = table.right["t"][fold][:, test]
+    for choice, right in zip(table.choices["t"], answers, strict=True):
+        assert (right == told_right(choice, vectors, train, test)).all()
+
+
+def test_every_answer_is_that_of_the_exported_estimators():
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 4)
+    table = evaluate(vectors, folds, GRIDS)
+    assert len(table.choices["t"]) == 4 + 6 + 1
+    for i, j in product(range(4), repeat=2):
+        train = (folds != i) & (folds != j)
+        assert_exported(table, i, vectors, train, folds == j)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_trials_that_are_equal_tie_as_in_the_exported_estimators(seed):
+    """Each trial has a twin of another label: the earlier of equally near ones
+    decides."""
+    folds = np.repeat(np.arange(6) % 3, 2)
+    y = np.array(["a", "b", "b", "c", "c", "a"] * 2)
+    grids = [replace(grid, neighbours=(1, 2)) for grid in GRIDS]
+    X = np.repeat(trials(6, seed).X, 2, axis=0) * 10.0 ** (seed - 4)
+    vectors = Vectors(X, {"t": y}, TWO)
+    table = evaluate(vectors, folds, grids)
+    for fold in range(3):
+        assert_exported(table, fold, vectors, folds != fold, folds == fold)
+
+
+@pytest.fixture
+def partly_labelled():
+    """Trials of which some have no label and others no fold, and their folds."""
+    vectors = trials()
+    y = vectors.y["t"]
+    y[::5] = ""
+    numbers = np.arange(len(y))
+    is_own = numbers % 2 == 0
+    folds = np.where(is_own, numbers // 2 % 3, -1)
+    return replace(vectors, is_own=is_own), folds
+
+
+def test_trials_without_a_label_or_a_fold_are_not_tested(partly_labelled):
+    vectors, folds = partly_labelled
+    table = evaluate(vectors, folds, GRIDS)
+    tested = vectors.is_own & (vectors.y["t"] != "")
+    assert (table.tested["t"] == tested).all()
+    assert table.nested("t").total == tested.sum()
+
+
+def test_weights_are_those_of_the_exported_estimators(partly_labelled):
+    vectors, folds = partly_labelled
+    grids = [replace(grid, weights=(1, 3)) for grid in GRIDS]
+    table = evaluate(vectors, folds, grids)
+    for fold in range(3):
+        test = (folds == fold) & (vectors.y["t"] != "")
+        assert_exported(table, fold, vectors, folds != fold, test)
+
+
+def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 4)
+    table = evaluate(vectors, folds, GRIDS)
+    choices = table.choices["t"]
+    right = 0
+    for fold in range(4):
+        inner = np.zeros(len(choices))
+        for second_fold in {*range(4)} - {fold}:
+            train = (folds != fold) & (folds != second_fold)
+            for i, choice in enumerate(choices):
+                inner[i] += told_right(
+                    choice,
+                    vectors,
+                    train,
+                    folds == second_fold,
+                ).sum()
+        best = choices[inner.argmax()]
+        right += told_right(best, vectors, folds != fold, folds == fold).sum()
+    assert table.nested("t").right == right
+
+
+def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
+    assert Result(90, 100).interval == wilson(90, 100)
+    assert Promise(90, 100).interval == wilson(36, 40)
+    assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
+
+
+def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_scores():
+    rng = np.random.default_rng(2)
+    best = []
+    honest = []
+    for _ in range(6):
+        X = rng.normal(size=(40, 12))
+        y = rng.choice(["a", "b"], 40)
+        table = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 5), GRIDS[1:2])
+        best.append(table.held_out("t").mean(axis=1).max())
+        honest.append(table.nested("t").accuracy)
+    assert np.mean(best) > 0.55
+    assert abs(np.mean(honest) - 0.5) < 0.1
+
+
+def test_twins_of_a_group_do_not_tell_each_other():
+    """Trials of one object are copies: only other objects may tell them."""
+    rng = np.random.default_rng(3)
+    objects = np.repeat([f"{i}" for i in range(12)], 4)
+    X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
+    y = np.repeat(np.tile(["a", "b"], 6), 4)
+    grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
+    by_object = evaluate(Vectors(X, {"t": y}, TWO), group_folds(objects), grids)
+    by_trial = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y), grids)
+    assert by_trial.nested("t").accuracy == 1.0
+    assert by_object.nested("t").accuracy < 0.8
+    few = group_folds(objects, count=5)
+    assert all(len(set(few[objects == name])) == 1 for name in objects)
+
+
+@pytest.mark.parametrize("most", [None, 2])
+def test_the_discriminants_of_two_tasks_may_be_set_side_by_side(most):
+    """All of them, or the first of them."""
+    y = trials().y["t"]
+    labels = {"t": y, "u": np.where(y == "a", "yes", "no")}
+    vectors = replace(trials(), y=labels)
+    grid = SearchGrid(
+        "IV",
+        "lda",
+        shrinkages=(0.1,),
+        neighbours=(1,),
+        targets=("t", "u"),
+        most_directions=most,
+    )
+    table = evaluate(vectors, stratified_folds(y, 4), [grid])
+    (choice,) = table.choices["t"]
+    assert choice.components == (most or 2 + 1)
+    assert_exported(table, 0, vectors, table.folds != 0, table.folds == 0)
+
+
+def test_the_cheapest_within_a_standard_error_of_the_difference_is_chosen():
+    right = np.ones((3, 100), dtype=bool)
+    right[0, :20] = False  # 20 worse than the best, with an error of 4
+    right[1, 20:23] = right[2, 98:] = False  # 1 worse, with an error of 2.2
+    rising = np.arange(3)
+    assert Rule().choose(right) == 2
+    assert Rule(rising).choose(right) == 1
+    assert Rule(np.array([0, 2, 1])).choose(right) == 2
+    assert Rule(rising, margin=0.2).choose(right) == 0
+    assert Rule(rising, allowed=np.array([0, 2])).choose(right) == 2
+
+
+def test_further_divisions_count_in_the_choice_by_all_trials_alone():
+    """By the first division the first candidate is better, by both the second."""
+    first = np.array([[True, True, True, False], [True, True, False, False]])
+    second = np.array([[False, False, False, False], [True, True, True, True]])
+    folds = np.arange(4) % 2
+    settings = [Choice("IV", 1, 1), Choice("IV", 1, 3)]
+
+    def table(right, **repeated):
+        return AnswerTable(
+            folds,
+            {"t": settings},
+            {"t": np.stack([right] * 2)},
+            **repeated,
+        )
+
+    repeated_table = table(first, repeated=(table(second),))
+    assert repeated_table.held_out("t").tolist() == [
+        [0.5, 0.5, 0.5, 0.0],
+        [1.0, 1.0, 0.5, 0.5],
+    ]
+    assert repeated_table.chosen("t") == 1
+    assert repeated_table.by_fold("t") == table(first).by_fold("t") == [0, 0]
+
+
+def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
+    right = np.array([[True, True, True, False], [True, True, False, False]])
+    folds = np.arange(4) % 2
+    settings = {"t": [Choice("IV", 1, 1), Choice("IV", 1, 3)]}
+    tables = [
+        AnswerTable(folds, settings, {"t": np.stack([window] * 2)})
+        for window in (right, ~right)
+    ]
+    mean = averaged([tables[0], tables[0], tables[1]])
+    assert mean.held_out("t") == pytest.approx(
+        np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3
+    )
+
+
+def test_of_candidates_that_cost_the_same_the_best_is_chosen():
+    """By how it is better the error of a difference does not ask: nothing is saved by
+    the other."""
+    right = np.ones((4, 100), dtype=bool)
+    right[0, :3] = right[1, 2:4] = right[2, 4:6] = False
+    right[3, 50:] = False
+    assert Rule(np.array([1, 1, 1, 0])).choose(right) == 1
+
+
+def test_folds_spread_each_class_evenly():
+    y = np.repeat(["a", "b"], [30, 14])
+    folds = stratified_folds(y, 10)
+    assert sorted(np.bincount(folds[y == "a"])) == [3] * 10
+    assert np.bincount(folds).max() - np.bincount(folds).min() <= 1
+    assert (folds == stratified_folds(y, 10)).all()
+
+
+def test_what_cannot_be_parted_or_measured_is_one_sentence():
+    vectors = trials()
+    y = vectors.y["t"]
+    with pytest.raises(InputError, match="at least 3 folds, not 2"):
+        evaluate(vectors, stratified_folds(y, 2), GRIDS)
+    vectors.X[5, 3] = np.nan
+    with pytest.raises(InputError, match="trial 5 are not finite"):
+        evaluate(vectors, stratified_folds(y, 3), GRIDS)
+
+
+@pytest.mark.parametrize(("nested", "count"), [(True, 15), (False, 5)])
+def test_progress_is_told_after_each_of_the_fits_that_are_announced(nested, count):
+    vectors = trials()
+    folds = stratified_folds(vectors.y["t"], 5)
+    progress = Mock()
+    evaluate(vectors, folds, GRIDS[:1], progress=progress, nested=nested)
+    assert fits(folds, nested) == count
+    assert progress.call_count == count

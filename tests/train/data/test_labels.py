@@ -1,0 +1,70 @@
+"""Labels that follow from others, and trials that lack some."""
+
+import pytest
+
+from edge.errors import InputError
+from edge.saving import save
+from train.data.dataset import load_trials
+from train.data.labels import completed, shared_tasks
+
+SIMULATED = {
+    "category": "rigid-movable",
+    "mobility": "movable",
+    "softness": "rigid",
+    "object": "box 3",
+}
+
+
+def test_softness_and_mobility_follow_from_the_category_and_the_reverse():
+    halves = {"softness": "soft", "mobility": "fixed"}
+    labels = completed(
+        [SIMULATED, {"category": "soft-fixed"}, halves, {"mobility": "movable"}]
+    )
+    assert labels[0] == SIMULATED
+    assert labels[1] == labels[2] == {"category": "soft-fixed", **halves}
+    assert labels[3] == {"mobility": "movable"}
+
+
+def test_labels_of_other_tasks_follow_where_all_trials_that_have_them_agree():
+    complete = {"grasp": "left-full", "side": "left", "filling": "full"}
+    assert completed([complete, {"grasp": "right-empty"}])[1] == {
+        "grasp": "right-empty",
+        "side": "right",
+        "filling": "empty",
+    }
+    odd = {**complete, "grasp": "left-empty"}
+    assert completed([complete, odd, {"grasp": "right-empty"}])[2] == {
+        "grasp": "right-empty"
+    }
+
+
+def test_no_task_is_added_and_a_label_of_another_form_is_left():
+    assert completed([{"category": "soft-fixed"}]) == [{"category": "soft-fixed"}]
+    assert completed([SIMULATED, {"category": "none"}])[1] == {"category": "none"}
+
+
+def test_a_task_is_what_most_have_or_ten():
+    trials = [{"a": "x"}] * 30 + [{"a": "x", "b": "y"}] * 10
+    assert shared_tasks(trials) == ("a",)
+    assert shared_tasks(trials, partial=True) == ("a", "b")
+    assert shared_tasks(trials[1:-1], partial=True) == ("a",)
+    with pytest.raises(InputError, match="share no label"):
+        shared_tasks([{}, {}, {"a": "x"}])
+
+
+def test_trials_that_lack_a_label_stay_for_their_other_tasks(
+    make_touch,
+    recordings,
+    tmp_path,
+):
+    bare = make_touch(seed=9)
+    bare.meta["labels"] = {"category": "rigid-fixed"}
+    save(tmp_path / "bare.npz", bare)
+    data = [recordings, tmp_path]
+    assert len(load_trials(data).trials) == 16
+    partial = load_trials(data, partial=True)
+    assert len(partial.trials) == 17
+    assert partial.labels("object")[-1] == ""
+    assert [path.name for path in partial.left_out["a label for object"]] == [
+        "bare.npz"
+    ]

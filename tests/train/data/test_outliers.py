@@ -1,0 +1,81 @@
+"""Recordings far outside all others are named, with what tells them."""
+
+from dataclasses import replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+
+from train.data.outliers import FEWEST_TRIALS, by_features, by_joints, deviations
+
+
+def exact(values):
+    """The distance of each row to the mean of the others, in their deviations, by
+    fractions."""
+    rows = np.array([[Fraction(x) for x in row] for row in values])
+    distances = []
+    for i, row in enumerate(rows):
+        rest = np.delete(rows, i, axis=0)
+        mean = rest.mean(axis=0)
+        variance = ((rest - mean) ** 2).mean()
+        distances.append(float(abs(row - mean).max()) / float(variance) ** 0.5)
+    return distances
+
+
+def test_distances_are_in_deviations_of_the_other_rows():
+    rows = np.random.default_rng(0).normal(size=(12, 3))
+    rows[4, 1] = 1e12
+    rows += 1e3
+    np.testing.assert_allclose(deviations(rows), exact(rows.tolist()), rtol=1e-12)
+
+
+def test_where_the_others_are_all_equal_nothing_is_far():
+    rows = np.full((12, 2), 0.1)
+    rows[3] = 7.0
+    assert deviations(rows)[3] == 0.0
+
+
+def test_a_trial_that_a_feature_puts_far_outside_is_named(fitted):
+    dataset = fitted.measured.of(["max_force"])
+    X = dataset.features(fitted.window_s, fitted.samples)
+    widths = dataset.widths(fitted.samples)
+    assert list(by_features(dataset, X, widths)) == []
+    X[5] *= 400.0
+    (line,) = by_features(dataset, X, widths)
+    assert f"{dataset.trials[5].path}: its max_force lies " in line
+
+
+def test_few_trials_do_not_tell_what_is_usual(fitted):
+    few = fitted.measured.of(["max_force"]).part(np.arange(fitted.X.shape[0]) < 5)
+    X = few.features(fitted.window_s, fitted.samples)
+    X[2] *= 1e6
+    assert len(X) < FEWEST_TRIALS
+    assert list(by_features(few, X, few.widths(fitted.samples))) == []
+
+
+def with_angle(dataset, angle, limits):
+    """The trials with one angle at frame 7 of the second, and other limits."""
+    trials = list(dataset.trials)
+    joints = trials[1].recording.joints.copy()
+    joints[7, 2] = angle
+    recording = replace(trials[1].recording, joints=joints)
+    trials[1] = replace(trials[1], recording=recording)
+    names = dataset.chain.names
+    chain = SimpleNamespace(names=names, limits=(limits,) * len(names))
+    return replace(dataset, trials=tuple(trials), chain=chain)
+
+
+def test_a_joint_without_limits_is_named_far_outside_all_others(fitted):
+    wrong = with_angle(fitted.measured, 9.0, None)
+    (line,) = by_joints(wrong)
+    assert "at frame 7 joint upper_arm_roll is at 9, " in line
+    assert "deviations outside all other recordings" in line
+
+
+def test_a_joint_beyond_its_limits_is_named(fitted):
+    (line,) = by_joints(with_angle(fitted.measured, 3.5, (-3.2, 3.2)))
+    assert "at frame 7 joint upper_arm_roll is at 3.5, beyond its limits" in line
+
+
+def test_usual_angles_are_not_named(fitted):
+    assert list(by_joints(with_angle(fitted.measured, 0.0, None))) == []

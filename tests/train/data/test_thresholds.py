@@ -1,0 +1,148 @@
+"""Thresholds from noise, and lower ones where touches are missed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+import train
+from edge.saving import save
+from train.data.thresholds import count_contacts, proposed
+
+GIVEN = {"features": ["paper"], "decision_points_s": (), "quick": True, "jobs": 1}
+
+
+def noisy(recording, seed):
+    """With noise of up to 40 counts on every taxel."""
+    noise = (
+        np.random.default_rng(seed)
+        .integers(0, 41, recording.frames.shape)
+        .astype(np.uint16)
+    )
+    return replace(recording, frames=np.maximum(recording.frames, noise))
+
+
+def weaker(recording, share, **skin):
+    """With a share of its force, and other thresholds; an entry of None is taken
+    out."""
+    skin = {**recording.meta["skin"], **skin}
+    kept = {key: value for key, value in skin.items() if value is not None}
+    frames = (recording.frames * share).astype(np.uint16)
+    return replace(recording, frames=frames, meta={**recording.meta, "skin": kept})
+
+
+def test_the_proposal_lies_above_the_noise_and_finds_every_contact(make_touch):
+    trials = [noisy(make_touch(seed=seed), seed) for seed in range(6)]
+    proposal = proposed(trials)
+    assert 70 <= proposal.threshold <= 80
+    assert proposal.onset == round(1.5 * proposal.threshold)
+    assert count_contacts(trials, proposal.threshold, proposal.onset) == (6, 6)
+    assert proposal.source == "the noise before contact"
+    assert count_contacts(trials, 60000, 60000) == (0, 0)
+
+
+def labelled(recording):
+    meta = {**recording.meta, "labels": {"object": "box"}}
+    return replace(recording, meta=meta)
+
+
+def begun(make_touch, seed):
+    """A touch whose recording begins in its middle."""
+    touch = labelled(noisy(make_touch(seed=seed), seed))
+    first = len(touch.t) // 2
+    return replace(
+        touch,
+        t=touch.t[first:],
+        frames=touch.frames[first:],
+        joints=touch.joints[first:],
+    )
+
+
+def test_recordings_that_begin_in_contact_give_no_noise_and_are_counted(make_touch):
+    quiet = [labelled(noisy(make_touch(seed=seed), seed)) for seed in range(12)]
+    late = [begun(make_touch, seed) for seed in range(20, 28)]
+    proposal = proposed(quiet + late)
+    assert 70 <= proposal.threshold <= 80
+    assert "8 of 20 begin in contact and give none" in proposal.source
+
+
+def test_without_an_untouched_part_the_quietest_taxels_give_the_threshold(make_touch):
+    late = [begun(make_touch, seed) for seed in range(8)]
+    proposal = proposed(late)
+    assert 10 <= proposal.threshold <= 40
+    assert "no recording has a part without contact" in proposal.source
+    assert count_contacts(late, proposal.threshold, proposal.onset)[0] == 8
+
+
+def test_where_every_taxel_is_pressed_throughout_the_threshold_is_0(make_touch):
+    rng = np.random.default_rng(0)
+    pressed = []
+    for seed in range(6):
+        touch = labelled(make_touch(seed=seed))
+        frames = rng.integers(900, 1000, touch.frames.shape).astype(np.uint16)
+        pressed.append(replace(touch, frames=frames))
+    proposal = proposed(pressed)
+    assert count_contacts(pressed, proposal.threshold, proposal.onset)[0] == 6
+    assert "no recording has a part without contact" in proposal.source
+
+
+def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
+    trials = []
+    for seed in range(4):
+        touch = make_touch(seed=seed)
+        soft = weaker(touch, 70.0 / touch.frames.max())
+        trials.append(
+            noisy(replace(soft, meta={**soft.meta, "labels": {"object": "down"}}), seed)
+        )
+    weak = proposed(trials)
+    assert weak.threshold == 40
+    assert weak.onset == 60  # the touch peaks at 70
+    strong = [noisy(make_touch(seed=seed), seed) for seed in range(4)]
+    assert proposed(strong).threshold == 80
+
+
+def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
+    make_touch,
+):
+    touch = make_touch(seed=0, lead_s=0.0)
+    slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
+    slow.frames[0] = 3
+    proposal = proposed([replace(slow, meta={"skin": slow.meta["skin"]})])
+    assert proposal.threshold == 6
+    assert proposal.onset == 9
+
+
+def saved(folder, make_touch, **skin):
+    for seed in range(20):
+        touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
+        save(
+            folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
+        )
+    return str(folder)
+
+
+def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_path):
+    high = {"threshold_counts": 150, "onset_counts": 200}
+    data = saved(tmp_path, make_touch, **high)
+    fitted = train.fit(data, **GIVEN)
+    assert fitted.dataset.layout.threshold_counts < 150
+    assert "recordings show no contact; in cross-validation" in fitted.notes[0]
+    assert not fitted.dataset.untouched
+    held = train.fit(data, **GIVEN, threshold=150)
+    assert held.dataset.layout.threshold_counts == 150
+    assert held.dataset.untouched
+
+
+def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
+    data = saved(tmp_path, make_touch, threshold_counts=None, onset_counts=None)
+    fitted = train.fit(data, **GIVEN)
+    assert "warning: the skin was saved without thresholds" in fitted.notes[0]
+    assert all(trial.onset_s > trial.recording.t[0] for trial in fitted.dataset.trials)
+
+
+def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
+    make_touch, tmp_path
+):
+    folder = saved(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
+    fitted = train.fit(folder, **GIVEN)
+    assert len(fitted.dataset.trials) == 20
+    assert any("no recording has a contact at its own" in note for note in fitted.notes)

@@ -1,0 +1,33 @@
+"""Products of two tasks, found by the training labels."""
+
+import numpy as np
+
+from train.model.agreement import factors_of, families, products
+
+TASKS = {
+    "category": np.array(
+        ["rigid-fixed", "rigid-movable", "soft-fixed", "soft-movable"]
+    ),
+    "mobility": np.array(["fixed", "movable", "fixed", "movable"]),
+    "object": np.array(["wall", "box", "pillow", "ball"]),
+    "softness": np.array(["rigid", "rigid", "soft", "soft"]),
+}
+
+
+def test_a_task_is_the_product_of_two_others_where_their_labels_say_so():
+    assert products(TASKS)["category"] == ("mobility", "softness")
+    assert "mobility" not in products(TASKS)
+    assert products({task: TASKS[task] for task in ("category", "mobility")}) == {}
+
+
+def test_each_label_of_a_product_stands_for_a_pair_and_no_task_is_in_two():
+    """`object` is a product by its labels too, but its factors are taken."""
+    assert products(TASKS)["object"] == ("mobility", "softness")
+    assert factors_of(TASKS) == {
+        "category": {"mobility": (0, 1, 0, 1), "softness": (0, 0, 1, 1)},
+    }
+    assert families(TASKS) == [("category", "mobility", "softness")]
+
+
+def test_a_pair_that_was_never_met_makes_no_product():
+    assert factors_of({task: labels[:3] for task, labels in TASKS.items()}) == {}

@@ -1,0 +1,160 @@
+"""Novelty: a score in whole numbers, and limits that held-out trials set."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from train.data.folds import stratified_folds
+from train.model.novelty import (
+    CLIP,
+    FARTHEST,
+    MOST_COMPONENTS,
+    STEP_BITS,
+    NoveltySpace,
+    held_out_scores,
+    limits_of,
+)
+
+WIDTHS = (20, 10)
+
+
+def trials(n, seed=0, points=2):
+    """Vectors (points, n, 30) around the means of four labels, and the labels."""
+    rng = np.random.default_rng(seed)
+    labels = np.array(list("abcd"))[np.arange(n) % 4]
+    mixing = np.random.default_rng(1).normal(size=(6, 30))
+    hidden = rng.normal(size=(points, n, 6)) + 5.0 * (np.arange(n) % 4)[:, None]
+    X = hidden @ mixing + 0.1 * rng.normal(size=(points, n, 30))
+    return X * np.repeat([1.0, 1e-4], WIDTHS), labels
+
+
+def integers(values):
+    """Whole numbers as Python's integers, which never overflow."""
+    return values.astype(np.int64).astype(object)
+
+
+def nearest_by_hand(space, x):
+    """The score of a vector at the first decision point, in integers."""
+    point = space.points[0]
+    most = int(CLIP * 2**STEP_BITS)
+    deviations = map(round, ((x - point.mean) * point.gain).tolist())
+    steps = np.array([min(max(d, -most), most) for d in deviations], dtype=object)
+    z = shifted(steps @ integers(space.weights), space.shift)
+    y = shifted(z @ integers(point.whitening), point.shift)
+    outside = max((steps**2).sum() - (z**2).sum(), 1)
+    squares = ((integers(point.rows) - y) ** 2).sum(axis=1)
+    return math.sqrt(outside) * math.sqrt(squares.min()) * point.unit
+
+
+def shifted(totals, shift):
+    """Integers divided by 2^shift, and rounded half to even."""
+    return np.array([round(Fraction(total, 1 << shift)) for total in totals], object)
+
+
+def test_the_score_is_that_of_integers():
+    X, labels = trials(60)
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    new, _ = trials(20, seed=5)
+    new[0, 10:] *= 3.0
+    expected = [nearest_by_hand(space, x) for x in new[0]]
+    assert min(expected) > 0.0
+    assert space.scores(new)[0].tolist() == expected
+
+
+def test_no_whole_number_reaches_2_to_the_53():
+    X, labels = trials(200)
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    columns, components = space.weights.shape
+    most = CLIP * 2.0**STEP_BITS
+    assert columns * most**2 < 2.0**53
+    assert (np.abs(space.weights).sum(axis=0) * most).max() < 2.0**53
+    for point in space.points:
+        # Components are no longer than the steps, but for the rounding of the weights.
+        longest = 1.01 * most * math.sqrt(columns)
+        assert (np.linalg.norm(point.whitening, axis=0) * longest).max() < 2.0**53
+        lengths = components * FARTHEST**2 + np.abs(point.rows).max() ** 2 * components
+        assert 2.0 * lengths < 2.0**53
+
+
+def test_what_is_stored_fits_16_bits():
+    X, labels = trials(60)
+    X[0, 0] *= 1000.0
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    assert 2**13 < np.abs(space.weights).max() < 2**15
+    for point in space.points:
+        assert 2**12 < np.abs(point.rows).max() < 2**14
+
+
+def test_a_shift_that_no_label_explains_is_novel():
+    X, labels = trials(120)
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    limits = limits_of(
+        "t", held_out_scores(X, labels, stratified_folds(labels), WIDTHS)
+    )
+    new, _ = trials(200, seed=9)
+    usual = [limits.rate(0, score) <= 0.02 for score in space.scores(new)[0]]
+    new[0, :, :5] += 1.0
+    shifted = [limits.rate(0, score) <= 0.02 for score in space.scores(new)[0]]
+    assert np.mean(usual) <= 0.06
+    assert np.mean(shifted) > 0.9
+
+
+def test_a_training_trial_is_not_novel():
+    X, labels = trials(60)
+    assert (NoveltySpace.of(X, labels, WIDTHS).scores(X) == 0.0).all()
+
+
+def test_units_of_a_feature_do_not_matter():
+    X, labels = trials(60)
+    new, _ = trials(30, seed=3)
+    scores = NoveltySpace.of(X, labels, WIDTHS).scores(new)
+    size = np.repeat([1.0, 2.0**40], WIDTHS)
+    scaled = NoveltySpace.of(X * size, labels, WIDTHS).scores(new * size)
+    assert scaled == pytest.approx(scores, rel=1e-3)
+
+
+def test_a_column_that_never_changed_counts_little_and_a_feature_not_at_all():
+    X, labels = trials(60)
+    X[..., 3] = 7.0
+    X[..., 20:] = 0.25
+    space = NoveltySpace.of(X, labels, WIDTHS)
+    assert 0.0 < space.points[0].gain[3] < np.inf
+    assert (space.points[0].gain[20:] == 0.0).all()
+
+
+def test_held_out_scores_do_not_depend_on_the_held_out_trials():
+    X, labels = trials(40)
+    folds = stratified_folds(labels, 5)
+    scores = held_out_scores(X, labels, folds, WIDTHS)
+    training = folds != 2
+    alone = NoveltySpace.of(X[:, training], labels[training], WIDTHS)
+    assert scores[:, ~training].tolist() == alone.scores(X[:, ~training]).tolist()
+
+
+def test_trials_without_a_fold_have_no_score():
+    X, labels = trials(40)
+    folds = stratified_folds(labels, 5)
+    folds[:4] = -1
+    scores = held_out_scores(X, labels, folds, WIDTHS)
+    assert np.isnan(scores[:, :4]).all()
+    assert np.isfinite(scores[:, 4:]).all()
+
+
+def test_limits_are_quantiles_up_to_a_tenth_and_an_exponential_tail_beyond():
+    scores = np.exp(np.arange(1000.0) / 100.0)[None]
+    limits = limits_of("t", scores)
+    assert limits.rates[0] == 0.5
+    assert limits.limits[0][0] == pytest.approx(math.exp(4.995))
+    tail = np.quantile(np.log(scores), 0.9)
+    excess = np.log(scores[np.log(scores) >= tail]).mean() - tail
+    expected = math.exp(tail + excess * math.log(0.1 / 0.02))
+    assert limits.limits[0][limits.rates.index(0.02)] == pytest.approx(expected)
+
+
+def test_few_trials_have_few_components():
+    X, labels = trials(12)
+    assert NoveltySpace.of(X, labels, WIDTHS).weights.shape == (30, 4)
+    X, labels = trials(400)
+    assert NoveltySpace.of(X, labels, WIDTHS).weights.shape[1] <= MOST_COMPONENTS

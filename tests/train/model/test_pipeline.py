@@ -1,0 +1,106 @@
+"""Votes, neighbours and all tasks of a model, against the rules and scikit-learn's own
+tools."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+
+from edge.errors import InputError
+from tests.hard_cases.models import features
+from train.model.pipeline import Choice, ContactClassifier, slope, vote
+from train.model.projection import Projection
+
+
+def test_votes_and_ties():
+    labels = np.array([[2, 0, 0], [1, 0, 2], [1, 0, 0], [2, 2, 0]])
+    assert vote(labels).tolist() == [0, 1, 0, 2]
+    assert vote(np.array([[2, 0]])).tolist() == [2]
+
+
+def test_equal_distances_go_to_the_earlier_row():
+    rows = np.array([[-1.0], [1.0], [-1.0], [3.0]])
+    y = {"t": np.array(["d", "c", "b", "a"])}
+    for k in (1, 2, 3):
+        model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
+            rows, y
+        )
+        assert model.classes_["t"][model.decide(np.array([[0.0]]))["t"].labels] == ["d"]
+
+
+def test_the_projection_works_in_a_scikit_learn_pipeline():
+    X = features(30)
+    y = np.repeat(["a", "b"], 15)
+    for kind in ("pca", "lda"):
+        pipe = make_pipeline(Projection("IV", 3, kind=kind), KNeighborsClassifier(1))
+        assert (pipe.fit(X, y).predict(X) == y).all()
+        assert cross_val_score(pipe, X, y, cv=5).shape == (5,)
+        copy = clone(pipe).fit(X, y)
+        assert (copy[0].weights_ == pipe[0].weights_).all()
+
+
+def test_a_classifier_answers_every_task_by_the_rules():
+    X = features(30)
+    y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
+    choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
+    model = ContactClassifier(choices).fit(X, y)
+    assert model.components_ == {"kind": 5, "object": 29}
+    squares = model.squares("object", X)
+    assert (squares.argmin(axis=1) == np.arange(30)).all()
+    assert not squares.diagonal().any()
+    assert (
+        model.classes_["object"][model.decide(X)["object"].labels] == y["object"]
+    ).all()
+
+
+def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
+    """At one size of gap the maximum is known: odds of 8.5 to 2.5 for 8 of 10, by half
+    a trial."""
+    assert slope(np.repeat([2.0, -2.0], [8, 2])) == pytest.approx(
+        np.log(8.5 / 2.5) / 2.0
+    )
+    assert slope(np.full(9, 1e-9)) == pytest.approx(np.log(9.5 / 0.5) * 1e9)
+    assert slope(np.repeat([1.0, -1.0], [1, 8])) == pytest.approx(1e-3)
+    assert slope(np.zeros(3)) == slope(np.zeros(0)) == 1.0
+
+
+def test_labels_that_say_nothing_of_new_trials_weigh_nothing():
+    """Discriminants of 200 columns separate any two labels of 40 trials, but not of new
+    ones."""
+    X = np.random.default_rng(0).normal(size=(40, 200))
+    y = {"real": np.tile(["a", "b"], 20)}
+    X[::2, 0] += 9.0
+    y["random"] = np.random.default_rng(1).permutation(y["real"])
+    choices = dict.fromkeys(y, Choice("none", 1, 1, "lda", 1e-3, weights=(0, 1)))
+    model = ContactClassifier(choices, ["max_force"], [200]).fit(X, y)
+    gaps = {
+        task: np.ptp(decision.distances, axis=1)
+        for task, decision in model.decide(X).items()
+    }
+    assert gaps["random"].max() < 2.0 < gaps["real"].min()
+    # Simulated trials that count for nothing say nothing either, though here they are
+    # all wrong.
+    doubled = (
+        np.vstack([X, -X]),
+        {task: np.tile(labels, 2) for task, labels in y.items()},
+    )
+    model.fit(*doubled, np.arange(80) < 40)
+    assert np.ptp(model.decide(X)["real"].distances, axis=1).min() > 2.0
+
+
+@pytest.mark.parametrize(
+    ("choice", "word"),
+    [
+        (Choice("none", 5, 31), "k must be 1 to 30"),
+        (Choice("none", 5, 0), "k must be"),
+        (Choice("none", 0, 1), "components must be"),
+        (Choice("VI", 5, 1), "scaling must be one of none, I"),
+    ],
+)
+def test_choices_that_make_no_sense_are_named(choice, word):
+    with pytest.raises(InputError, match=word):
+        ContactClassifier({"t": choice}).fit(
+            features(30), {"t": np.repeat(["a", "b"], 15)}
+        )

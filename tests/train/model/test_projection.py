@@ -1,0 +1,240 @@
+"""Projections against exact fractions, long double and fifty digits."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from edge.errors import InputError
+from tests.hard_cases import exact
+from tests.hard_cases.models import features
+from train.model.projection import Projection, Spectrum, coordinate_bits, principal_axes
+from train.model.scaling import SCALINGS
+
+
+def test_components_match_long_double_and_have_a_fixed_sign():
+    X = features(50)
+    _, axes, values = principal_axes(X)
+    centred = (X - X.mean(axis=0)).astype(np.longdouble)
+    covariance = centred.T @ centred
+    assert len(axes) == 49
+    # Each is an eigenvector of the long double scatter to within rounding of the
+    # largest.
+    residual = (
+        covariance @ axes.T.astype(np.longdouble)
+        - axes.T * values.astype(np.longdouble) ** 2
+    )
+    assert float(np.abs(residual).max()) < 1e-12 * float(values[0] ** 2)
+    top = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
+    assert (top > 0).all()
+    assert principal_axes(X[::-1])[1][:5] == pytest.approx(axes[:5], abs=1e-12)
+
+
+def test_the_sign_does_not_hang_on_rounding():
+    """Two features against each other: their entries are equal but for rounding."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        a, b = rng.normal(size=(2, 30))
+        X = 5.0 + np.repeat(np.column_stack([a, -a, 0.01 * b]), 40, axis=1)
+        weights = Projection("none", 2).fit(X).weights_
+        assert (weights[:40, 0] > 0.7 / 40**0.5).all()
+        assert (
+            Projection("none", 2).fit(X[rng.permutation(30)]).weights_ == weights
+        ).all()
+
+
+def test_components_stop_at_the_rank():
+    X = features(12)
+    fitted = Projection(components=20).fit(X)
+    assert fitted.weights_.shape[1] == 11
+    assert fitted.rank_ == 11
+    rank_two = np.outer(np.arange(30.0), X[0]) + np.outer(np.arange(30.0) ** 2, X[1])
+    assert Projection().fit(rank_two).rank_ == 2
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 100),
+    scaling=st.sampled_from(SCALINGS),
+    offset=st.sampled_from([0.0, 1e3, 1e6]),
+    spread=st.sampled_from([1e-6, 1.0, 1e6]),
+)
+def test_coordinates_are_those_of_whole_numbers_in_any_order(
+    seed,
+    scaling,
+    offset,
+    spread,
+):
+    X = features(30, seed) * spread + offset
+    p = Projection(scaling, 4).fit(X)
+    z = p.transform(X)
+    assert (z / p.grid_.unit).tolist() == exact.coordinates(X, p, 4).tolist()
+    d = (X - p.mean_) * p.gain_
+    order = np.random.default_rng(seed).permutation(120)
+    assert (p.grid_.project(d[:, order], p.weights_[order]) == z).all()
+
+
+@pytest.mark.parametrize("kind", ["pca", "lda"])
+@pytest.mark.parametrize("columns", [1, 3, 120, 4096])
+def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
+    """For features at their limit with the signs of the weights, the worst that can
+    come."""
+    X = np.random.default_rng(columns).normal(size=(30, columns))
+    X *= 10.0 ** np.linspace(0, 6, columns)
+    p = Projection("none", 20, ["max_force"], kind).fit(X, np.arange(30) % 5)
+    weights = exact.multiples(p.weights_, exact.smallest_bit(p.weights_))
+    assert max(map(abs, weights.ravel())) <= 2**24
+    assert max(sum(abs(weights)) * 2**24) < 2**53
+
+
+@pytest.mark.parametrize(
+    ("components", "bits"), [(0, 22), (20, 22), (115, 22), (116, 21), (500, 20)]
+)
+def test_squared_distances_stay_below_2_to_the_53(components, bits):
+    assert coordinate_bits(components) == bits
+    longest = 2**bits
+    limit = 2 ** (bits + 1)
+    assert (longest + components**0.5 * limit) ** 2 < 2**53
+
+
+@pytest.mark.parametrize("components", [1, 5, 19, 20])
+def test_the_grid_of_principal_components_does_not_depend_on_their_number(components):
+    """So that leave-one-out serves every number with one decomposition."""
+    X = features(40)
+    many = Projection("IV", 20).fit(X)
+    few = Projection("IV", components).fit(X)
+    assert few.grid_ == many.grid_
+    assert (few.transform(X) == many.transform(X)[:, :components]).all()
+
+
+def test_rounding_moves_a_coordinate_by_a_few_millionths_of_the_longest_row():
+    X = features(30)
+    p = Projection("none", 20).fit(X)
+    _, axes, _ = principal_axes(X)
+    true = (X - p.mean_).astype(np.longdouble) @ axes[:20].T.astype(np.longdouble)
+    longest = np.linalg.norm(X - p.mean_, axis=1).max()
+    assert float(np.abs(p.transform(X) - true).max()) < 2.0**-20 * longest
+
+
+def exact_distances(rows, labels, shrinkage):
+    """Squared distances of integer rows among their discriminants, to 50 digits."""
+    with mpmath.workdps(50):
+        n = len(rows)
+        X = mpmath.matrix(rows)
+        centred = X - mpmath.ones(n) * X / n
+        # The mean of each row's class.
+        shares = [
+            [mpmath.mpf(a == b) / labels.count(b) for b in labels] for a in labels
+        ]
+        means = mpmath.matrix(shares) * centred
+        scatter = centred.T * centred
+        between = means.T * means
+        ridge = shrinkage * sum(scatter[i, i] for i in range(X.cols)) / n
+        shrunk = scatter - between + ridge * mpmath.eye(X.cols)
+        # With shrunk = L L', the directions are L'^-1 v for the eigenvectors v of L^-1
+        # B L'^-1.
+        inverse = mpmath.cholesky(shrunk) ** -1
+        values, vectors = mpmath.eigsy(inverse * between * inverse.T)
+        z = np.array((X * inverse.T * vectors * mpmath.sqrt(n)).tolist())
+        z = z[:, np.array(values.tolist())[:, 0] > mpmath.mpf(10) ** -20]
+        return ((z[:, None] - z) ** 2).sum(axis=2).astype(float)
+
+
+ROWS = [
+    [3, 1, 4],
+    [1, 5, 9],
+    [2, 6, 5],
+    [3, 5, 8],
+    [9, 7, 9],
+    [3, 2, 3],
+    [8, 4, 6],
+    [2, 6, 4],
+]
+
+
+@pytest.mark.parametrize(
+    ("rows", "labels"),
+    [
+        pytest.param(ROWS, "aabbccaa", id="three classes"),
+        pytest.param(
+            [[*row, *row[::-1], 7, row[0] ** 2, *row] for row in ROWS[:6]],
+            "aabbcc",
+            id="more columns than trials, a constant one, copies",
+        ),
+        pytest.param(ROWS, "abcdefgh", id="one trial a class"),
+        pytest.param(ROWS, "abbbbbbb", id="a class of one"),
+        pytest.param([*ROWS[:4], *ROWS[:4]], "abcdabcd", id="equal trials"),
+        pytest.param([[a, 2 * a, -a] for a, *_ in ROWS], "abababab", id="rank 1"),
+        pytest.param(
+            [[a + 10**6, b, c - 10**6] for a, b, c in ROWS],
+            "aabbccaa",
+            id="offsets",
+        ),
+    ],
+)
+@pytest.mark.parametrize("shrinkage", [1.0, 0.1, 0.001])
+def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
+    """1e-16 of the largest eigenvalue, over the least that the ridge leaves: below
+    1e-11."""
+    indices = np.unique(list(labels), return_inverse=True)[1]
+    X = np.array(rows, dtype=np.float64)
+    weights = Spectrum(X).discriminants(indices, shrinkage)
+    assert weights.shape[1] <= min(len(set(labels)) - 1, X.shape[1])
+    z = X @ weights - (X @ weights).mean(axis=0)
+    ours = ((z[:, None] - z) ** 2).sum(axis=2)
+    exact = exact_distances(rows, labels, shrinkage)
+    assert np.abs(ours - exact).max() < 1e-9 * exact.max()
+
+
+def test_discriminants_have_a_fixed_sign_and_the_variance_one_within():
+    X = features(60)
+    labels = np.repeat([0, 1, 2], 20)
+    X[labels == 1, :40] += 3.0
+    X[labels == 2, 40:80] += 90.0
+    weights = Spectrum(X).discriminants(labels, 1e-9)
+    top = weights[np.abs(weights).argmax(axis=0), np.arange(2)]
+    assert (top > 0).all()
+    wide = features(900, seed=3)[:, ::7]
+    labels = np.repeat([0, 1, 2], 300)
+    wide[labels == 1] += 0.1
+    z = wide @ Spectrum(wide).discriminants(labels, 1e-9)
+    means = np.array([z[labels == c].mean(axis=0) for c in range(3)])
+    within = ((z - means[labels]) ** 2).mean(axis=0)
+    assert within == pytest.approx(np.ones(z.shape[1]), rel=1e-4)
+
+
+def test_the_discriminants_of_several_tasks_stand_side_by_side():
+    X = features(40)
+    sides = np.repeat(["a", "b"], 20)
+    shapes = np.tile(["x", "y", "z", "z"], 10)
+    together = Projection("IV", kind="lda").fit(X, np.column_stack([sides, shapes]))
+    alone = [Projection("IV", kind="lda").fit(X, y).weights_ for y in (sides, shapes)]
+    assert (together.weights_ == np.hstack(alone)).all()
+    assert together.rank_ == 3
+
+
+@pytest.mark.parametrize("value", [0.0, 7.5])
+def test_trials_that_are_all_equal_have_no_discriminant(value):
+    fitted = Projection(kind="lda").fit(
+        np.full((6, 120), value), np.repeat(["a", "b"], 3)
+    )
+    assert fitted.transform(np.zeros((2, 120))).shape == (2, 0)
+
+
+def test_discriminants_without_labels_or_shrinkage_and_unknown_projections_are_refused():
+    with pytest.raises(InputError, match="needs labels"):
+        Projection(kind="lda").fit(features(30))
+    for shrinkage in (0.0, -0.1, np.nan):
+        with pytest.raises(InputError, match="shrinkage of lda must be above 0, not"):
+            Projection(kind="lda", shrinkage=shrinkage).fit(
+                features(30), np.repeat(["a", "b"], 15)
+            )
+    with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
+        Projection(kind="nca").fit(features(30))
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9])
+def test_a_large_offset_adds_no_component(offset):
+    X = np.random.default_rng(1).normal(size=(12, 120))
+    assert len(principal_axes(X + offset)[1]) == 11

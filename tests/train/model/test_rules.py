@@ -1,0 +1,135 @@
+"""Learn-then-test: exact limits, walks that stop at the first failure, certificates
+that hold."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from edge.model.info import TEST_SHARE, StoppingRule
+from train.model.rules import (
+    NEVER,
+    RISK,
+    Course,
+    certify,
+    following,
+    stops,
+    upper_limit,
+)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)]
+)
+def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
+    limit = upper_limit(wrong, trials, 0.1)
+    assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
+    assert binom.cdf(wrong, trials, limit - 1e-6) > 0.1
+
+
+class TestStops:
+    CONFIDENCE = np.array([[0.9, 0.2, 0.9], [0.9, 0.8, 0.1], [0.1, 0.9, 0.2]])
+
+    def stop(self, unknown=(), **rule):
+        usual = {"error": 0.1, "mean_s": 1.0, "confidence": 0.7, "last": 2}
+        waits = np.zeros((3, 3), dtype=bool)
+        waits[tuple(np.array(unknown, dtype=int).reshape(-1, 2).T)] = True
+        return stops(self.CONFIDENCE, StoppingRule(**{**usual, **rule}), waits).tolist()
+
+    def test_at_the_first_decision_point_that_is_sure(self):
+        assert self.stop() == [0, 1, 0]
+
+    def test_a_fixed_window_waits_for_it_and_no_longer(self):
+        assert self.stop(confidence=NEVER, last=1) == [1, 1, 1]
+
+    def test_what_is_unknown_waits_until_it_is_known_or_for_the_full_window(self):
+        assert self.stop(unknown=[(0, 0), (1, 1), (2, 1)]) == [1, 2, 0]
+        assert self.stop(unknown=[(0, 1), (1, 1)], confidence=NEVER, last=0) == [
+            0,
+            2,
+            0,
+        ]
+
+
+SECONDS = np.array([0.4, 0.8, 1.2])
+
+
+def course(confidence, wrong):
+    """Of a task that is no product; no contact is unknown."""
+    return Course([confidence], [wrong], np.zeros_like(wrong))
+
+
+def drawn(n, rng):
+    """Confidences that are the probability of being right, and outcomes drawn with
+    them."""
+    final = rng.beta(8.0, 1.0, n)
+    confidence = np.stack([0.4 + 0.2 * final, 0.2 + 0.7 * final, final])
+    right = rng.random(n) < confidence
+    return confidence, right
+
+
+def test_the_first_rule_is_the_full_window_at_the_whole_level():
+    confidence, right = drawn(140, np.random.default_rng(1))
+    rules = certify(course(confidence, ~right), SECONDS)
+    wrong = int((~right[-1]).sum())
+    assert rules[0].error == pytest.approx(upper_limit(wrong, 140, TEST_SHARE * RISK))
+
+
+def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
+    """Right answers at the first decision point count for nothing once the full window,
+    which is tested first, has 20 of 100 wrong."""
+    wrong = np.zeros((3, 100), dtype=bool)
+    wrong[-1, :20] = True
+    rules = certify(course(np.full((3, 100), 0.9), wrong), SECONDS)
+    assert [rule.error for rule in rules] == [
+        pytest.approx(upper_limit(20, 100, TEST_SHARE * RISK))
+    ]
+
+
+def test_certificates_fail_no_oftener_than_they_say():
+    """Of 300 calibrations the share whose rule errs more often than certified; at most
+    a tenth."""
+    error = 0.2
+    rng = np.random.default_rng(2)
+    world_confidence, world = drawn(20_000, rng)
+    failed = 0
+    for _ in range(300):
+        confidence, right = drawn(100, rng)
+        able = [
+            rule
+            for rule in certify(course(confidence, ~right), SECONDS)
+            if rule.error <= error
+        ]
+        if able:
+            at = stops(world_confidence, able[-1], np.zeros_like(world))
+            failed += 1.0 - world[at, np.arange(20_000)].mean() > error
+    assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
+
+
+class TestProduct:
+    """Two factors and their product, which is decided when both are."""
+
+    SLOW = np.array([[0.2, 0.2], [0.2, 0.9], [0.2, 0.9]])
+    FAST = np.full((3, 2), 0.9)
+    WRONG = np.array([[True, True], [True, False], [False, False]])
+
+    def product(self):
+        right = np.zeros_like(self.WRONG)
+        return Course([self.FAST, self.SLOW], [right, self.WRONG], np.zeros_like(right))
+
+    def test_is_decided_with_the_later_factor_and_wrong_where_either_is(self):
+        at, wrong = self.product().under(StoppingRule(0.1, 1.0, 0.7, 2))
+        assert at.tolist() == [2, 1]
+        assert wrong.tolist() == [False, False]
+        at, wrong = self.product().under(StoppingRule(0.1, 1.0, NEVER, 0))
+        assert at.tolist() == [0, 0]
+        assert wrong.all()
+
+    def test_a_factor_follows_its_rules_at_its_own_pace_after_stricter_ones_of_its_own(
+        self,
+    ):
+        rules = [StoppingRule(0.2, 1.2, NEVER, 2), StoppingRule(0.3, 1.0, 0.7, 2)]
+        of_factor = [StoppingRule(0.1, 0.8, 0.9, 2), StoppingRule(0.25, 0.5, 0.6, 2)]
+        followed = following(of_factor, rules, course(self.FAST, self.WRONG), SECONDS)
+        assert [rule.error for rule in followed] == [0.1, 0.2, 0.3]
+        assert [rule.mean_s for rule in followed] == [0.8, 1.2, 0.4]
+        assert followed[2].confidence == rules[1].confidence

@@ -1,0 +1,111 @@
+"""The report of an export: the answers to left-out trials, and the reasons for wrong
+ones."""
+
+from dataclasses import replace
+
+import pytest
+
+import export
+import train
+from edge.model.model import Model
+from edge.recording import load
+from edge.saving import save
+from export.api import measure
+from tests.conftest import rows_of
+from train.report import model_report as report
+
+
+@pytest.fixture(scope="module")
+def written(recordings, tmp_path_factory):
+    """A report of 16 trials, of which hard_3 is labelled wrong and hard_7 touches
+    nothing."""
+    folder = tmp_path_factory.mktemp("labelled")
+    out = tmp_path_factory.mktemp("report")
+    for path in sorted(recordings.glob("*.npz")):
+        trial = load(path)
+        if path.stem == "hard_3":
+            trial = replace(
+                trial, meta={**trial.meta, "labels": {"category": "soft-fixed"}}
+            )
+        trial.meta["labels"] = {"category": trial.labels["category"]}
+        if path.stem == "hard_7":
+            trial = replace(trial, frames=0 * trial.frames)
+        save(folder / path.name, trial)
+    fitted = train.fit(
+        str(folder),
+        features=["paper"],
+        projection="pca",
+        quick=True,
+        jobs=1,
+    )
+    export.save(out / "model.onnx", fitted)
+    page = report.write(out, fitted, Model(out / "model.onnx"), measure(fitted))
+    return fitted, page
+
+
+def table(page, name):
+    return rows_of(page.parent / f"{name}.csv")
+
+
+def test_what_holds_for_every_task_stands_once_before_them(written):
+    text = written[1].read_text()
+    assert text.index("Wilson's for two fifths") < text.index("Accuracy: category")
+    assert 'aria-label="category: scores of each class"' in text
+
+
+def test_the_answers_are_those_that_the_nested_accuracy_counts(written):
+    fitted, page = written
+    result = fitted.chosen["category"].accuracy
+    answers = report.answers_of(fitted)["category"]
+    assert ((answers.answers[-1] == answers.truth) == result.hits).all()
+    rows = table(page, "recall_category")
+    # The touch that was missed is rigid, and counts as answered wrongly.
+    assert [(row["category"], row["trials"]) for row in rows] == [
+        ("rigid-fixed", "7"),
+        ("soft-fixed", "9"),
+    ]
+    right = sum(float(row["recall %"]) * int(row["trials"]) / 100.0 for row in rows)
+    assert right == pytest.approx(result.right, abs=0.01)
+    assert (
+        f"{result.accuracy:.1%} of 16 trials are classified correctly"
+        in page.read_text()
+    )
+    assert "The trials include 1 recording without a contact." in page.read_text()
+
+
+def test_a_wrong_answer_is_named_with_its_nearest_trial_and_its_strongest_pull(written):
+    fitted, page = written
+    rows = {row["trial"]: row for row in table(page, "wrong")}
+    assert len(rows) == (~fitted.chosen["category"].accuracy.hits).sum()
+    row = rows["hard_3"]
+    assert row["label"] == "soft-fixed"
+    assert row["answer"] == "rigid-fixed"
+    assert row["nearest trial"].startswith("hard_")
+    assert float(row["distance"]) < float(row["distance to its label"])
+    assert row["strongest pull"] in ("max_force", "contact_area", "contact_motion")
+    assert (page.parent / "wrong_category.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_features_learning_curve_and_prices_have_their_tables(written):
+    fitted, page = written
+    shares = [float(row["category, % of pull"]) for row in table(page, "features")]
+    assert sum(shares) == pytest.approx(100.0, abs=0.02)
+    learning = table(page, "learning")
+    assert [int(row["trials"]) for row in learning] == [
+        3,
+        6,
+        9,
+        12,
+    ]  # four of five folds of 15
+    hits = fitted.chosen["category"].accuracy.hits
+    assert float(learning[-1]["category %"]) == pytest.approx(
+        100 * hits.mean(), abs=0.01
+    )
+    assert [row["features"] for row in table(page, "candidates")] == ["paper"]
+    assert float(table(page, "candidates_timings")[0]["us per decision"]) > 0.0
+
+
+def test_the_page_stands_alone(written):
+    _, page = written
+    assert 'src="http' not in page.read_text()
+    assert page.read_text().count("<h2>") == 5 + len(written[0].chosen) - 1

@@ -1,0 +1,317 @@
+"""The candidates among features, scalings, projections and their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from edge.arrays import Integers
+from train.choose.search import NEIGHBOURS, SHRINKAGES, SearchGrid
+from train.data.feature_sets import expand
+from train.data.vectors import Labels
+from train.model.agreement import products
+from train.model.pipeline import Choice
+from train.model.projection import KINDS
+
+PLAIN = (
+    ("paper",),
+    ("contact",),
+    ("moments",),
+    ("contact", "moments"),
+    ("taxels",),
+    ("sqrt_taxels",),
+    ("kernels",),
+    ("moments", "zone_kernels"),
+)
+"""Combinations of feature sets that are candidates for recordings without joint
+angles."""
+WITH_JOINTS = (
+    ("paper",),
+    ("contact", "joints"),
+    ("moments", "joints"),
+    ("contact", "moments", "joints"),
+    ("contact", "sqrt_joints"),
+    ("taxels",),
+    ("sqrt_taxels",),
+    ("contact", "joints", "posture"),
+    ("moments", "joints", "posture"),
+    ("kernels", "joints"),
+    ("moments", "zone_kernels", "joints"),
+)
+"""Those for recordings with joint angles, whose changes show how far the thing gave
+way."""
+WITH_SHEAR = (
+    ("contact", "shear"),
+    ("moments", "shear"),
+)
+"""Those that recordings of a skin of three axes have besides, with or without joint
+angles."""
+EARLY_WITH_JOINTS = (
+    ("contact", "joints"),
+    ("moments", "joints"),
+    ("contact", "moments", "joints"),
+    ("contact", "sqrt_joints"),
+    ("sqrt_joints",),
+)
+"""Those tried at early decision points of recordings with joint angles. The arm tells
+that a thing has begun to move before the skin does. Roots let a small motion count."""
+DRAWN = ("contact",)
+DRAWN_WITH_JOINTS = ("contact", "joints")
+"""The combination tried for touches of simulated things that are drawn from kinds
+(`kinds_of`). Joint angles at onset and single taxels say how the scene is built.
+Moments say how large and of what form a contact is, in which simulators of soft things
+differ most. How far the contact turns the joints back is a second measure of how the
+thing gives way, whatever the skin."""
+QUICK = 3
+"""Combinations tried by a quick choice, from the first on."""
+COMPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 14, 20)
+QUICK_SHRINKAGES = (0.3, 0.03)
+FEW_NEIGHBOURS = (1, 3, 5)
+PAPER_SCALINGS = ("none", "I", "IV", "V")
+DRAWN_SHRINKAGES = (1.0, 0.3)
+DRAWN_COMPONENTS = (1, 2, 3, 4, 6, 8, 10)
+"""Those tried for touches of simulated things of several kinds, and the most
+discriminants. Another physics differs most in differences that are small beside the
+features' spread."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Features, and how they are projected.
+
+    Attributes:
+        sets: names of feature sets and of single features.
+        projection: one of `train.model.projection.KINDS`.
+        grids: the settings tried with them.
+        full: whether it is tried at the full window.
+        early: whether it is tried at early decision points.
+    """
+
+    sets: tuple[str, ...]
+    projection: str
+    grids: tuple[SearchGrid, ...]
+    full: bool = True
+    early: bool = False
+
+    @property
+    def name(self) -> str:
+        """The names of its features, as `--features` takes them."""
+        return " ".join(self.sets)
+
+
+def known_products(y: Labels) -> dict[str, tuple[str, str]]:
+    """{product: its factors}, where every trial with the one has labels of both."""
+    return {
+        task: factors
+        for task, factors in products(y).items()
+        if all((y[factor][y[task] != ""] != "").all() for factor in factors)
+    }
+
+
+def features_of(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """The features of some candidates, each once."""
+    return expand([name for candidate in candidates for name in candidate.sets])
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Settings that are not to be chosen; those that are None are.
+
+    Attributes:
+        features: names of sets and of single features.
+        projection: one of `train.model.projection.KINDS`.
+        scaling: one of `train.model.scaling.SCALINGS`.
+        components: coordinates.
+        k: neighbours.
+    """
+
+    features: Sequence[str] | None = None
+    projection: str | None = None
+    scaling: str | None = None
+    components: int | None = None
+    k: int | None = None
+
+    @property
+    def asks(self) -> bool:
+        """Whether features or a projection are asked for."""
+        return self.features is not None or self.projection is not None
+
+    def thorough(self, kind: str) -> bool:
+        """Whether more numbers are tried, as features are asked for by name."""
+        return self.features is not None and kind == "pca"
+
+
+CHOOSE_ALL = Fixed()
+
+
+def candidates(
+    y: Labels,
+    fixed: Fixed = CHOOSE_ALL,
+    *,
+    joints: bool = False,
+    shear: bool = False,
+    drawn: bool = False,
+    quick: bool = False,
+) -> list[Candidate]:
+    """Every candidate with the settings that are held fixed.
+
+    Features of several units need scaling by Method IV. Principal components of the
+    paper's three features are tried with more scalings and numbers where you ask for
+    these features only. Beside other candidates the best of so many settings would win
+    by chance. Methods II and III are left out, as Method I and no scaling have the same
+    neighbours. The discriminants of all tasks side by side tell known things best, so
+    they are tried where no group is left out. Where `kinds_of` names kinds (`drawn`)
+    only what carries over to other skins and arms is tried.
+    """
+    mode = Mode.drawn(joints) if drawn else Mode.usual(joints, shear, quick)
+    full = mode.full if fixed.features is None else [tuple(fixed.features)]
+    early = [] if fixed.asks else mode.early
+    projections = KINDS if fixed.projection is None else (fixed.projection,)
+    combinations = []
+    for sets, kind in product(dict.fromkeys((*full, *early)), projections):
+        if fixed.asks or mode.tries(kind, sets):
+            grid = _grid(sets, kind, fixed, mode)
+            grids = _scaled(_with_targets(grid, y, mode), sets, fixed)
+            candidate = Candidate(sets, kind, grids, sets in full, sets in early)
+            combinations.append(candidate)
+    return combinations
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The candidates that are tried by default.
+
+    Attributes:
+        full: feature sets that are tried together at the full window.
+        early: those of early decision points; none where these have the settings of the
+            full window.
+        shrinkages: of discriminants.
+        components: numbers of coordinates.
+        most_directions: of discriminants; None for all.
+        components_alone: try principal components of other sets than the paper's.
+        together: try the discriminants of all tasks side by side.
+    """
+
+    full: Sequence[tuple[str, ...]]
+    early: Sequence[tuple[str, ...]]
+    shrinkages: tuple[float, ...]
+    components: tuple[int, ...]
+    most_directions: int | None
+    components_alone: bool
+    together: bool
+
+    @classmethod
+    def drawn(cls, joints: bool) -> Mode:
+        """The mode of things that a scene drew from kinds."""
+        return cls(
+            full=[DRAWN_WITH_JOINTS if joints else DRAWN],
+            early=[],
+            shrinkages=DRAWN_SHRINKAGES,
+            components=DRAWN_COMPONENTS,
+            most_directions=DRAWN_COMPONENTS[-1],
+            components_alone=False,
+            together=False,
+        )
+
+    @classmethod
+    def usual(cls, joints: bool, shear: bool, quick: bool) -> Mode:
+        """The mode of all others, or of a quick choice."""
+        usual = WITH_JOINTS if joints else PLAIN
+        angles = ("joints",) if joints else ()
+        sheared = [(*sets, *angles) for sets in WITH_SHEAR] if shear else []
+        has_early = joints and not quick
+        return cls(
+            full=[*usual[: QUICK if quick else None], *sheared],
+            early=[*EARLY_WITH_JOINTS, *sheared] if has_early else [],
+            shrinkages=QUICK_SHRINKAGES if quick else SHRINKAGES,
+            components=COMPONENTS,
+            most_directions=None,
+            components_alone=not quick,
+            together=True,
+        )
+
+    def tries(self, kind: str, sets: Sequence[str]) -> bool:
+        """Whether a projection of some feature sets is tried by default.
+
+        Discriminants are not, for the paper's few features. A quick choice tries
+        discriminants alone for the others. So does one for simulated things, because
+        principal components do not hold back the coordinates in which simulators
+        differ.
+        """
+        if sets == ("paper",):
+            return kind == "pca"
+        return kind == "lda" or self.components_alone
+
+
+def _grid(sets: tuple[str, ...], kind: str, fixed: Fixed, mode: Mode) -> SearchGrid:
+    """The numbers that are tried for some feature sets and a projection."""
+    neighbours = NEIGHBOURS if fixed.thorough(kind) else FEW_NEIGHBOURS
+    components = mode.components if fixed.components is None else (fixed.components,)
+    return SearchGrid(
+        projection=kind,
+        features=expand(sets),
+        components=components,
+        shrinkages=mode.shrinkages,
+        most_directions=mode.most_directions,
+        neighbours=neighbours if fixed.k is None else (fixed.k,),
+    )
+
+
+def _with_targets(grid: SearchGrid, y: Labels, mode: Mode) -> list[SearchGrid]:
+    """A grid, and those of discriminants of several tasks side by side."""
+    grids = [grid]
+    if grid.projection == "pca":
+        return grids
+    pairs = known_products(y)
+    for task, factors in pairs.items():
+        grids.append(replace(grid, targets=factors, tasks=(task,)))
+    complete = [task for task in sorted(y) if (y[task] != "").all()]
+    together = tuple(task for task in complete if task not in pairs)
+    if mode.together and len(together) > 1:
+        grids.append(replace(grid, targets=together))
+    return grids
+
+
+def _scaled(
+    grids: Sequence[SearchGrid],
+    sets: Sequence[str],
+    fixed: Fixed,
+) -> tuple[SearchGrid, ...]:
+    """The grids with each method of scaling that is tried."""
+    methods: Sequence[str] = ("IV",)
+    if fixed.scaling is not None:
+        methods = (fixed.scaling,)
+    elif sets == ("paper",) and fixed.thorough(grids[0].projection):
+        methods = PAPER_SCALINGS
+    scaled = product(methods, grids)
+    return tuple(replace(grid, scaling=method) for method, grid in scaled)
+
+
+def costs(choices: Sequence[Choice], widths: Mapping[str, int]) -> Integers:
+    """(choices,) rank of the price of each choice's features, projection and targets,
+    from 0.
+
+    The price is the number of weights of the largest projection tried: these are
+    fitted, stored on the board and multiplied for a decision. At an equal price the
+    first choice ranks lower.
+
+    Args:
+        choices: the candidates' settings.
+        widths: columns of each feature.
+    """
+    sizes: dict[tuple[object, ...], int] = {}
+    kinds = [(choice.features, choice.projection, choice.targets) for choice in choices]
+    for kind, choice in zip(kinds, choices, strict=True):
+        columns = sum(widths[name] for name in choice.features or widths)
+        sizes[kind] = max(sizes.get(kind, 0), choice.components * columns)
+    ranking = sorted(sizes, key=sizes.__getitem__)
+    return np.array([ranking.index(kind) for kind in kinds])
+
+
+def places_of(candidate: Candidate, choices: Sequence[Choice]) -> Integers:
+    """Indices of the choices that belong to a candidate."""
+    names = {(grid.features, grid.projection) for grid in candidate.grids}
+    return np.flatnonzero([(c.features, c.projection) in names for c in choices])

@@ -1,0 +1,503 @@
+"""The choice among the candidates, by nested cross-validation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from edge.arrays import Booleans, Floats, Integers
+from train.choose.candidates import Candidate, costs, features_of, places_of
+from train.choose.evaluate import (
+    VARIANCE,
+    AnswerTable,
+    Promise,
+    Result,
+    Rule,
+    averaged,
+    evaluate,
+    fits,
+)
+from train.choose.search import SearchGrid
+from train.data.dataset import DataSet
+from train.data.groups import TRIAL, Divisions, Groups
+from train.data.labels import NO_CONTACT
+from train.data.vectors import Labels, Vectors
+from train.model.agreement import families
+from train.model.pipeline import Choice, Choices
+from train.model.stopping import Early, held_out
+from train.progress import bar
+
+EARLY_SHARES = (0.25, 0.5, 0.75)
+"""Parts of the full window at which the settings of the earlier decision points are
+chosen, by the mean of their accuracies."""
+UNSEEN_MARGIN = 0.01
+"""Accuracy on left-out groups within which the cheaper candidate is taken."""
+UNSEEN_SHRINKAGE = 0.1
+"""Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
+differences that are small beside the features' spread, which do not carry over to new
+objects."""
+WINDOW_MARGIN = 0.02
+"""Accuracy that is not worth twice the wait."""
+
+
+Plan = tuple[Integers, Sequence[Choices]]
+"""(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
+
+
+@dataclass(frozen=True)
+class EarlySettings:
+    """The settings of the decision points before the full window.
+
+    Attributes:
+        settings: chosen as those of the full window are.
+        settings_of_known: chosen for objects that were recorded.
+    """
+
+    settings: Early
+    settings_of_known: Early
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The settings that a task is fitted with, and their accuracy.
+
+    Attributes:
+        choice: the features, scaling, projection and numbers.
+        accuracy: nested accuracy of the entire choice, with entire groups left out
+            where `left_out` is not `trial`. Tasks that agree are decided together, as
+            the model does. Its interval is that of the exported model on other trials.
+        by_trial: the same with single trials left out.
+        left_out: `trial`, or the label whose groups were left out.
+        candidates: nested accuracy of each candidate's own choice of numbers, by the
+            task alone.
+        picks: the best settings of each candidate.
+        folds: (n,) of `accuracy`.
+        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
+            `accuracy` counts: those of the task and of the tasks that are decided
+            together with it.
+        choice_of_known: the settings that are best for objects that were recorded, where groups
+            were left out to choose the others.
+        known_by_fold: [fold] the same, chosen without the fold's trials.
+    """
+
+    choice: Choice
+    accuracy: Promise
+    by_trial: Promise
+    left_out: str
+    candidates: tuple[Promise, ...] = ()
+    picks: tuple[Choice, ...] = ()
+    folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
+    by_fold: tuple[dict[str, Choice], ...] = ()
+    choice_of_known: Choice | None = None
+    known_by_fold: tuple[Choice, ...] = ()
+
+
+class Choosing:
+    """Chooses the window, and each task's settings, among candidates.
+
+    Args:
+        dataset: measured for every candidate.
+        y: {task: (n,) labels}.
+        candidates: those of early decision points among them.
+        divisions: the trials that are left out together.
+        samples: values of a feature.
+        jobs: processes.
+        progress: show progress bars on stderr.
+    """
+
+    def __init__(
+        self,
+        dataset: DataSet,
+        y: Labels,
+        candidates: Sequence[Candidate],
+        divisions: Divisions,
+        samples: int,
+        jobs: int = 1,
+        progress: bool = False,
+    ) -> None:
+        self._dataset = dataset
+        self._y = y
+        self.candidates = [candidate for candidate in candidates if candidate.full]
+        self._early_candidates = [
+            candidate for candidate in candidates if candidate.early
+        ]
+        self._divisions = divisions
+        self._groups = divisions.groups
+        self._samples = samples
+        self._jobs = jobs
+        self._progress = progress
+        self._widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+
+    def _is_grouped(self, task: str) -> bool:
+        """Whether entire groups are left out for a task."""
+        return self._groups is not None and task in self._groups.tasks
+
+    def _vectors(self, window_s: float) -> Vectors:
+        """The trials at a window."""
+        dataset = self._dataset.with_kernels(window_s)
+        return dataset.vectors(window_s, self._samples, self._y)
+
+    def _tables(
+        self,
+        vectors: Vectors,
+        candidates: Sequence[Candidate],
+        what: str,
+        *,
+        nested: bool,
+        repeated: bool = True,
+    ) -> tuple[AnswerTable, AnswerTable]:
+        """The candidates' answers to left-out trials, and to left-out groups where
+        there are any.
+
+        Without groups, both are the answers to left-out trials.
+        """
+        folds = self._divisions.folds
+        further_folds = self._divisions.further if repeated else ()
+        grids = [grid for candidate in candidates for grid in candidate.grids]
+        total = fits(folds, nested)
+        total += sum(fits(division, False) for division in further_folds)
+        if self._groups is not None:
+            total += fits(self._groups.folds, nested)
+        # One bar for both tables, so that the time left is that of the whole choice.
+        with bar(
+            total=total,
+            desc=what,
+            unit=" fits",
+            disable=not self._progress,
+        ) as progress:
+            answers = partial(evaluate, jobs=self._jobs, progress=progress.update)
+            trials = answers(vectors, folds, grids, nested=nested)
+            further = [
+                answers(vectors, division, grids, nested=False)
+                for division in further_folds
+            ]
+            trials = replace(trials, repeated=tuple(further))
+            if self._groups is None:
+                return trials, trials
+            vectors = replace(vectors, y=_grouped_labels(self._groups, self._y, grids))
+            unseen = _unseen(self._groups, grids)
+            groups = answers(vectors, self._groups.folds, unseen, nested=nested)
+        return trials, groups
+
+    def _right(self, window_s: float) -> dict[str, Floats]:
+        """{task: the shares of right answers to each trial, of the candidate that is
+        best in plain cross-validation}."""
+        vectors = self._vectors(window_s)
+        what = f"{window_s:g} s"
+        trials, groups = self._tables(vectors, self.candidates, what, nested=False)
+        right: dict[str, Floats] = {}
+        for task in self._y:
+            table = groups if self._is_grouped(task) else trials
+            answers = table.held_out(task)[:, table.tested[task]]
+            right[task] = answers[Rule().choose(answers)]
+        return right
+
+    def accuracy(self, window_s: float) -> float:
+        """Mean accuracy of the tasks in plain cross-validation; missed touches count as
+        wrong."""
+        accuracies = []
+        for task, right in self._right(window_s).items():
+            result = Result(round(right.sum()), len(right))
+            untouched = self._dataset.untouched_labels(task)
+            accuracies.append(promised(result, untouched).accuracy)
+        return sum(accuracies) / len(accuracies)
+
+    def window(self, windows: Sequence[float]) -> tuple[float, list[str]]:
+        """The shortest of some windows at which every task is about as accurate as at
+        its best.
+
+        A task may lose a standard error, or `WINDOW_MARGIN`.
+
+        Returns:
+            The window in seconds, and sentences that say why.
+        """
+        if len(windows) == 1:
+            return windows[0], []
+        by_window = [self._right(window_s) for window_s in windows]
+        shortest = Rule(np.arange(len(windows)), margin=WINDOW_MARGIN)
+        place = 0
+        shares = []
+        for task in self._y:
+            right = np.array([answers[task] for answers in by_window])
+            place = max(place, shortest.choose(right))
+            accuracies = zip(right.mean(axis=1), windows, strict=True)
+            of_task = [f"{share:.0%} at {w:g} s" for share, w in accuracies]
+            shares.append(f"{task} {', '.join(of_task)}")
+        return windows[place], [
+            f"the window is {windows[place]:g} s, as the touches last longer than "
+            f"{windows[0]:g} s; in cross-validation {'; '.join(shares)} (--window sets "
+            "it)"
+        ]
+
+    def choose(
+        self, window_s: float
+    ) -> tuple[dict[str, Chosen], Integers, list[dict[str, Choice]]]:
+        """Each task's settings.
+
+        Returns:
+            {task: its settings}, the fold of each trial, and
+            [fold]{task: the choice made without the fold's trials}.
+        """
+        vectors = self._vectors(window_s)
+        trials, groups = self._tables(vectors, self.candidates, "choosing", nested=True)
+        chosen = {}
+        of_task = {}
+        for task in self._y:
+            chosen[task], of_task[task] = self._settle(task, trials, groups)
+        without = _by_fold(of_task)
+        plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
+        if self._groups is not None:
+            by_group = {
+                task: self._without_groups(task, groups) for task in groups.right
+            }
+            plans[self._groups.name] = groups.folds, _by_fold(by_group)
+        together = decided_together(chosen, vectors, plans, self._jobs)
+        return together, trials.folds, without
+
+    def early(
+        self,
+        window_s: float,
+        chosen: Mapping[str, Chosen],
+    ) -> EarlySettings | None:
+        """The settings of the decision points before the full window, by the same rule
+        as those of the full window; None without candidates for them."""
+        if not self._early_candidates:
+            return None
+        tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
+        trials = averaged([by_trial for by_trial, _ in tables])
+        groups = averaged([by_group for _, by_group in tables])
+        of_known = {}
+        usual = {}
+        for task in self._y:
+            k = chosen[task].choice.k
+            of_known[task] = self._settle_early(task, trials, k)
+            usual[task] = of_known[task]
+            if self._is_grouped(task):
+                usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
+        return EarlySettings(_early(window_s, usual), _early(window_s, of_known))
+
+    def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
+        """The answers of the candidates for early decision points at one of them."""
+        candidates = self._early_candidates
+        dataset = self._dataset.of(features_of(candidates))
+        vectors = dataset.vectors(window_s, self._samples, self._y)
+        what = f"{window_s:g} s"
+        return self._tables(vectors, candidates, what, nested=False, repeated=False)
+
+    def _settle_early(
+        self,
+        task: str,
+        table: AnswerTable,
+        k: int,
+        margin: float = 0.0,
+    ) -> list[Choice]:
+        """A task's settings by a table, and those chosen without each fold of the
+        trials.
+
+        The graph has one number of neighbours, `k`, for all decision points.
+        """
+        choices = table.choices[task]
+        allowed = np.flatnonzero([choice.k == k for choice in choices])
+        rule = replace(self._rule(task, table, margin), allowed=allowed)
+        folds = self._divisions.folds
+        places = [table.chosen(task, rule), *table.by_other_fold(task, folds, rule)]
+        return [choices[place] for place in places]
+
+    def _rule(self, task: str, table: AnswerTable, margin: float = 0.0) -> Rule:
+        """The rule that chooses among a table's candidates."""
+        return Rule(costs(table.choices[task], self._widths), margin=margin)
+
+    def _settle(
+        self,
+        task: str,
+        trials: AnswerTable,
+        groups: AnswerTable,
+    ) -> tuple[Chosen, list[Choice]]:
+        """A task's settings, by the answers to left-out trials and to left-out groups;
+        and [fold] those chosen without the trials of a fold.
+
+        These too are chosen by answers to left-out groups, where the settings are.
+        """
+        if self._groups is None or not self._is_grouped(task):
+            left_out = TRIAL
+            count = 0
+            table = trials
+            rule = self._rule(task, trials)
+            places = trials.by_fold(task, rule)
+        else:
+            left_out = self._groups.name
+            count = self._groups.count(self._y[task])
+            table = groups
+            rule = self._rule(task, groups, UNSEEN_MARGIN)
+            places = groups.by_other_fold(task, trials.folds, rule)
+        choices = table.choices[task]
+        without = [choices[place] for place in places]
+        trial_places = [trials.choices[task].index(choice) for choice in without]
+        untouched = self._dataset.untouched_labels(task)
+        of_trials = promised(trials.answered(task, trial_places), untouched)
+        promise = partial(promised, untouched=untouched, groups=count)
+        by_error = self._rule(task, table)
+        candidate_rules = [
+            replace(by_error, allowed=places_of(candidate, choices))
+            for candidate in self.candidates
+        ]
+        chosen = Chosen(
+            choice=choices[table.chosen(task, rule)],
+            accuracy=promise(table.nested(task, rule)),
+            by_trial=of_trials,
+            left_out=left_out,
+            candidates=tuple(promise(table.nested(task, r)) for r in candidate_rules),
+            picks=tuple(choices[table.chosen(task, r)] for r in candidate_rules),
+            folds=table.folds,
+        )
+        if table is not trials:
+            chosen = self._with_known(chosen, task, trials)
+        return chosen, without
+
+    def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:
+        """A task's settings, with those that are best for recorded objects."""
+        choices = trials.choices[task]
+        rule = self._rule(task, trials)
+        return replace(
+            chosen,
+            choice_of_known=choices[trials.chosen(task, rule)],
+            known_by_fold=tuple(choices[i] for i in trials.by_fold(task, rule)),
+        )
+
+    def _without_groups(self, task: str, groups: AnswerTable) -> list[Choice]:
+        """[fold] a task's settings chosen without the groups of a fold."""
+        margin = UNSEEN_MARGIN if self._is_grouped(task) else 0.0
+        places = groups.by_fold(task, self._rule(task, groups, margin))
+        return [groups.choices[task][place] for place in places]
+
+
+def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
+    """The candidates for groups that are left out: with more shrinkage, and without
+    discriminants of these groups."""
+    unseen = []
+    for grid in grids:
+        if groups.name not in grid.targets:
+            enough = tuple(s for s in grid.shrinkages if s >= UNSEEN_SHRINKAGE)
+            unseen.append(replace(grid, shrinkages=enough))
+    return unseen
+
+
+def _grouped_labels(groups: Groups, y: Labels, grids: Sequence[SearchGrid]) -> Labels:
+    """The labels that answers to left-out groups need: of all tasks where a grid has
+    targets, else of those with groups and of the tasks that agree with them."""
+    if any(grid.targets for grid in grids):
+        return y
+    together = [family for family in families(y) if groups.tasks & {*family}]
+    tasks = groups.tasks.union(*together)
+    return {task: y[task] for task in y if task in tasks}
+
+
+def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]:
+    """[fold]{task: its choice} from {task: [fold] its choice}."""
+    folds = zip(*choices.values(), strict=True)
+    return [dict(zip(choices, of_fold, strict=True)) for of_fold in folds]
+
+
+def _early(window_s: float, settled: Mapping[str, Sequence[Choice]]) -> Early:
+    """Early settings from {task: its choice, and the choice made without each fold}."""
+    choices, *by_fold = _by_fold(settled)
+    return Early(window_s, choices, by_fold)
+
+
+def decided_together(
+    chosen: Mapping[str, Chosen],
+    vectors: Vectors,
+    plans: Mapping[str, Plan],
+    jobs: int = 1,
+) -> dict[str, Chosen]:
+    """The tasks' settings with `by_fold`, and with the accuracies of the decisions of a
+    model.
+
+    A model decides tasks that agree together (`edge.model.agreement`).
+
+    Args:
+        chosen: {task: its settings}, with the accuracies of the task by itself.
+        vectors: (n, p) of the trials.
+        plans: {`left_out`: (n,) folds, and [fold]{task: the choice made without its
+            trials}}.
+        jobs: processes.
+    """
+    together = {}
+    for task, settings in chosen.items():
+        together[task] = _planned(settings, plans, (task,))
+    for family in families(vectors.y):
+        right = {}
+        for left_out in {TRIAL, *(chosen[task].left_out for task in family)}:
+            right[left_out] = _right_together(family, vectors, plans[left_out], jobs)
+        for task in family:
+            settings = _planned(chosen[task], plans, family)
+            together[task] = replace(
+                settings,
+                accuracy=_recounted(settings.accuracy, right[settings.left_out][task]),
+                by_trial=_recounted(settings.by_trial, right[TRIAL][task]),
+            )
+    return together
+
+
+def _planned(
+    settings: Chosen,
+    plans: Mapping[str, Plan],
+    tasks: Sequence[str],
+) -> Chosen:
+    """A task's settings with `by_fold`, of the tasks that are decided together."""
+    _, by_fold = plans[settings.left_out]
+    of_tasks = [_of_tasks(by_task, tasks) for by_task in by_fold]
+    return replace(settings, by_fold=tuple(of_tasks))
+
+
+def _of_tasks(choices: Choices, tasks: Sequence[str]) -> dict[str, Choice]:
+    """{task: its choice} of some tasks."""
+    return {task: choices[task] for task in tasks}
+
+
+def _recounted(result: Promise, hits: Booleans) -> Promise:
+    """A result with other answers to the same trials."""
+    assert result.hits is not None
+    more = int(hits.sum()) - int(result.hits.sum())
+    return replace(result, right=result.right + more, hits=hits)
+
+
+def _right_together(
+    family: Sequence[str],
+    vectors: Vectors,
+    plan: Plan,
+    jobs: int,
+) -> dict[str, Booleans]:
+    """{task: whether the label named without a trial's fold is right} of tasks that are
+    decided together, for the trials with a fold and a label."""
+    folds, choices = plan
+    at_end = replace(vectors, X=vectors.X[None])
+    of_family = [[_of_tasks(by_task, family)] for by_task in choices]
+    right = {task: np.zeros(len(folds), dtype=bool) for task in family}
+    for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
+        in_fold = folds == fold
+        for task, (labels, _) in answers.items():
+            right[task][in_fold] = labels[0] == vectors.y[task][in_fold]
+    return {
+        task: hits[(folds >= 0) & (vectors.y[task] != "")]
+        for task, hits in right.items()
+    }
+
+
+def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
+    """A result as a promise of the accuracy on other trials, or on other groups.
+
+    Args:
+        result: on the trials with a contact.
+        untouched: labels of the recordings without one. Missed touches count as wrong,
+            and recordings of no touch as right.
+        groups: number of the groups left out; 0 for single trials.
+    """
+    right = result.right + untouched.count(NO_CONTACT)
+    total = result.total + len(untouched)
+    variance = max(VARIANCE, total / groups if groups else 0.0)
+    counted = {"right": right, "total": total, "variance": variance}
+    return Promise(**{**vars(result), **counted})

@@ -1,0 +1,114 @@
+"""The usual decision points of a model: as many as calibration and its size allow."""
+
+from __future__ import annotations
+
+from edge.touch.features import WINDOW_S
+from train.choose.settings import Settings
+from train.data.dataset import DataSet
+from train.model.novelty import MOST_COMPONENTS
+from train.model.pipeline import Choices
+from train.model.stopping import FEWEST
+
+STEPS_S = (0.1, 0.2, 0.3, 0.4, 0.6)
+"""Steps between decision points. The first one that keeps the weights below
+`LARGEST_BYTES` is taken. With 0.1 s decisions come 30 to 40 ms sooner than with 0.2 s,
+at the same error (cody18, household)."""
+FIRST_S = 0.2
+"""The first decision point."""
+MOST_TRIALS = 2000
+"""With more trials early decisions take minutes to calibrate, so their decision points
+must be asked for."""
+LARGEST_BYTES = 1_150_000
+"""Bytes of weights with which a model stays below 1.2 MB."""
+
+
+def usual_points(
+    dataset: DataSet,
+    settings: Settings,
+    samples: int,
+    notes: list[str],
+) -> tuple[float, ...]:
+    """The decision points of a model, where none are asked for.
+
+    There are none without calibration, and fewer where the model would be too large.
+
+    Args:
+        dataset: measured for every candidate.
+        settings: of the model.
+        samples: values of a feature.
+        notes: takes a sentence where there are fewer.
+    """
+    tested = settings.tested
+    if tested < FEWEST:
+        notes.append(
+            "decisions carry no confidence and none is early: calibration needs at "
+            f"least {FEWEST} trials, not {tested}"
+        )
+        return ()
+    if tested > MOST_TRIALS:
+        notes.append(
+            f"no decision points before the full window: {tested} trials are more than "
+            f"the {MOST_TRIALS} for which they are made by default; --decision-points "
+            "asks for them"
+        )
+        return (settings.window_s,)
+    dataset = dataset.of(sorted(settings.features()))
+    for every_s in STEPS_S:
+        # A long window has as many decision points as the usual one.
+        step_s = every_s * max(settings.window_s / WINDOW_S, 1.0)
+        points = _rising(step_s, settings.window_s)
+        size = _size(len(points), dataset, settings, samples)
+        if size <= LARGEST_BYTES:
+            if every_s > STEPS_S[0]:
+                notes.append(
+                    f"{len(points)} decision points, one every {step_s:g} s, so that "
+                    "the model stays below 1.2 MB; --decision-points asks for more"
+                )
+            return tuple(points)
+    notes.append(
+        "no decision points before the full window: they would make the model about "
+        f"{size / 1e6:.1f} MB; --decision-points asks for them"
+    )
+    return (settings.window_s,)
+
+
+def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> int:
+    """Bytes of the constants of a model with so many decision points."""
+    columns = sum(dataset.widths(samples))
+    trials = len(dataset.trials)
+    shared = 2 * MOST_COMPONENTS * columns
+    novelty = MOST_COMPONENTS * (2 * trials + 4 * MOST_COMPONENTS)
+    novelty += 8 * columns + 8 * trials
+    early = settings.choices
+    if settings.early is not None:
+        early = {**early, **settings.early.settings.choices}
+    full = _bytes_of(settings.choices, dataset, samples)
+    before = (points - 1) * (novelty + _bytes_of(early, dataset, samples))
+    return shared + before + novelty + full
+
+
+def _bytes_of(choices: Choices, dataset: DataSet, samples: int) -> int:
+    """Bytes of the constants that project and compare at a decision point.
+
+    A column has a mean, a gain, and a weight for each coordinate; a trial its
+    coordinates and their length.
+    """
+    widths = dict(zip(dataset.names, dataset.widths(samples), strict=True))
+    trials = len(dataset.trials)
+    size = 0
+    for task, choice in choices.items():
+        columns = sum(widths[name] for name in choice.features)
+        classes = len(set(dataset.labels(task).tolist()))
+        components = min(choice.components, 2 * classes, trials)
+        size += columns * (16 + 4 * components) + trials * (8 + 4 * components)
+    return size
+
+
+def _rising(step_s: float, window_s: float) -> list[float]:
+    """Decision points one every `step_s`, up to the window."""
+    points = []
+    point_s = round(max(FIRST_S, step_s), 6)
+    while point_s < window_s:
+        points.append(point_s)
+        point_s = round(max(FIRST_S, step_s) + len(points) * step_s, 6)
+    return [*points, window_s]

@@ -1,0 +1,607 @@
+"""Recordings to feature vectors, with the code that runs on the board."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import compress
+from operator import not_
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from edge.arrays import Booleans, Floats
+from edge.errors import InputError
+from edge.files import read_bytes
+from edge.recording import LARGEST_BYTES, Recording, load
+from edge.saving import find
+from edge.touch import measures
+from edge.touch.arm import Chain
+from edge.touch.contact import Contact, FeatureSeries, feature_types
+from edge.touch.feature import KERNELS, Feature
+from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
+from edge.touch.frame import Frame
+from edge.touch.kernels import KernelTable, kernel_channels
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, WatchfulTracker
+from train.data.arms import arm_of, joint_angles
+from train.data.feature_sets import axes, moves, unit
+from train.data.kernels import MOST_TOUCHES, kernel_table
+from train.data.labels import completed, labels_of, shared_tasks
+from train.data.vectors import Labels, Strings, Vectors
+from train.progress import bar
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Recordings as read from their files.
+
+    Attributes:
+        paths: of the files, in their order.
+        recordings: one a file.
+        digest: SHA-256 over the files' bytes.
+    """
+
+    paths: tuple[Path, ...]
+    recordings: tuple[Recording, ...]
+    digest: str
+
+    @property
+    def of_owner(self) -> tuple[Recording, ...]:
+        """Those that are not simulated; all where all are."""
+        recordings = tuple(r for r in self.recordings if "simulation" not in r.meta)
+        return recordings or self.recordings
+
+    @property
+    def mixed(self) -> bool:
+        """Whether some are simulated, and some are not."""
+        return len(self.of_owner) < len(self.recordings)
+
+    @property
+    def joints(self) -> bool:
+        """Whether most of the owner's have joint angles."""
+        return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
+
+    @property
+    def shear(self) -> bool:
+        """Whether most of the owner's have shear."""
+        return bool(np.mean([r.shear is not None for r in self.of_owner]) > 0.5)
+
+    def split(self, part: str) -> tuple[Recordings, tuple[Path, ...]]:
+        """The recordings that have `joints` or `shear`, and the files of the others."""
+        has = [getattr(recording, part) is not None for recording in self.recordings]
+        with_part = replace(
+            self,
+            paths=tuple(compress(self.paths, has)),
+            recordings=tuple(compress(self.recordings, has)),
+        )
+        return with_part, tuple(compress(self.paths, map(not_, has)))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One contact of a recording: its first, or each of them where the recording says
+    so."""
+
+    path: Path
+    recording: Recording
+    labels: dict[str, str]
+    onset_s: float
+    series: FeatureSeries
+
+
+LabelledFile = tuple[Path, dict[str, str]]
+"""A recording's file, and {task: label}."""
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Trials of one skin.
+
+    Attributes:
+        trials: in the order of the files' names.
+        layout: the skin, with the thresholds used for all trials.
+        chain: the arm, where the trials have joint angles and a feature needs them;
+            motion is then in the world's frame.
+        untouched: recordings in which no contact was found, with their labels.
+        digest: SHA-256 over the recordings' bytes.
+        names: the features that were measured, by default the paper's three.
+        joints: number of joint angles, where a feature is made of them; else 0.
+        tasks: keys of the labels, sorted.
+        left_out: {missing label or joint angles: recordings left out for lack of it}.
+            Where each task is fitted on the trials that have it, those that lack it are
+            left out of it alone.
+        unused: recordings with more contacts than were used.
+        kernels: {feature: its table} of the features that are made of kernels, see
+            `with_kernels`.
+    """
+
+    trials: tuple[Trial, ...]
+    layout: SkinLayout
+    chain: Chain | None
+    untouched: tuple[LabelledFile, ...]
+    digest: str
+    names: tuple[str, ...]
+    joints: int
+    tasks: tuple[str, ...]
+    left_out: dict[str, tuple[Path, ...]]
+    unused: tuple[Path, ...]
+    kernels: Mapping[str, KernelTable] = field(default_factory=dict)
+
+    @property
+    def is_own(self) -> Booleans | None:
+        """(n,) whether a trial is the owner's; None where all, or none, are
+        simulated."""
+        is_own = ["simulation" not in trial.recording.meta for trial in self.trials]
+        return np.array(is_own) if len(set(is_own)) > 1 else None
+
+    def part(self, trials: Booleans) -> DataSet:
+        """Some of the trials (n,)."""
+        return replace(self, trials=tuple(compress(self.trials, trials)))
+
+    def untouched_labels(self, task: str) -> list[str]:
+        """The labels for a task of the recordings in which no contact was found."""
+        return [labels[task] for _, labels in self.untouched if task in labels]
+
+    def groups(self, key: str) -> Strings | None:
+        """(n,) each trial's value of a key in its labels or metadata; None where most
+        lack it.
+
+        Those that lack it are one group, as nobody knows which of them belong together.
+        """
+        values = [
+            trial.labels.get(key, trial.recording.meta.get(key))
+            for trial in self.trials
+        ]
+        if 2 * values.count(None) > len(values):
+            return None
+        return np.array(["" if value is None else str(value) for value in values])
+
+    def widths(self, samples: int = SAMPLES) -> tuple[int, ...]:
+        """Columns of each feature in `features`."""
+        return widths(self.names, samples, self.layout, self.joints)
+
+    def labels(self, task: str) -> Strings:
+        """(n,) the trials' labels for a task; empty where a trial has none."""
+        return np.array([trial.labels.get(task, "") for trial in self.trials])
+
+    def features(
+        self,
+        window_s: float = WINDOW_S,
+        samples: int = SAMPLES,
+        names: Sequence[str] | None = None,
+    ) -> Floats:
+        """(n, features * samples) feature vectors (see
+        `edge.touch.features.feature_vector`).
+
+        Args:
+            window_s: seconds from onset.
+            samples: times per feature.
+            names: some of the features measured; all where None.
+        """
+        names = self.names if names is None else tuple(names)
+        return np.stack(
+            [
+                feature_vector(t.series, window_s, samples, names, self.kernels)
+                for t in self.trials
+            ]
+        )
+
+    def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
+        """The feature vectors at a window, with the labels of some tasks."""
+        X = self.features(window_s, samples)
+        return Vectors(X, y, self.names, self.widths(samples), self.is_own)
+
+    def with_kernels(self, window_s: float) -> DataSet:
+        """The same trials with the tables that features of kernels need, for a window.
+
+        A model has one table, of its full window, for all its decision points: at half
+        of the window, tables of that window's own change the accuracy by less than its
+        interval.
+        """
+        every = -(-len(self.trials) // MOST_TOUCHES)
+        felt = [trial.series.felt(window_s) for trial in self.trials[::every]]
+        tables = {
+            name: kernel_table(
+                [kernel_channels(series, window_s, name) for series in felt],
+                KERNELS[name],
+                alike=name == "taxel_kernels",
+            )
+            for name in self.names
+            if name in KERNELS
+        }
+        return replace(self, kernels=tables)
+
+    def of(self, names: Sequence[str]) -> DataSet:
+        """The same trials with some of the features measured, in the order of
+        `self.names`."""
+        measured_names = tuple(name for name in self.names if name in names)
+        types = feature_types(measured_names)
+        return replace(
+            self,
+            names=measured_names,
+            layout=replace(self.layout, axes=axes(types)),
+            chain=self.chain if any(map(moves, types)) else None,
+            joints=self.joints if any(feature.of_joints for feature in types) else 0,
+            kernels={
+                name: table
+                for name, table in self.kernels.items()
+                if name in measured_names
+            },
+        )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each feature."""
+        return {name: unit(measures.feature(name), self.layout) for name in self.names}
+
+
+def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
+    """Read recordings, each file once.
+
+    Args:
+        data: `.npz` files and folders of them.
+        progress: show a progress bar on stderr.
+
+    Raises:
+        InputError: no file is named, or one cannot be used.
+    """
+    paths = find([str(path) for path in data])
+    if not paths:
+        raise InputError("no recordings given; name .npz files or a folder of them")
+    digest = hashlib.sha256()
+    recordings: list[Recording] = []
+    bad: list[str] = []
+    for path in bar(paths, desc="reading", unit=" trials", disable=not progress):
+        try:
+            contents = read_bytes(path, LARGEST_BYTES)
+            recordings.append(load(path, io.BytesIO(contents)))
+            digest.update(contents)
+        except InputError as error:
+            bad.append(str(error))
+    if bad:
+        more = f"; {len(bad) - 1} more cannot be used either" if len(bad) > 1 else ""
+        raise InputError(bad[0] + more)
+    return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The measures that are taken of each contact.
+
+    Attributes:
+        features: names of the features (see `edge.touch.measures`).
+        horizon_s: seconds from onset that are kept of each contact.
+        threshold: counts above which a taxel is in contact; those of the first
+            recording that is not simulated where None. All share it, as the board does
+            not know which object it touches.
+        onset: counts above which a contact begins; scaled with the threshold where
+            None.
+        arm: for recordings with joint angles that name no arm.
+    """
+
+    features: Sequence[str] = FEATURES
+    horizon_s: float = 2.0
+    threshold: int | None = None
+    onset: int | None = None
+    arm: Chain | None = None
+
+    @cached_property
+    def types(self) -> tuple[Feature, ...]:
+        """The features."""
+        return feature_types(tuple(self.features))
+
+    @property
+    def moves(self) -> bool:
+        """Whether a feature is measured in the world's frame."""
+        return any(map(moves, self.types))
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether a feature is made of joint angles."""
+        return any(feature.of_joints for feature in self.types)
+
+    def layout(self, data: Recordings) -> SkinLayout:
+        """The skin of recordings, as it is measured."""
+        skin = with_thresholds(data.of_owner[0].layout, self.threshold, self.onset)
+        return replace(skin, dead=_dead(data.recordings), axes=axes(self.types))
+
+
+USUAL = Measurement()
+"""The paper's three features, at the recorded thresholds."""
+
+
+def load_trials(
+    data: Recordings | Sequence[str | Path],
+    measurement: Measurement = USUAL,
+    *,
+    partial: bool = False,
+    progress: bool = False,
+    jobs: int = 1,
+) -> DataSet:
+    """Follow the contacts of recordings.
+
+    A recording's first contact is a trial, with the recording's labels. Where
+    `meta.contacts` is "alike", each of its contacts is a trial with these labels. Where
+    it is a list of labels, they belong to the contacts in their order. Labels that
+    follow from others are added (`train.data.labels.completed`). Recordings that lack a
+    label, or joint angles that a feature needs, are left out and named in `left_out`,
+    if most recordings have it.
+
+    Args:
+        data: recordings, or `.npz` files and folders of them.
+        measurement: what is measured.
+        partial: keep trials that have a label for some task.
+        progress: show progress bars on stderr.
+        jobs: processes.
+
+    Raises:
+        InputError: a file cannot be used, the skins differ, or nothing is labelled or
+            touched.
+    """
+    recordings = data if isinstance(data, Recordings) else read(data, progress=progress)
+    layout = measurement.layout(recordings)
+    recordings, without_shear = with_shear(recordings, layout)
+    posed = with_poses(recordings, measurement)
+    names = tuple(feature.name for feature in measurement.types)
+    tracked = {
+        "chain": posed.chain,
+        "horizon_s": measurement.horizon_s,
+        "features": names,
+        "joints": posed.joints,
+    }
+    work = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_followed)(recording, path, layout, **tracked)
+        for recording, path in posed.recordings
+    )
+    trials = bar(
+        work,
+        total=len(posed.recordings),
+        desc="following",
+        unit=" trials",
+        disable=not progress,
+    )
+    touched = collect(posed.recordings, trials, layout).completed()
+    tasks = shared_tasks(touched.labels, partial=partial)
+    labelled = touched.labelled(tasks, partial=partial)
+    left_out = {f"a label for {task}": touched.without(task) for task in tasks}
+    left_out |= {"joint angles": posed.without_joints, "shear": without_shear}
+    return DataSet(
+        trials=labelled.trials,
+        layout=layout,
+        chain=posed.chain,
+        untouched=labelled.untouched,
+        digest=recordings.digest,
+        names=names,
+        joints=posed.joints,
+        tasks=tasks,
+        left_out={need: paths for need, paths in left_out.items() if paths},
+        unused=touched.unused,
+    )
+
+
+Named = tuple[Recording, Path]
+"""A recording and its file."""
+
+
+def with_shear(
+    data: Recordings, layout: SkinLayout
+) -> tuple[Recordings, tuple[Path, ...]]:
+    """The recordings that have the shear that a layout asks for, and the other files.
+
+    Raises:
+        InputError: none has it.
+    """
+    if layout.axes is None:
+        return data, ()
+    sheared, without = data.split("shear")
+    if not sheared.paths:
+        raise InputError("no recording has shear, which the features need")
+    return sheared, without
+
+
+@dataclass(frozen=True)
+class Posed:
+    """The recordings that have the joint angles that the features need.
+
+    Attributes:
+        recordings: with their files; the angles are in the arm's order.
+        chain: the arm, where motion is measured in its base's frame.
+        joints: number of joint angles, where a feature is made of them.
+        without_joints: files that are left out, as they have no angles.
+    """
+
+    recordings: list[Named]
+    chain: Chain | None
+    joints: int
+    without_joints: tuple[Path, ...]
+
+
+def with_poses(data: Recordings, measurement: Measurement) -> Posed:
+    """Leave out recordings without joint angles, where most have them.
+
+    Raises:
+        InputError: the recordings have several arms.
+    """
+    without: tuple[Path, ...] = ()
+    if data.joints and (measurement.of_joints or measurement.moves):
+        data, without = data.split("joints")
+    named: list[Named] = []
+    arms: list[Chain | None] = []
+    for recording, path in zip(data.recordings, data.paths, strict=True):
+        chain = arm_of(recording, str(path), measurement.arm)
+        arms.append(chain)
+        if chain is not None:
+            recording = recording.for_joints(chain.names)
+        named.append((recording, path))
+    chain = arms[0] if measurement.moves and None not in arms else None
+    if chain is not None:
+        require_one_arm(named, arms, chain)
+    joints = joint_angles(named) if measurement.of_joints else 0
+    return Posed(named, chain, joints, without)
+
+
+def require_one_arm(
+    recordings: Sequence[Named],
+    arms: Sequence[Chain | None],
+    chain: Chain,
+) -> None:
+    """Refuse recordings of an arm that differs from the first one's.
+
+    Raises:
+        InputError: one does; the sentence names it.
+    """
+    for arm, (_, path) in zip(arms, recordings, strict=True):
+        if arm is not None and arm.to_dict() != chain.to_dict():
+            raise InputError(
+                f"{path}: its arm is not that of {recordings[0][1]}; train on one arm"
+            )
+
+
+class Untouched(InputError):
+    """No recording has a contact at the thresholds."""
+
+
+@dataclass(frozen=True)
+class Touched:
+    """The contacts of recordings.
+
+    Attributes:
+        trials: one for each contact that has labels.
+        untouched: files without a contact, with their labels.
+        unused: files with more contacts than labels.
+    """
+
+    trials: tuple[Trial, ...]
+    untouched: tuple[LabelledFile, ...]
+    unused: tuple[Path, ...]
+
+    @property
+    def files(self) -> list[LabelledFile]:
+        """The file and the labels of each trial, and of the untouched."""
+        files = [(trial.path, trial.labels) for trial in self.trials]
+        return [*files, *self.untouched]
+
+    @property
+    def labels(self) -> list[dict[str, str]]:
+        """The labels of each trial, and of the untouched."""
+        return [labels for _, labels in self.files]
+
+    def completed(self) -> Touched:
+        """The same contacts with the labels that follow from their others."""
+        labels = iter(completed(self.labels))
+        trials = [replace(trial, labels=next(labels)) for trial in self.trials]
+        untouched = [(path, next(labels)) for path, _ in self.untouched]
+        return Touched(tuple(trials), tuple(untouched), self.unused)
+
+    def without(self, task: str) -> tuple[Path, ...]:
+        """The files that lack a label for a task, each once."""
+        lacking = (path for path, labels in self.files if task not in labels)
+        return tuple(dict.fromkeys(lacking))
+
+    def labelled(self, tasks: Sequence[str], *, partial: bool) -> Touched:
+        """The contacts that have a label for each task; `partial`, for some.
+
+        Raises:
+            InputError: no trial has.
+        """
+        enough = any if partial else all
+
+        def suffices(labels: dict[str, str]) -> bool:
+            return enough(task in labels for task in tasks)
+
+        trials = tuple(trial for trial in self.trials if suffices(trial.labels))
+        if not trials:
+            raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
+        untouched = tuple(file for file in self.untouched if suffices(file[1]))
+        return Touched(trials, untouched, self.unused)
+
+
+def collect(
+    recordings: Sequence[Named],
+    followed: Iterable[Followed],
+    layout: SkinLayout,
+) -> Touched:
+    """The trials of recordings whose contacts were followed.
+
+    Raises:
+        Untouched: no recording has a contact.
+    """
+    trials: list[Trial] = []
+    untouched = []
+    unused = []
+    for (recording, path), (touches, labels) in zip(recordings, followed, strict=True):
+        if not touches:
+            untouched.append((path, recording.labels))
+        if len(touches) > len(labels):
+            unused.append(path)
+        for trial_labels, touch in zip(labels, touches, strict=False):
+            trials.append(Trial(path, recording, trial_labels, *touch))
+    if not trials:
+        raise Untouched(
+            f"no contact in any of {len(recordings)} recordings; lower the threshold "
+            f"of {layout.threshold_counts} counts"
+        )
+    return Touched(tuple(trials), tuple(untouched), tuple(unused))
+
+
+Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
+"""The contacts of a recording, and the labels of those that are trials."""
+
+
+def _followed(
+    recording: Recording,
+    path: Path,
+    layout: SkinLayout,
+    **tracked: Any,
+) -> Followed:
+    """The contacts of a recording, and the labels of those that are trials."""
+    try:
+        tracker = WatchfulTracker(for_device(layout, recording.layout), **tracked)
+        touches = contacts(recording, tracker)
+        return touches, labels_of(recording, len(touches))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def contacts(
+    frames: Iterable[Frame], tracker: ContactTracker
+) -> list[tuple[float, FeatureSeries]]:
+    """Onset in seconds and series of every contact of a recording, in their order."""
+    followed: dict[int, Contact] = {}
+    for frame in frames:
+        followed |= {id(contact): contact for contact in tracker.push(frame)}
+    if not followed:
+        followed = {id(contact): contact for contact in tracker.finish()}
+    return [(contact.onset_s, contact.series()) for contact in followed.values()]
+
+
+def with_thresholds(
+    layout: SkinLayout,
+    threshold: int | None,
+    onset: int | None,
+) -> SkinLayout:
+    """The skin with these thresholds; one that is None stays, or scales with the
+    other."""
+    if threshold is not None:
+        ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
+        begin = round(threshold * ratio) if onset is None else onset
+        return replace(layout, threshold_counts=threshold, onset_counts=begin)
+    return layout if onset is None else replace(layout, onset_counts=onset)
+
+
+def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:
+    """Taxels that no frame of any recording could read."""
+    shape = recordings[0].frames.shape[1:]
+    alive = np.zeros(shape, dtype=bool)
+    for recording in recordings:
+        if recording.frames.shape[1:] != shape or recording.valid is None:
+            return ()
+        valid = recording.valid
+        alive |= valid if valid.ndim == 2 else valid.any(axis=0)
+    return tuple(np.flatnonzero(~alive).tolist())

@@ -1,0 +1,34 @@
+"""Folds of trials, and of entire groups of them, that are left out together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edge.arrays import Integers
+from train.data.vectors import Labels, Strings
+
+FOLDS = 10
+SEED = 2012
+"""Of the folds, so that they are the same for the same labels."""
+
+
+def finest(y: Labels) -> str:
+    """The task with most labels, or the first of several by name."""
+    return max(sorted(y), key=lambda task: len(set(y[task].tolist())))
+
+
+def stratified_folds(y: Strings, count: int = FOLDS, seed: int = SEED) -> Integers:
+    """(n,) folds in which each class is spread evenly; the same for the same labels."""
+    order = np.random.default_rng(seed).permutation(len(y))
+    order = order[np.argsort(y[order], kind="stable")]
+    folds = np.empty(len(y), dtype=np.int64)
+    folds[order] = np.arange(len(y)) % min(count, len(y))
+    return folds
+
+
+def group_folds(groups: Strings, count: int = 20) -> Integers:
+    """(n,) folds of entire groups: one group each, or several where there are over
+    `count`."""
+    names, members = np.unique(groups, return_inverse=True)
+    order = np.random.default_rng(SEED).permutation(len(names))
+    return np.asarray((order % count)[members], dtype=np.int64)

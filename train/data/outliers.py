@@ -1,0 +1,129 @@
+"""Recordings far outside all others, by a feature or by a joint angle.
+
+One damaged recording or frame spoils the scale of a feature for all trials. It is told
+by its distance to the mean of the others, in their standard deviations.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from edge.arrays import Floats
+from edge.touch.doubts import LIMIT_TOLERANCE
+from train.data.dataset import DataSet
+
+MOST_DEVIATIONS = 20.0
+"""No trial of the simulated and recorded sets that we know lies so far outside."""
+ROUNDING = 1e-12
+"""A spread of a smaller share of the values is rounding."""
+STILL_RAD = 0.01
+"""Joints that move less count as moving so much: a still arm may stand elsewhere."""
+UNLIMITED = (-np.inf, np.inf)
+LEAVE_OUT = "leave the recording out if it is wrong"
+FEWEST_TRIALS = 10
+"""Fewer others do not tell what is usual."""
+
+
+def deviations(values: Floats) -> Floats:
+    """(n,) the largest distance of each row of values (n, p) to the mean of the other
+    rows, in the others' standard deviation over all columns; 0 where the others are all
+    equal."""
+    rest = len(values) - 1
+    middle = np.median(values, axis=0)
+    centred = values - middle
+    squares = np.square(centred)
+    means = _sum_of_others(centred) / rest
+    variance = _sum_of_others(squares) / rest - np.square(means)
+    spread = variance.mean(axis=1)
+    spread = np.where(spread > np.square(ROUNDING * middle).mean(), spread, np.inf)
+    return np.asarray(np.abs(centred - means).max(axis=1) / np.sqrt(spread))
+
+
+def _sum_of_others(x: Floats) -> Floats:
+    """(n, p) the sum of the other rows, without a difference that an outlier would
+    round."""
+    none = np.zeros((1, x.shape[1]))
+    before = np.cumsum(np.concatenate([none, x[:-1]]), axis=0)
+    after = np.cumsum(np.concatenate([none, x[:0:-1]]), axis=0)[::-1]
+    return np.asarray(before + after)
+
+
+def by_features(dataset: DataSet, X: Floats, widths: Sequence[int]) -> Iterator[str]:
+    """A sentence on each trial that a feature puts far outside.
+
+    Args:
+        dataset: the trials.
+        X: (n, p) their vectors.
+        widths: columns of each feature.
+    """
+    if len(X) < FEWEST_TRIALS:
+        return
+    farthest = np.zeros(len(X))
+    names = [""] * len(X)
+    blocks = np.split(X, np.cumsum(widths)[:-1], axis=1)
+    for name, block in zip(dataset.names, blocks, strict=True):
+        distances = deviations(block)
+        for trial in np.flatnonzero(distances > farthest):
+            names[trial] = name
+        farthest = np.maximum(farthest, distances)
+    for i in np.flatnonzero(farthest > MOST_DEVIATIONS):
+        yield (
+            f"warning: {dataset.trials[i].path}: its {names[i]} lies {farthest[i]:.0f} "
+            f"deviations outside all others; {LEAVE_OUT}"
+        )
+
+
+def by_joints(dataset: DataSet) -> Iterator[str]:
+    """A sentence on each recording with a joint angle beyond its limits, or else far
+    outside those of the other recordings."""
+    if dataset.chain is None:
+        return
+    joints = _angles_of(dataset)
+    limits = np.array([pair or UNLIMITED for pair in dataset.chain.limits])
+    sums = _sums([*joints.values()])
+    for i, (path, angles) in enumerate(joints.items()):
+        excess = np.maximum(limits[:, 0] - angles, angles - limits[:, 1])
+        excess = np.nan_to_num(excess, neginf=0.0)
+        distances = _outside(angles, np.delete(sums, i, axis=0).sum(axis=0))
+        why = ""
+        if excess.max() > LIMIT_TOLERANCE:
+            frame, joint = np.unravel_index(excess.argmax(), excess.shape)
+            low, high = limits[joint]
+            why = f"beyond its limits of {low:g} and {high:g}"
+        elif len(joints) >= FEWEST_TRIALS and distances.max() > MOST_DEVIATIONS:
+            frame, joint = np.unravel_index(distances.argmax(), distances.shape)
+            times = distances[frame, joint]
+            why = f"{times:.0f} deviations outside all other recordings"
+        if why:
+            yield (
+                f"warning: {path}: at frame {frame} joint {dataset.chain.names[joint]} "
+                f"is at {angles[frame, joint]:g}, {why}; {LEAVE_OUT}"
+            )
+
+
+def _angles_of(dataset: DataSet) -> dict[Path, Floats]:
+    """{path: (n, dof) angles} of the recordings that have some."""
+    angles = {trial.path: trial.recording.joints for trial in dataset.trials}
+    return {path: joints for path, joints in angles.items() if joints is not None}
+
+
+def _sums(joints: Sequence[Floats]) -> Floats:
+    """(recordings, 3, dof) for each joint: number of angles, their sum, and the sum of
+    their squares."""
+    return np.array(
+        [
+            [np.isfinite(q).sum(0), np.nansum(q, axis=0), np.nansum(q**2, axis=0)]
+            for q in joints
+        ]
+    )
+
+
+def _outside(angles: Floats, sums: Floats) -> Floats:
+    """(frames, dof) distances to the mean of other recordings in deviations, by their
+    sums (3, dof); 0 where an angle is unknown."""
+    count, total, squares = sums
+    mean = total / np.maximum(count, 1)
+    variance = squares / np.maximum(count, 1) - mean**2
+    spread = np.sqrt(np.maximum(variance, STILL_RAD**2))
+    return np.asarray(np.nan_to_num(np.abs(angles - mean) / spread))

@@ -1,0 +1,181 @@
+"""Thresholds: those that a skin's own noise suggests, and lower ones where touches are
+missed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import filterfalse
+
+import numpy as np
+
+from edge.recording import Recording
+from edge.touch.layout import for_device
+from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
+from edge.touch.track import DEBOUNCE, WatchfulTracker
+from train.data.dataset import DataSet, contacts, with_thresholds
+from train.data.labels import NO_CONTACT
+
+MARGINS = (MARGIN, 1.0)
+"""Ratios of the threshold to the noise: the lower one where touches are missed at the
+other."""
+MISSED_SHARE = 0.02
+"""Of the touches, which a proposal may miss."""
+FELT_SHARE = 0.05
+"""Of the recordings labelled with a touch; fewer contacts mean that the noise was none."""
+BEGUN_RATIO = 3.0
+BEGUN_SHARE = 0.2
+"""A recording begins in contact if a count of its first frames is above three times the
+median taxel, and above a fifth of its highest count."""
+QUIETEST = 0.2
+LOWER = (0.5, 0.25, 0.0)
+"""Parts of the recorded thresholds that are tried where touches are missed."""
+FEWEST_GAINED = 1.5
+"""Recordings that lower thresholds must decide right more often."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Thresholds that suit the noise of some recordings.
+
+    Attributes:
+        threshold, onset: in counts.
+        source: where they come from, as the end of a sentence.
+    """
+
+    threshold: int
+    onset: int
+    source: str
+
+
+def proposed(recordings: Sequence[Recording]) -> Proposal:
+    """Thresholds from the noise before contact.
+
+    The noise is the 90th percentile of `edge.touch.thresholds.noise` over the
+    recordings that do not begin in contact. The threshold is twice the noise, or as
+    high as the noise where that misses more of the recordings labelled with a touch.
+    Where no recording has an untouched part, the threshold is the level of the quietest
+    taxels, or 0 where that misses touches.
+    """
+    labelled = list(filter(_is_touch, recordings))
+    untouched = list(filterfalse(begins_in_contact, recordings))
+    begun = len(recordings) - len(untouched)
+    pair = _above_noise(untouched, labelled) if untouched else None
+    if pair is not None:
+        source = "the noise before contact"
+        if begun:
+            source += f" ({begun} of {len(recordings)} begin in contact and give none)"
+        return Proposal(*pair, source)
+    level = float(np.median(list(map(_quietest, recordings))))
+    pair = above(level, 1.0)
+    touched = labelled or recordings
+    if count_felt(touched, pair[1]) >= (1.0 - MISSED_SHARE) * len(touched):
+        source = "the quietest taxels, as no recording has a part without contact"
+        return Proposal(*pair, source)
+    source = "nothing to go by: no recording has a part without contact"
+    return Proposal(0, 0, source)
+
+
+def _is_touch(recording: Recording) -> bool:
+    """Whether a recording is labelled with a touch."""
+    return bool(recording.labels) and NO_CONTACT not in recording.labels.values()
+
+
+def _above_noise(
+    untouched: Sequence[Recording], labelled: Sequence[Recording]
+) -> tuple[int, int] | None:
+    """Threshold and onset above the noise of recordings that begin untouched; None
+    where even the lower ones miss most of the recordings labelled with a touch."""
+    levels = [noise(recording.t, recording.frames) for recording in untouched]
+    level = float(np.quantile(levels, 0.9))
+    usual, lower = (above(level, margin) for margin in MARGINS)
+    if not labelled:
+        return usual
+    high = count_felt(labelled, usual[1])
+    low = count_felt(labelled, lower[1])
+    if low < FELT_SHARE * len(labelled):
+        return None
+    return lower if high < (1.0 - MISSED_SHARE) * low else usual
+
+
+def count_felt(recordings: Sequence[Recording], onset: int) -> int:
+    """The number of recordings with a contact, by a pass over their peaks.
+
+    A region's peak is nearly always the frame's, so `count_contacts` seldom differs.
+    """
+    felt = 0
+    for recording in recordings:
+        peaks = recording.frames.reshape(len(recording.t), -1).max(axis=1)
+        above_onset = peaks > onset
+        for _ in range(DEBOUNCE - 1):
+            above_onset = above_onset[1:] & above_onset[:-1]
+        felt += bool(above_onset.any())
+    return felt
+
+
+def begins_in_contact(recording: Recording) -> bool:
+    """Whether the first frames stand out, from most taxels and against the rest of the
+    recording."""
+    start = recording.frames[recording.t < recording.t[0] + QUIET_S]
+    by_taxel = start.max(axis=0)
+    highest = int(by_taxel.max(initial=0))
+    stands_out = highest > BEGUN_RATIO * float(np.median(by_taxel))
+    return stands_out and highest > BEGUN_SHARE * int(recording.frames.max())
+
+
+def _quietest(recording: Recording) -> float:
+    """The level below which the quietest fifth of the taxels stay half of the time."""
+    return float(np.quantile(np.median(recording.frames, axis=0), QUIETEST))
+
+
+def count_contacts(
+    recordings: Sequence[Recording],
+    threshold: int,
+    onset: int,
+) -> tuple[int, int]:
+    """The number of recordings with a contact, and the number of contacts."""
+    layout = with_thresholds(recordings[0].layout, threshold, onset)
+    counts = []
+    for recording in recordings:
+        tracker = WatchfulTracker(for_device(layout, recording.layout), horizon_s=0.1)
+        counts.append(len(contacts(recording, tracker)))
+    return len(np.flatnonzero(counts)), sum(counts)
+
+
+def chosen(
+    dataset: DataSet,
+    load: Callable[[int, int], DataSet],
+    accuracy: Callable[[DataSet], float],
+) -> tuple[DataSet, list[str]]:
+    """The data set at the thresholds whose decisions are most accurate, and sentences
+    that say so.
+
+    Lower ones are tried where a recording that is labelled with a touch shows none.
+    They are taken where they gain more than a standard error and a single recording, as
+    they find a contact in any noise. Of equally accurate ones the highest are taken.
+
+    Args:
+        dataset: at the recorded thresholds.
+        load: the data set at a threshold and an onset.
+        accuracy: of decisions on a data set, where missed touches count as wrong.
+    """
+    unfelt = sum(NO_CONTACT not in labels.values() for _, labels in dataset.untouched)
+    present = dataset.layout.threshold_counts, dataset.layout.onset
+    levels = dict.fromkeys(
+        (round(part * present[0]), round(part * present[1])) for part in LOWER
+    )
+    if not unfelt or present[1] == 0:
+        return dataset, []
+    datasets = [dataset, *(load(*level) for level in levels if level != present)]
+    shares = [accuracy(candidate) for candidate in datasets]
+    best = int(np.argmax(shares))
+    n = len(dataset.trials) + len(dataset.untouched)
+    error = np.sqrt(n * shares[0] * (1.0 - shares[0]))
+    if n * (shares[best] - shares[0]) <= max(error, FEWEST_GAINED):
+        return dataset, []
+    layout = datasets[best].layout
+    return datasets[best], [
+        f"the threshold is {layout.threshold_counts} and the onset {layout.onset} "
+        "counts: at "
+        f"{present[0]} and {present[1]} counts, {unfelt} recordings show no contact; in "
+        "cross-validation "
+        f"{shares[best]:.1%} against {shares[0]:.1%} (--threshold and --onset set them)"
+    ]

@@ -1,0 +1,73 @@
+"""Feature vectors of trials, with their labels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from edge.arrays import Booleans, Floats
+from edge.errors import InputError
+from edge.touch.features import FEATURES
+
+Strings = NDArray[np.str_]
+
+Labels = Mapping[str, Strings]
+"""{task: (n,) labels}; empty where a trial has none, which then does not count."""
+
+
+def widths_of(
+    columns: int,
+    features: Sequence[str],
+    widths: Sequence[int] | None = None,
+) -> tuple[int, ...]:
+    """How many of so many columns each feature type has: `widths`, or an equal share.
+
+    Raises:
+        InputError: the columns are no whole number of samples a feature.
+    """
+    if widths is None:
+        if columns % len(features):
+            raise InputError(
+                f"{columns} columns are no whole number of samples of {len(features)} "
+                "features"
+            )
+        return (columns // len(features),) * len(features)
+    if len(widths) != len(features) or sum(widths) != columns:
+        raise InputError(f"{columns} columns are not those of {len(features)} features")
+    return tuple(widths)
+
+
+@dataclass(frozen=True)
+class Vectors:
+    """Feature vectors of n trials, and what they are.
+
+    Attributes:
+        X: (n, p), or (decision points, n, p).
+        y: {task: (n,) labels}.
+        features: names of the feature types, in the order of X.
+        widths: columns of each; equal where None.
+        is_own: (n,) whether a trial is the owner's, where simulated ones are among them;
+            see `train.model.pipeline.Choice.counts`.
+    """
+
+    X: Floats = field(repr=False)
+    y: Labels = field(repr=False)
+    features: Sequence[str] = FEATURES
+    widths: Sequence[int] | None = None
+    is_own: Booleans | None = field(default=None, repr=False)
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Columns of each feature type."""
+        return widths_of(self.X.shape[-1], self.features, self.widths)
+
+    def part(self, trials: NDArray[Any]) -> Self:
+        """Some of the trials, by a mask (n,) or by their numbers."""
+        return replace(
+            self,
+            X=self.X[..., trials, :],
+            y={task: labels[trials] for task, labels in self.y.items()},
+            is_own=None if self.is_own is None else self.is_own[trials],
+        )

@@ -1,0 +1,63 @@
+"""Which tasks' labels are the pairs of two others', as the training labels show."""
+
+from itertools import combinations
+
+import numpy as np
+
+from train.data.vectors import Labels, Strings
+
+
+def products(y: Labels) -> dict[str, tuple[str, str]]:
+    """{task: two other tasks whose labels together determine its own, and follow from
+    it}.
+
+    Neither of the two determines the task alone.
+    """
+    pairs: dict[str, tuple[str, str]] = {}
+    for task, labels in y.items():
+        factors = []
+        for factor in y:
+            follows = _determines(labels, y[factor])
+            if factor != task and follows and not _determines(y[factor], labels):
+                factors.append(factor)
+        for a, b in combinations(factors, 2):
+            joined = np.char.add(np.char.add(y[a], "\0"), y[b])
+            if task not in pairs and _determines(joined, labels):
+                pairs[task] = (a, b)
+    return pairs
+
+
+def _determines(a: Strings, b: Strings) -> bool:
+    """Whether the labels b follow from the labels a."""
+    labelled = (a != "") & (b != "")
+    names = a[labelled].tolist()
+    pairs = set(zip(names, b[labelled].tolist(), strict=True))
+    return len(pairs) == len(set(names))
+
+
+def factors_of(y: Labels) -> dict[str, dict[str, tuple[int, ...]]]:
+    """{product: its `edge.model.agreement.Factors`}, where every pair of labels was
+    met.
+
+    No task belongs to two products.
+    """
+    products_of: dict[str, dict[str, tuple[int, ...]]] = {}
+    used_tasks: set[str] = set()
+    for task, factors in products(y).items():
+        tasks = (task, *factors)
+        rows = set(zip(*(y[t].tolist() for t in tasks), strict=True))
+        pairs = sorted(filter(all, rows))
+        names = [sorted({*y[factor].tolist()} - {""}) for factor in factors]
+        complete = 0 < len(pairs) == len(names[0]) * len(names[1])
+        if complete and used_tasks.isdisjoint(tasks):
+            used_tasks.update(tasks)
+            _, *columns = zip(*pairs, strict=True)
+            products_of[task] = {}
+            for factor, labels, column in zip(factors, names, columns, strict=True):
+                products_of[task][factor] = tuple(map(labels.index, column))
+    return products_of
+
+
+def families(y: Labels) -> list[tuple[str, ...]]:
+    """The tasks that are decided together: a product and its two factors each."""
+    return [(task, *factors) for task, factors in factors_of(y).items()]

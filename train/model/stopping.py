@@ -1,0 +1,555 @@
+"""Deciding as soon as it is sure: a calibrated confidence at each decision point.
+
+A model decides at several decision points, each with a window, a projection and
+training rows of its own. Those before some time may have settings of their own too
+(`Early`): early the arm tells what the skin tells later. Confidence, rules and novelty
+limits are made from trials that the deciding model did not see: the trials are divided
+into folds, and each fold is decided by a model that was fitted, and whose settings were
+chosen, without it.
+
+**Confidence.** The margin says how much nearer the training trials of the named label
+lie than those of any other (`edge.model.info.margin`). Logistic regression at each
+decision point turns it into the probability that the label is right (Platt,
+Probabilistic outputs for support vector machines, 1999). A label's distance is that of
+its nearest twentieth (`train.model.pipeline.label_distances`). So it is the same for the
+folds' models, which have fewer trials, as for the exported one.
+
+**Rules** are certified by `train.model.rules`. They compare the confidences of all decision
+points with one threshold, so these come from one logistic regression on all points
+together. With a curve for each point, an early point hardly reaches the threshold, and
+clear contacts wait as long as others.
+
+A touch that is unlike the training data at a decision point waits, for the full window
+if it stays so: rules are tested with this wait, at `NOVELTY_RATE` and with the other
+folds' limits for a fold's distances. An error is a wrong label. The task with most
+labels then names nothing, so an `unknown` for a trained object is an error of it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+from scipy.optimize import brentq
+from scipy.special import expit
+
+from edge.arrays import Booleans, Floats, Integers
+from edge.errors import InputError
+from edge.model.info import (
+    NOVELTY_RATE,
+    Novelty,
+    Stopping,
+    StoppingRule,
+    margin,
+)
+from edge.touch.features import FEATURES
+from train.data.folds import finest, stratified_folds
+from train.data.vectors import Strings, Vectors
+from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
+from train.model.pipeline import Choices, ContactClassifier, columns_of, types_of
+from train.model.rules import RISK, Course, candidates, certify, following
+from train.threads import single_thread
+
+FEWEST = 20
+"""Trials that calibration needs."""
+PULL = 0.5
+"""Weight of the prior of a margin's slope, 1 a standard deviation, and of the
+intercept's, 0."""
+DOUBT = 1.0
+"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
+DOUBT_PULL = 10.0
+"""Weight of this prior for an excess of a standard deviation. It is heavy because few
+held-out trials are as novel as what a robot may meet."""
+LEAST_DOUBT = 0.5
+"""The odds fall at least by the root of the novelty, for the same reason."""
+LEAST_SLOPE = 1e-3
+"""Smallest slope a standard deviation: a larger margin never makes a label less
+likely."""
+
+
+AtPoints = Sequence[Choices]
+"""[decision point]{task: Choice}."""
+
+
+@dataclass(frozen=True)
+class Early:
+    """Settings of the decision points before some time.
+
+    Attributes:
+        until_s: the time.
+        choices: {task: Choice}; a task without one has the settings of the full window.
+        by_fold: [fold]{task: the choice made without the fold's trials}.
+    """
+
+    until_s: float
+    choices: Choices
+    by_fold: Sequence[Choices]
+
+
+Answers = dict[str, tuple[Strings, Floats]]
+"""{task: labels and margins, (decision points, m) each}."""
+
+
+def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
+    """The answers of models, one for each decision point, to vectors (points, m, p)."""
+    by_task: dict[str, tuple[list[Strings], list[list[float]]]] = {}
+    for model, x in zip(models, X, strict=True):
+        for task, (indices, distances) in model.decide(x).items():
+            labels, margins = by_task.setdefault(task, ([], []))
+            labels.append(model.classes_[task][indices])
+            margins.append(list(map(margin, distances.tolist(), indices.tolist())))
+    return {
+        task: (np.array(labels), np.array(margins))
+        for task, (labels, margins) in by_task.items()
+    }
+
+
+def held_out(
+    vectors: Vectors,
+    folds: Integers,
+    fold_choices: Sequence[AtPoints],
+    jobs: int = 1,
+) -> list[Answers]:
+    """[fold] decisions of models without the fold's trials on these, in their order.
+
+    Args:
+        vectors: (decision points, n, p).
+        folds: (n,) from 0, or -1 for trials that are never left out.
+        fold_choices: [fold][decision point]{task: Choice}.
+        jobs: processes.
+    """
+    work = (
+        delayed(_fold)(vectors, folds == fold, choices)
+        for fold, choices in enumerate(fold_choices)
+    )
+    return list(Parallel(n_jobs=jobs)(work))
+
+
+def _fold(vectors: Vectors, left_out: Booleans, choices: AtPoints) -> Answers:
+    training = vectors.part(~left_out)
+    models = []
+    with single_thread():
+        for at_point, x in zip(choices, training.X, strict=True):
+            models.append(ContactClassifier.of(at_point, replace(training, X=x)))
+        return answers(models, vectors.X[:, left_out])
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The probability that a label is right.
+
+    It is the logistic function of slope * margin + intercept - doubt * excess, where the
+    excess is the part of the novelty above that of half of the trials (`excess_of`).
+    """
+
+    slope: float
+    intercept: float
+    doubt: float
+
+    @classmethod
+    def of(
+        cls,
+        margins: Floats,
+        excess: Floats,
+        right: Booleans,
+    ) -> Curve:
+        """The most likely curve for some answers; arrays of one shape."""
+        columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
+        middle = columns.mean(axis=0)
+        spread = columns.std(axis=0)
+        # The spread of equal values is the rounding of their mean.
+        spread[spread <= 1e-12 * np.abs(middle)] = 1.0
+        constant = np.ones((len(columns), 1))
+        scaled = np.hstack([(columns - middle) / spread, constant])
+        prior = np.array([1.0, DOUBT * spread[1], 0.0])
+        solution = _logistic(scaled, right.ravel(), prior)
+        slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
+        intercept = float(solution[2] - slopes @ middle)
+        return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
+
+    def with_mean(
+        self,
+        margins: Floats,
+        excess: Floats,
+        share: float,
+    ) -> Curve:
+        """The curve with the intercept at which the mean probability is `share`."""
+        half_a_trial = 0.5 / margins.size
+        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
+
+        def surplus(shift: float) -> float:
+            shifted = replace(self, intercept=self.intercept + shift)
+            return float(shifted.probabilities(margins, excess).mean()) - target
+
+        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
+        shift = float(brentq(surplus, -reach, reach))
+        return replace(self, intercept=self.intercept + shift)
+
+    def probabilities(self, margins: Floats, excess: Floats) -> Floats:
+        """That labels with these margins are right, in the shape of the margins."""
+        logits = self.slope * margins + self.intercept - self.doubt * excess
+        return np.asarray(expit(logits))
+
+
+def _logistic(
+    columns: Floats,
+    right: Booleans,
+    prior: Floats,
+) -> Floats:
+    """(3,) weights of columns (m, 3) for the log odds of being right."""
+    solution = prior
+    pull = np.array([PULL, DOUBT_PULL, PULL])
+
+    def loss(parameters: Floats) -> float:
+        logits = columns @ parameters
+        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
+        return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
+
+    for _ in range(500):
+        p = expit(columns @ solution)
+        gradient = columns.T @ (p - right) + pull * (solution - prior)
+        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
+        step = np.linalg.solve(hessian, gradient)
+        # Far from the optimum, whole steps may go back and forth for ever. Near it,
+        # they converge, and rounding hides what the loss gains.
+        while np.abs(step).max() > 1e-3 and loss(solution - step) > loss(solution):
+            step /= 2.0
+        solution = solution - step
+        if np.abs(step).max() < 1e-10:
+            break
+    return solution
+
+
+def excess_of(novelty: Novelty, scores: Floats) -> Floats:
+    """(points, n) by how much the logarithm of the novelty (points, n) is above that of
+    half of the trials; 0 below."""
+    typical = np.array([row[0] for row in novelty.limits])[:, None]
+    ratios = np.maximum(np.nan_to_num(scores), typical) / typical
+    return np.asarray(np.log(ratios))
+
+
+def unlike(novelty: Novelty, scores: Floats) -> Booleans:
+    """(points, n) whether contacts are unknown, from their novelty (points, n)."""
+    limits = np.array(novelty.limits)[:, novelty.rates.index(NOVELTY_RATE)]
+    return np.asarray(scores > limits[:, None])
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Answers to each trial by models that were fitted without it.
+
+    Attributes:
+        right: {task: (decision points, n) whether the label is right}.
+        margins: {task: (decision points, n) the label's margin}.
+    """
+
+    right: dict[str, Booleans]
+    margins: dict[str, Floats]
+
+
+@dataclass(eq=False)
+class SequentialClassifier:
+    """All tasks of a model at several windows, with rules that say when to stop
+    waiting.
+
+    Args:
+        choices: {task: Choice} of the full window.
+        decision_points_s: windows in seconds, increasing; the last is the full window.
+        features: names of the feature types, in the order of the vectors; features that
+            `choices` do not take are there for the choices of the folds.
+        jobs: processes.
+        widths: columns of each feature type; equal where None.
+        early: settings of early decision points; those of the full window where None.
+
+    Attributes:
+        decision_points_: a fitted `ContactClassifier` for each decision point.
+        columns_: the columns of the vectors that these take, rising.
+        right_: {task: (decision points, n) whether the labels named without a trial are
+            right}.
+        unknown_: (decision points, n) whether trials are unlike all others.
+        stopping_: {task: Stopping}.
+        space_: in which novelty is scored.
+        novelty_: its limits.
+    """
+
+    choices: Choices
+    decision_points_s: Sequence[float]
+    features: Sequence[str] = FEATURES
+    jobs: int = 1
+    widths: Sequence[int] | None = None
+    early: Early | None = None
+
+    def fit(
+        self,
+        X: Floats,
+        y: Mapping[str, Strings],
+        folds: Integers,
+        fold_choices: Sequence[Choices],
+        is_own: Booleans | None = None,
+    ) -> SequentialClassifier:
+        """Fit and calibrate.
+
+        Args:
+            X: (decision points, n, p).
+            y: {task: (n,) labels}; empty where a trial has none.
+            folds: (n,) from 0, or -1 for trials that calibrate nothing.
+            fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
+            is_own: see `ContactClassifier.fit`.
+
+        Raises:
+            InputError: there are too few trials, or X is not finite.
+        """
+        n = int((folds >= 0).sum())
+        if n < FEWEST:
+            raise InputError(
+                f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
+                "export without decision points"
+            )
+        vectors = Vectors(X, y, self.features, self.widths, is_own)
+        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
+        self._fit_novelty(self._fit_points(vectors), folds)
+        without = self._without(fold_choices)
+        chosen_without = self._held_out(vectors, folds, without)
+        self.right_ = chosen_without.right
+        rules = self._certify(chosen_without, folds, tested)
+        # Margins are on the scale of the settings. Curves that the exported model uses
+        # come from margins by its own settings, in fits without the trials; as the
+        # trials had a part in the choice of these, the curves' means come from choices
+        # without them.
+        same = [self.choices_at] * len(fold_choices)
+        curves = chosen_without
+        if without != same:
+            curves = self._held_out(vectors, folds, same)
+        self._calibrate(curves, tested, rules)
+        return self
+
+    @property
+    def choices_at(self) -> AtPoints:
+        """[decision point]{task: Choice}."""
+        early = {} if self.early is None else self.early.choices
+        return self._at_points(self.choices, early)
+
+    def _without(self, fold_choices: Sequence[Choices]) -> list[AtPoints]:
+        """[fold][decision point]{task: the choice made without the fold's trials}."""
+        early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
+        return list(map(self._at_points, fold_choices, early))
+
+    def _at_points(
+        self,
+        full: Choices,
+        early: Choices,
+    ) -> AtPoints:
+        """[decision point]{task: Choice} of choices for the full window and for early
+        points."""
+        until_s = 0.0 if self.early is None else self.early.until_s
+        return [
+            {**full, **early} if seconds < until_s else full
+            for seconds in self.decision_points_s
+        ]
+
+    def _held_out(
+        self,
+        vectors: Vectors,
+        folds: Integers,
+        fold_choices: Sequence[AtPoints],
+    ) -> HeldOut:
+        """Answers to each trial by models with some settings, without its fold."""
+        by_fold = held_out(vectors, folds, fold_choices, self.jobs)
+        shape = vectors.X.shape[:2]
+        right = {}
+        margins = {}
+        for task in self.choices:
+            right[task] = np.zeros(shape, dtype=bool)
+            margins[task] = np.zeros(shape)
+            for fold, answers_of in enumerate(by_fold):
+                in_fold = folds == fold
+                labels, sure = answers_of[task]
+                right[task][:, in_fold] = labels == vectors.y[task][in_fold]
+                margins[task][:, in_fold] = sure
+        return HeldOut(right, margins)
+
+    def _fit_points(self, vectors: Vectors) -> Vectors:
+        """Fit the classifier of each decision point; the vectors that these take."""
+        choices = [choice for at in self.choices_at for choice in at.values()]
+        features = set().union(*(c.features or self.features for c in choices))
+        self.columns_ = columns_of(features, self.features, vectors.columns)
+        names, widths = types_of(features, self.features, vectors.columns)
+        self.n_features_in_ = len(self.columns_)
+        X = np.ascontiguousarray(vectors.X[..., self.columns_])
+        vectors = replace(vectors, X=X, features=names, widths=widths)
+        self.decision_points_ = []
+        with single_thread():
+            for at_point, x in zip(self.choices_at, X, strict=True):
+                model = ContactClassifier.of(at_point, replace(vectors, X=x))
+                self.decision_points_.append(model)
+        return vectors
+
+    def _fit_novelty(self, vectors: Vectors, folds: Integers) -> None:
+        """Fit the space of novelty, and set its limits by held-out trials."""
+        most = finest({task: vectors.y[task] for task in self.choices})
+        labels = vectors.y[most]
+        with single_thread():
+            self.space_ = NoveltySpace.of(vectors.X, labels, vectors.columns)
+        novelty_folds = np.where(folds >= 0, stratified_folds(labels, FOLDS), -1)
+        scores = held_out_scores(
+            vectors.X,
+            labels,
+            novelty_folds,
+            vectors.columns,
+            self.jobs,
+        )
+        self.novelty_ = limits_of(most, scores[:, folds >= 0])
+        self._excess = excess_of(self.novelty_, scores)
+        self.unknown_ = unlike(self.novelty_, scores)
+
+    def _certify(
+        self,
+        answered: HeldOut,
+        folds: Integers,
+        tested: Mapping[str, Booleans],
+    ) -> dict[str, tuple[list[StoppingRule], Booleans]]:
+        """{task: its certified rules, and whether the full window is wrong (n,)}."""
+        scores = {}
+        for task, right in answered.right.items():
+            evidence = answered.margins[task], self._excess, right
+            scores[task] = cross_fitted(*evidence, folds, tested[task])
+        courses = self._courses(scores, answered.right, self.unknown_, tested)
+        seconds = np.array(self.decision_points_s)
+        rules = {task: certify(course, seconds) for task, course in courses.items()}
+        for task, factors in self.products_.items():
+            for factor in factors:
+                rules[factor] = following(
+                    rules[factor],
+                    rules[task],
+                    courses[factor],
+                    seconds,
+                )
+        full, _ = candidates(len(seconds))
+        return {task: (rules[task], courses[task].under(full)[1]) for task in rules}
+
+    def _calibrate(
+        self,
+        answered: HeldOut,
+        tested: Mapping[str, Booleans],
+        rules: Mapping[str, tuple[list[StoppingRule], Booleans]],
+    ) -> None:
+        """Set the stopping rules and curves of each task."""
+        self.stopping_ = {}
+        for task, tests in tested.items():
+            evidence = (
+                answered.margins[task][:, tests],
+                self._excess[:, tests],
+                answered.right[task][:, tests],
+                self.right_[task][:, tests],
+            )
+            together = _curve(*evidence)
+            curves = map(_curve, *evidence)
+            slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
+            of_task, wrong = rules[task]
+            self.stopping_[task] = Stopping(
+                slopes=slopes,
+                intercepts=intercepts,
+                doubts=doubts,
+                slope=together.slope,
+                intercept=together.intercept,
+                doubt=together.doubt,
+                rules=tuple(of_task),
+                trials=len(wrong),
+                wrong=int(wrong.sum()),
+                risk=RISK,
+            )
+
+    @property
+    def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
+        """{task: its factors} of the tasks decided together."""
+        return self.decision_points_[-1].products_
+
+    def judged(
+        self,
+        X: Floats,
+        y: Mapping[str, Strings],
+    ) -> tuple[dict[str, Booleans], dict[str, Floats], dict[str, Course]]:
+        """Hits and confidences (points, m) and course of each task, for trials that are
+        new.
+
+        Args:
+            X: (points, m, p).
+            y: {task: (m,) labels}.
+        """
+        with single_thread():
+            answered = answers(self.decision_points_, X)
+        scores = self.space_.scores(X)
+        excess = excess_of(self.novelty_, scores)
+        right = {}
+        confidence = {}
+        together = {}
+        for task, (labels, margins) in answered.items():
+            stopping = self.stopping_[task]
+            right[task] = labels == y[task]
+            pooled = Curve(stopping.slope, stopping.intercept, stopping.doubt)
+            together[task] = pooled.probabilities(margins, excess)
+            curves = map(Curve, stopping.slopes, stopping.intercepts, stopping.doubts)
+            by_point = map(Curve.probabilities, curves, margins, excess)
+            confidence[task] = np.stack(list(by_point))
+        unknown = unlike(self.novelty_, scores)
+        tested = {task: y[task] != "" for task in right}
+        return right, confidence, self._courses(together, right, unknown, tested)
+
+    def _courses(
+        self,
+        scores: Mapping[str, Floats],
+        right: Mapping[str, Booleans],
+        unknown: Booleans,
+        tested: Mapping[str, Booleans],
+    ) -> dict[str, Course]:
+        """{task: its course}, from each task's own answers and confidences for rules
+        (points, n).
+
+        The trials `tested` (n,) count; for a product, those that count for its factors
+        too.
+        """
+        courses = {}
+        for task in self.choices:
+            deciding = tuple(self.products_.get(task, (task,)))
+            decided = np.all([tested[t] for t in (task, *deciding)], axis=0)
+            sure = [scores[part][:, decided] for part in deciding]
+            wrong = [~right[part][:, decided] for part in deciding]
+            courses[task] = Course(
+                sure,
+                wrong,
+                unknown[:, decided],
+                task == self.novelty_.task,
+            )
+        return courses
+
+
+def _curve(
+    margins: Floats,
+    excess: Floats,
+    right: Booleans,
+    honest: Booleans,
+) -> Curve:
+    """The curve of answers, with the mean probability of honest ones."""
+    share = float(honest.mean())
+    return Curve.of(margins, excess, right).with_mean(margins, excess, share)
+
+
+def cross_fitted(
+    margins: Floats,
+    excess: Floats,
+    right: Booleans,
+    folds: Integers,
+    tested: Booleans,
+) -> Floats:
+    """(points, n) confidences for rules, each fold's by the curve of the other folds'
+    tested."""
+    confidences = np.zeros(right.shape)
+    for fold in range(int(folds.max()) + 1):
+        left_out = folds == fold
+        outside = tested & ~left_out
+        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
+        evidence = margins[:, left_out], excess[:, left_out]
+        confidences[:, left_out] = curve.probabilities(*evidence)
+    return confidences

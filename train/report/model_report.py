@@ -1,0 +1,415 @@
+"""The report of a fitted model: its accuracy, wrong answers, features, and
+candidates."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sklearn.metrics import precision_recall_fscore_support
+
+from edge.arrays import Integers
+from edge.model.model import Model
+from edge.tools.explanation import Explanation, Space, explain
+from train.choose.evaluate import Result
+from train.data.folds import stratified_folds
+from train.data.labels import NO_CONTACT
+from train.data.vectors import Strings, Vectors
+from train.draw.explanation import MOST_NEAR, Case, draw_case
+from train.fitting import Fitted
+from train.model.pipeline import Choice, Choices, ContactClassifier, fittable
+from train.model.projection import MOST_STEPS
+from train.report import page
+from train.report.figures import confusion, lines, picture
+from train.report.score import interval, percent
+from train.report.section import Figure, Row, Section, Table, counted
+from train.report.summary import Prices, accuracy, candidates, names, warnings
+from train.report.work import Workers
+
+QUARTERS = 4
+"""The learning curve has a point for each of these parts of the training trials."""
+EXPLAINED = 60
+"""About this many trials are explained beside the wrong answers."""
+UNTOUCHED = "(no contact)"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """A task's answers to left-out trials.
+
+    Attributes:
+        classes: the task's labels, sorted.
+        truth: (n,) labels; empty where a trial has none, or was never left out.
+        answers: (quarters, n) the answers of fits to growing parts of the other trials;
+            the last fit has all of them.
+        explained: {trial: explanation of the last fit's answer} for the wrong answers
+            and some others.
+    """
+
+    classes: list[str]
+    truth: Strings
+    answers: Strings
+    explained: dict[int, Explanation]
+
+    @property
+    def wrong(self) -> list[int]:
+        """The trials with a wrong answer."""
+        wrong: list[int] = np.flatnonzero(self.answers[-1] != self.truth).tolist()
+        return wrong
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A fit with its answers {task: Answers}, its file, and its candidates' prices."""
+
+    fitted: Fitted
+    answers: dict[str, Answers]
+    model: Model
+    prices: Prices
+
+
+def _left_out(
+    vectors: Vectors,
+    task: str,
+    choices: Choices,
+    test: Integers,
+) -> tuple[list[Strings], dict[int, Explanation]]:
+    """[quarter] (test,) answers to left-out trials, and explanations as `Answers` has
+    them.
+
+    Args:
+        vectors: (n, p) of all trials.
+        task: the task to answer.
+        choices: each task's settings, chosen without the left-out trials.
+        test: the left-out trials.
+    """
+    labels = vectors.y[task]
+    classes, index = np.unique(labels, return_inverse=True)
+    counting = choices[task].counts(labels, vectors.is_own) > 0
+    counting[test] = False
+    training = np.flatnonzero(counting)
+    quarter_of = stratified_folds(labels[training], QUARTERS)
+    X = vectors.X[test]
+    answers = []
+    for quarter in range(QUARTERS):
+        train = training[quarter_of <= quarter]
+        fewer = vectors.part(train)
+        possible = fittable(choices, fewer.y, fewer.is_own)
+        model = ContactClassifier.of(possible, fewer)
+        answers.append(model.classes_[task][model.decide(X)[task].labels])
+    _, voters = model.neighbours(task, X)
+    space = _space(model, task, index[train])
+    form = vectors.features, vectors.columns
+
+    def numbered(neighbour: Any) -> Any:
+        """The training trial under its number among all trials; None stays None."""
+        return neighbour and neighbour._replace(row=int(train[neighbour.row]))
+
+    explained = {}
+    for place, (trial, answer) in enumerate(
+        zip(test.tolist(), answers[-1], strict=True)
+    ):
+        if answer != labels[trial] or trial % max(len(labels) // EXPLAINED, 1) == 0:
+            label = int(np.searchsorted(classes, answer))
+            truth = int(index[trial])
+            why = explain(space, X[place], voters[place].tolist(), label, *form, truth)
+            voted = tuple(map(numbered, why.voters))
+            explained[trial] = why._replace(voters=voted, rival=numbered(why.rival))
+    return answers, explained
+
+
+def _space(model: ContactClassifier, task: str, labels: Integers) -> Space:
+    """The space of a task, whose trials have these labels (n,)."""
+    key = model.spaces_[task]
+    c = model.components_[task]
+    projection = model.projections_[key]
+    grid = projection.grid_
+    return Space(
+        columns=model.columns_[key],
+        mean=projection.mean_,
+        gain=projection.gain_,
+        weights=projection.weights_[:, :c],
+        rows=model.rows_[key][:, :c],
+        labels=labels,
+        reach=MOST_STEPS * grid.step,
+        limit=grid.limit * grid.unit,
+    )
+
+
+def answers_of(fitted: Fitted, jobs: int = 1) -> dict[str, Answers]:
+    """{task: its answers to left-out trials}, the same that the nested accuracy
+    counts."""
+    choices: list[Choice] = []
+    for chosen in fitted.chosen.values():
+        for by_task in chosen.by_fold:
+            choices += by_task.values()
+    _, vectors = fitted.selection(choices)
+    answers = {}
+    cases = []
+    for task, chosen in fitted.chosen.items():
+        labels = vectors.y[task]
+        tested = (chosen.folds >= 0) & (labels != "")
+        truth = np.where(tested, labels, "")
+        classes = np.unique(labels).tolist()
+        answers[task] = Answers(classes, truth, np.tile(truth, (QUARTERS, 1)), {})
+        for fold, by_task in enumerate(chosen.by_fold):
+            test = np.flatnonzero(tested & (chosen.folds == fold))
+            if test.size:
+                cases.append((task, by_task, test))
+    left_out = partial(_left_out, vectors)
+    results = Workers(jobs, progress=False).map("report", left_out, cases)
+    for (task, _, test), (answered, explained) in zip(cases, results, strict=True):
+        answers[task].answers[:, test] = answered
+        answers[task].explained.update(explained)
+    return answers
+
+
+def write(
+    out: Path,
+    fitted: Fitted,
+    model: Model,
+    prices: Prices,
+    jobs: int = 1,
+) -> Path:
+    """Write report.html with its CSV and PNG files into a folder; the page's path.
+
+    Args:
+        out: the folder.
+        fitted: the result of `train.fit`.
+        model: the file that was exported from it.
+        prices: of the candidates.
+        jobs: processes.
+    """
+    exported = Exported(fitted, answers_of(fitted, jobs), model, prices)
+    accuracies = [_accuracy(exported, task) for task in fitted.chosen]
+    sections = [*accuracies, *(section(exported) for section in SECTIONS)]
+    lead = [
+        f"The model was fitted on {counted(model.info.rows, 'trial')}, and decides "
+        f"{model.info.window_s:g} s after the onset of a contact. Its version is "
+        f"{model.version}; "
+        f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
+        "The intervals are for the exported model on other trials: Wilson's for two "
+        "fifths of the trials, because that model differs from those of the folds. "
+        "Where entire groups are left out they count groups, whose trials are right or "
+        "wrong together.",
+        *(
+            line[0].upper() + line[1:] + "."
+            for line in (*fitted.notes, *warnings(fitted))
+        ),
+    ]
+    return page.write(out, f"Model {model.info.name}", lead, sections)
+
+
+def _accuracy(exported: Exported, task: str) -> Section:
+    """A task's accuracy, its confusion matrix, and the scores of each class."""
+    answer = exported.answers[task]
+    chosen = exported.fitted.chosen[task]
+    untouched = exported.fitted.dataset.untouched_labels(task)
+    tested = answer.truth != ""
+    truth = np.array([*answer.truth[tested], *untouched], dtype=str)
+    untouched_answers = [
+        label if label == NO_CONTACT else UNTOUCHED for label in untouched
+    ]
+    answers = np.array([*answer.answers[-1][tested], *untouched_answers], dtype=str)
+    text = f"{accuracy(chosen)}."
+    if untouched:
+        text += f" The trials include {counted(len(untouched), 'recording')} without a contact."
+    labels = sorted(set(truth))
+    scores: Any = precision_recall_fscore_support(
+        truth,
+        answers,
+        labels=labels,
+        zero_division=0.0,
+    )
+    rows: list[Row] = [
+        {
+            task: label,
+            "recall %": percent(recall),
+            "95 % interval": interval(
+                replace(chosen.accuracy, right=recall * total, total=total)
+            ),
+            "precision %": percent(precision),
+            "F1 %": percent(f1),
+            "trials": int(total),
+        }
+        for label, precision, recall, f1, total in zip(labels, *scores, strict=True)
+    ]
+    return Section(
+        f"Accuracy: {task}",
+        [text],
+        [Table(f"recall_{_file(task)}", f"{task}: scores of each class", rows)],
+        [
+            confusion(
+                f"confusion_{_file(task)}",
+                f"{task}: answers to left-out trials",
+                truth,
+                answers,
+            )
+        ],
+    )
+
+
+def _file(task: str) -> str:
+    """The task's name as a part of a file name."""
+    return re.sub(r"\W+", "_", task)
+
+
+def _wrong(exported: Exported) -> Section:
+    """The wrong answers, and a picture of the first."""
+    figures: list[Figure] = []
+    fitted = exported.fitted
+    rows = []
+    trials = names(fitted.measured)[1]
+    for task, answer in exported.answers.items():
+        for trial in answer.wrong:
+            why = answer.explained[trial]
+            rows.append(
+                {
+                    "trial": trials[trial],
+                    "task": task,
+                    "label": answer.truth[trial],
+                    "answer": answer.answers[-1][trial],
+                    "nearest trial": trials[why.voters[0].row],
+                    "distance": why.voters[0].distance,
+                    "distance to its label": why.rival.distance if why.rival else "",
+                    "strongest pull": next(iter(why.pulls), ""),
+                }
+            )
+        if answer.wrong and not figures:
+            figures.append(_picture(fitted, trials, task, answer))
+    text = [
+        "A model that had not seen these trials classified them wrongly. The last "
+        "column names the feature that pulls a trial most strongly towards the wrong "
+        "answer, compared with the nearest trial of the right label. Wrong labels and "
+        "failed touches often stand out here. The picture shows the first of the "
+        "trials; `edge-classify explain` and `python -m train show` explain any other "
+        "recording in the same way."
+    ]
+    table = Table("wrong", "Wrong answers", rows)
+    return Section("Wrong answers", text if rows else ["None."], [table], figures)
+
+
+def _picture(
+    fitted: Fitted,
+    trials: Sequence[str],
+    task: str,
+    answer: Answers,
+) -> Figure:
+    """The first wrong answer: the touch's curves over those of the trials that voted
+    for it."""
+    trial = answer.wrong[0]
+    measured = fitted.measured
+    why = answer.explained[trial]
+    wrong = str(answer.answers[-1][trial])
+    neighbours = [*why.voters[:MOST_NEAR], *([] if why.rival is None else [why.rival])]
+    entries = []
+    for n in neighbours:
+        label = answer.classes[n.label]
+        series = measured.trials[n.row].series
+        entries.append(
+            (f"{trials[n.row]}: {label}, {n.distance:.3g} away", series, label == wrong)
+        )
+    title = f"{trials[trial]}: classified as {wrong}, labelled {answer.truth[trial]}"
+    rival = answer.classes[neighbours[-1].label]
+    case = Case(title, measured.trials[trial].series, entries, why.pulls, rival)
+
+    def draw(canvas: Any, phone: bool) -> None:
+        draw_case(canvas, case, measured.layout, fitted.window_s, phone)
+
+    return picture(f"wrong_{_file(task)}", title, draw, (4.8, 8.4))
+
+
+def _features(exported: Exported) -> Section:
+    """Each feature's share in the answers to left-out trials."""
+    fitted = exported.fitted
+    dataset = fitted.dataset
+    rows = []
+    widths = dict(zip(dataset.names, dataset.widths(fitted.samples), strict=True))
+    for name, unit in dataset.units.items():
+        row: Row = {"feature": name}
+        for task, answer in exported.answers.items():
+            pulls = [why.pulls for why in answer.explained.values() if why.pulls]
+            shares = [_share(name, of_answer) for of_answer in pulls] or [0.0]
+            row[f"{task}, % of pull"] = percent(float(np.mean(shares)))
+        row["unit"] = "" if unit == "1" else unit
+        row["values"] = widths[name]
+        rows.append(row)
+    text = [
+        "A feature's pull says how much nearer the feature brings a touch to the "
+        "nearest trial with the model's answer than to the nearest trial with another "
+        "label. The table gives each feature's share of all pulls, as a mean over the "
+        f"wrong answers and about {EXPLAINED} other left-out trials."
+    ]
+    table = Table("features", "Each feature's share of the pull", rows, narrow=3)
+    return Section("Features", text, [table])
+
+
+def _share(name: str, pulls: Mapping[str, float]) -> float:
+    """A feature's share of all pulls."""
+    return abs(pulls.get(name, 0.0)) / (sum(map(abs, pulls.values())) or 1.0)
+
+
+def _learning(exported: Exported) -> Section:
+    """The accuracy with fewer training trials."""
+    n = len(exported.fitted.dataset.trials)
+    folds = max(len(chosen.by_fold) for chosen in exported.fitted.chosen.values())
+    largest = n * (1.0 - 1.0 / folds)
+    sizes = [round(largest * quarter / QUARTERS) for quarter in range(1, QUARTERS + 1)]
+    rows: list[Row] = [{"trials": size} for size in sizes]
+    half = QUARTERS // 2 - 1
+    text = []
+    results = {}
+    for task, answer in exported.answers.items():
+        hits = (answer.answers == answer.truth)[:, answer.truth != ""]
+        results[task] = [Result(int(quarter.sum()), quarter.size) for quarter in hits]
+        accuracies = [result.accuracy for result in results[task]]
+        for row, share in zip(rows, accuracies, strict=True):
+            row[f"{task} %"] = percent(share)
+        text.append(
+            f"{task}: doubling the training trials from {sizes[half]} to {sizes[-1]} "
+            "changed the accuracy by "
+            f"{100 * (accuracies[-1] - accuracies[half]):+.1f} percentage points."
+        )
+    text.append(
+        "Doubling them again usually changes less. All fits use the settings that were "
+        "chosen on the full training set, and the smaller sets contain the same "
+        "objects. To recognise objects that the model has never met, record more "
+        "objects rather than more touches of the same ones."
+    )
+    title = "Accuracy by the number of training trials"
+    figure = lines("learning", title, sizes, results, label="training trials")
+    return Section(
+        "The value of more recordings",
+        text,
+        [Table("learning", title, rows)],
+        [figure],
+    )
+
+
+def _sizes(exported: Exported) -> Section:
+    """The candidates with their accuracies, sizes and times."""
+    size = Path(exported.model.path).stat().st_size / 1024
+    text = [
+        f"The model file takes {size:.0f} kB. The candidates' accuracies come from "
+        "nested cross-validation, and stand with their 95 % intervals. The times are "
+        "for features and decision together on this machine; `edge-classify bench` "
+        "measures those of a board. A star marks the candidate chosen for a task, "
+        "which is the smallest one within a standard error of the best."
+    ]
+    return Section(
+        "Candidates, sizes and times",
+        text,
+        [candidates(exported.fitted, exported.prices)],
+    )
+
+
+SECTIONS: tuple[Callable[[Exported], Section], ...] = (
+    _wrong,
+    _features,
+    _learning,
+    _sizes,
+)
+"""The sections after those of each task's accuracy."""
