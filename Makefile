@@ -9,13 +9,14 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 # Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help venv test lint types export demo demo-data golden study tradeoff wheel wheel-test \
+.PHONY: help venv test test-all lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
   stopping soak soak-day constraints clean
 
 help:
 	@echo "Everyday"
-	@echo "  make test          lint, types and tests, as CI runs them"
+	@echo "  make test          lint, types and the fast tests"
+	@echo "  make test-all      the slow tests too, as CI runs them"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
 	@echo "                     build); NAME=... names the model"
@@ -80,8 +81,14 @@ lint: $(DEV)
 types: $(DEV)
 	$(BIN)/mypy
 
+# A file's tests share a worker, so that its fixtures are made once.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile
+
 test: lint types
-	$(BIN)/python -m pytest -n 2 $(TESTS)
+	$(PYTEST) -m "not slow" $(TESTS)
+
+test-all: lint types
+	$(PYTEST) $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml

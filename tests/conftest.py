@@ -28,8 +28,41 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False, deadline=None)
 settings.load_profile("explore" if os.environ.get("EXPLORE") else "same")
 
+FAST_S = 5.0
+"""Seconds of processor time that a test without the mark `slow` may take, its fixtures
+among them."""
+STARTED = pytest.StashKey[float]()
+
 ROOT = Path(__file__).parents[1]
 REAL = ROOT.parent / "shared" / "real"
+
+
+def processor_s():
+    """Seconds of processor time of this process and of those that it has waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Remember when a test's fixtures begin."""
+    item.stash[STARTED] = processor_s()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Fail a fast test that takes long: it belongs to the slow tier."""
+    report = yield
+    if call.when == "call" and report.passed and not item.get_closest_marker("slow"):
+        spent_s = processor_s() - item.stash[STARTED]
+        if spent_s > FAST_S:
+            report.outcome = "failed"
+            report.longrepr = (
+                f"{item.nodeid} took {spent_s:.1f} s of processor time with its "
+                f"fixtures; make it shorter or mark it slow (over {FAST_S:g} s)"
+            )
+    return report
+
 
 FOREARM = SkinLayout(
     rows=16,
