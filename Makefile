@@ -49,10 +49,10 @@ help:
 	@echo "  make soak-day      24 hours of the same at 15 Hz"
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
-	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes, and not from OpenVINO"
+	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
 	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
 	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
-	@echo "  make kills         kill record, label, teach, a map and export 60 times each: no damaged file"
+	@echo "  make kills         kill record, label and export 60 times each: no damaged file"
 	@echo "Upkeep"
 	@echo "  make golden        renew the small model and outputs that the tests compare with"
 	@echo "  make demo-data     renew the model and the touches that the wheel carries"
@@ -333,11 +333,9 @@ HARD := $(OUT)/hard-cases
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases
 
-# Writes golden files of the hard cases, then checks them with other ONNX Runtimes, and that
-# verify refuses an engine that computes in float32.
+# Writes golden files of the hard cases, then checks them with other ONNX Runtimes.
 OTHER_RUNTIMES ?= 1.22.1 1.26.0 1.32.0
 OTHERS := $(OTHER_RUNTIMES:%=$(HARD)/onnxruntime-%)
-FLOAT32 := $(HARD)/openvino-2026.4.1
 ELSEWHERE = -m pip install --quiet --disable-pip-version-check \
   $$(grep -E '^(numpy|smbus2)==' constraints.txt)
 
@@ -346,17 +344,11 @@ $(OTHERS:%=%/.ready): $(HARD)/onnxruntime-%/.ready: constraints.txt
 	$(@D)/bin/python $(ELSEWHERE) onnxruntime==$*
 	@touch $@
 
-$(FLOAT32)/.ready: constraints.txt
-	$(PYTHON) -m venv $(@D)
-	$(@D)/bin/python $(ELSEWHERE) openvino==$(lastword $(subst -, ,$(@D)))
-	@touch $@
-
-hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready) $(FLOAT32)/.ready
+hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready)
 	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
 	for other in $(OTHERS); do \
 	  $(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
 	  || exit 1; done
-	$(FLOAT32)/bin/python -m tests.hard_cases.float32 --golden $(HARD)/golden
 
 $(VENV)/.mutants: $(DEV)
 	$(PIP) --group mutants
@@ -379,7 +371,7 @@ constraints: $(VENV)/.upkeep
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
-# KILLS="--count 10 --only teach": fewer of them, and of one command.
+# KILLS="--count 10 --only record": fewer of them, and of one command.
 kills: $(DEV)
 	$(BIN)/python -m tests.kills $(KILLS)
 

@@ -3,7 +3,6 @@
 import bz2
 import contextlib
 import io
-import json
 import re
 import shutil
 import tempfile
@@ -34,7 +33,6 @@ from tests.train.importers.test_log_importers import (
 )
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
-from train.touch_map import TouchMap
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "edge" / "demo"
@@ -151,20 +149,6 @@ def read_chain(path):
         raise Wrong("a pose is not finite")
 
 
-HEAD = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
-TOUCH = {
-    "event": "decision",
-    "task": "object",
-    "contact": 1,
-    "onset_s": 1.5,
-    "label": "cup",
-    "place": [0.1, 0.2, 0.3],
-    "confidence": 0.5,
-    "flags": ["tie"],
-}
-MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
-
-
 def read_grasp(path):
     """Import the XML as the only grasp of a folder."""
     folder = path.parent / "grasps"
@@ -257,13 +241,6 @@ READERS = (
     ),
     Reader("arm", ".toml", files("edge/arms/cody.toml"), mutate.of_text, read_chain),
     Reader("urdf", ".urdf", lambda: [ARM.encode()], mutate.of_text, read_chain),
-    Reader(
-        "map",
-        ".jsonl",
-        lambda: [MAP.encode()],
-        mutate.of_text,
-        lambda path: list(TouchMap(path)),
-    ),
     Reader(
         "scene",
         ".toml",
