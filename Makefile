@@ -9,7 +9,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 # Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help venv test test-all lint types export demo demo-data golden study tradeoff wheel wheel-test \
+.PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
   board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
   stopping soak soak-day constraints clean
 
@@ -17,6 +17,7 @@ help:
 	@echo "Everyday"
 	@echo "  make test          lint, types and the fast tests"
 	@echo "  make test-all      the slow tests too, as CI runs them"
+	@echo "  make test-busy     the fast tests five times beside eight busy processes"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
 	@echo "                     build); NAME=... names the model"
@@ -89,6 +90,9 @@ test: lint types
 
 test-all: lint types
 	$(PYTEST) $(TESTS)
+
+test-busy: $(DEV)
+	$(BIN)/python -m tests.busy $(PYTEST) -m "not slow" $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml

@@ -191,7 +191,7 @@ class Ros:
             self.modules[f"{package}.msg"] = messages
 
     def spin(self, node):
-        node._reading.join(timeout=30)
+        node._reading.join()
         node.diagnose()
 
     def run(self, monkeypatch):
@@ -305,7 +305,7 @@ def test_the_ros_node_names_the_chips_that_are_not_read(monkeypatch):
     ros = Ros()
 
     def spin(node):
-        node._reading.join(timeout=30)
+        node._reading.join()
         first, second, *_ = node._skin.status()
         down = [replace(first, state="down"), second]
         monkeypatch.setattr(node._skin, "status", lambda: down)
