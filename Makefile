@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
+  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
   stopping soak soak-day constraints clean
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
 	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
+	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
@@ -269,6 +270,9 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt "pip>=25.1"
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
 	@touch $@
+
+peers-test: $(PEERS)/.ready
+	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
 
 stopping: $(PEERS)/.ready
 	$(PEERS)/bin/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
