@@ -17,6 +17,7 @@ import edge
 from tests.board.debian import CHECKOUT
 from tests.conftest import ended
 
+pytestmark = pytest.mark.slow
 LARGEST = 290_000
 
 
