@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (`.bag`) or ROS 2 (a folder): one recording each; see
+"""Logs of ROS 1 (`.bag`) or ROS 2 (a folder, `.mcap` or `.db3`): one recording each; see
 train/importers/topics.py.
 
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros

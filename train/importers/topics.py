@@ -1,13 +1,12 @@
 """Topics of frames and joint angles in a robot's log, turned into one recording.
 
 Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), an array of
-`std_msgs` (`UInt16MultiArray`, `Int16MultiArray`, `Float32MultiArray` and so on), or
-JSON `{"counts": [[...], ...]}`. A sensor's own message is read by the definition that
-the log carries: `--field forces.z` names the values in it, and with `--axes` the field
-whose parts are x, y and z. Joint angles are `sensor_msgs/JointState`, or JSON `{"q":
-[...]}`, optionally with `"names": [...]`. A message may carry its own time
-(`header.stamp`, `"t"`); otherwise the time at which it was logged is used. Where the
-clocks of frames and angles never meet, both are taken by the time of logging.
+`std_msgs` (`UInt16MultiArray`, `Int16MultiArray`, `Float32MultiArray` and so on). A
+sensor's own message is read by the definition that the log carries: `--field forces.z`
+names the values in it, and with `--axes` the field whose parts are x, y and z. Joint
+angles are `sensor_msgs/JointState`. A message may carry its own time (`header.stamp`);
+otherwise the time at which it was logged is used. Where the clocks of frames and angles
+never meet, both are taken by the time of logging.
 
 Joints are identified by name, in any order, and several messages may share them. With
 an arm, its joints are selected in the arm's order, and a warning names the others.
@@ -19,7 +18,6 @@ the ones to use: `frames_topic` and `joints_topic`. Other topics are not read.
 """
 
 import argparse
-import json
 import logging
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -33,9 +31,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from edge.commands.output import counted
-from edge.config import ConfigTable, short_text
+from edge.config import short_text
 from edge.errors import InputError
-from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.joint_angles import joint_columns
@@ -53,7 +50,6 @@ ARRAYS = tuple(
     f"std_msgs/msg/{name}MultiArray"
     for name in "UInt8 Int8 UInt16 Int16 UInt32 Int32 Float32 Float64".split()
 )
-JSON = "json"
 JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
 CLOCKS = ["stamp", "logged"]
@@ -140,25 +136,6 @@ class Log:
         else:
             self._frame(topic, times, kind, message)
 
-    def json(self, topic: str, data: bytes, logged_s: float) -> None:
-        """Take in a JSON message."""
-        where = f"{self.path}: a message of {topic}"
-        try:
-            message = json.loads(data)
-        except (ValueError, RecursionError):
-            message = None
-        if not isinstance(message, dict):
-            self.leave_out(topic, "has a message that is no JSON table")
-        elif "q" in message and self.takes(topic, JOINTS):
-            with parsing(where, "usable"):
-                t = ConfigTable(message, where).number("t", logged_s)
-                angles = np.asarray(message["q"], dtype=np.float64)
-                names = list(map(str, message.get("names", ())))
-                self._pose(topic, (t, logged_s), names, angles)
-        elif "counts" in message and self.takes(topic, IMAGE):
-            t = ConfigTable(message, where).number("t", logged_s)
-            self._frame(topic, (t, logged_s), JSON, message["counts"])
-
     def leave_out(self, topic: str, reason: str) -> None:
         """Note why a message of a topic that may hold frames is not read."""
         if self.beside.get("frames_topic", topic) == topic:
@@ -214,8 +191,6 @@ class Log:
             return image_values(message)
         if kind in ARRAYS:
             return array_values(message)
-        if kind == JSON:
-            return json_values(message)
         name = self.options.field
         if name is None:
             raise Unusable(f"is {kind}; give --field, the name of the values in it")
@@ -289,9 +264,8 @@ class Log:
         """The sentence for a log without frames."""
         for topic, reasons in self._left_out.items():
             return f"holds no frames: {topic} {reasons[0]}"
-        kinds = f"{IMAGE}, {ARRAYS[2]} or another array"
         return (
-            f'holds no frames; they must be {kinds}, JSON {{"counts": [[...]]}}, or a '
+            f"holds no frames; they must be {IMAGE}, {ARRAYS[2]} or another array, or a "
             "message of a sensor's own with --field"
         )
 
@@ -445,18 +419,6 @@ def field_values(message: Any, name: str) -> NDArray[np.float64]:
     for part in name.split("."):
         value = _part(value, part)
     return np.atleast_1d(numbers_in(value, name))
-
-
-def json_values(counts: Any) -> NDArray[np.float64]:
-    """(rows, columns) values of a JSON message.
-
-    Raises:
-        Unusable: they are no numbers in rows and columns.
-    """
-    values = numbers_in(counts, "counts")
-    if values.ndim != 2:
-        raise Unusable(f"has counts of {values.shape} instead of rows and columns")
-    return values
 
 
 def numbers_in(value: Any, name: str) -> NDArray[np.float64]:
