@@ -17,28 +17,24 @@ Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see 
 
 import argparse
 import re
-from collections.abc import Iterable, Iterator, Sequence, Set
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import mode
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.options import within
 from edge.commands.output import counted
 from edge.config import ConfigTable, short_text
 from edge.errors import InputError, about
 from edge.files import parsing
-from edge.recording import Recording
 from edge.touch.arm import Chain
-from train.importers import arrays, counts
-from train.importers.axes import Axes, parted
+from train.importers import Refused, Trial, arrays
+from train.importers.axes import parted
 from train.importers.columns import (
-    UNITS,
     Meaning,
     columns,
     is_date,
@@ -46,7 +42,8 @@ from train.importers.columns import (
     named_times,
     times_of,
 )
-from train.importers.counts import Trial, rest_of, skin_shape
+from train.importers.counts import Samples, rest_of, skin_shape
+from train.importers.options import TableOptions, add_table_options
 from train.importers.reading import (
     TEXTS,
     Table,
@@ -65,8 +62,6 @@ from train.progress import say
 LABELS = "labels.csv"
 SKIN = "skin.json"
 SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
-FASTEST_HZ = 1e6
-"""A higher frame rate must be a mistake."""
 NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
 """Names of folders that only count trials."""
 FEWEST_ROWS = 8
@@ -74,40 +69,9 @@ FEWEST_ROWS = 8
 SPARSEST = 64
 """Cells for each value of a long table; more would be nearly empty."""
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add options for the facts that a table lacks."""
-    rate = within(float, 1e-3, FASTEST_HZ)
-    add = parser.add_argument
-    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
-    add(
-        "--frames",
-        action="store_true",
-        help="a folder is a trial, and a file in it a frame, named by its time in "
-        "seconds, or by its number if --rate is given",
-    )
-    add(
-        "--trials",
-        action="store_true",
-        help="a file of arrays holds several trials: cells, structures, or a first axis",
-    )
-    add("--time", metavar="COL", help="the time (default: a column of such a name)")
-    add(
-        "--time-unit",
-        choices=UNITS,
-        help="unit of the times (default: by name or steps, where they leave no doubt)",
-    )
-    add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
-    add("--joints", metavar="COLS", help="joint angles in radians")
-    add("--degrees", action="store_true", help="joint angles are in degrees")
-    add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
-    add(
-        "--task",
-        default="object",
-        help="the task of these labels (default: %(default)s)",
-    )
-    add("--strict", action="store_true", help="stop at the first file that is unusable")
-    counts.add_options(parser)
+Before = TypeVar("Before")
+After = TypeVar("After")
+add_options = add_table_options
 
 
 @dataclass(frozen=True)
@@ -135,7 +99,7 @@ class Measured:
         name, labels, label: as those of its source.
         form: of its table.
         meaning: of the columns.
-        numbers: of the trial.
+        samples: the numbers of the trial.
     """
 
     name: str
@@ -143,114 +107,137 @@ class Measured:
     label: str
     form: tuple[str, ...]
     meaning: Meaning
-    numbers: Trial
+    samples: Samples
 
 
 def trials(
     path: Path,
     arm: Chain | None,
-    options: argparse.Namespace,
-) -> Iterator[tuple[str, Recording]]:
+    arguments: argparse.Namespace,
+) -> Iterator[Trial | Refused]:
     """One recording for each file of a folder, or for each trial of a long table.
 
-    Prints what was taken. Files that cannot be used are appended to `options.skipped`.
+    Prints what was taken.
 
     Raises:
-        InputError: no file can be used, or one cannot with `--strict`.
+        InputError: there is no file, or one cannot be used with `--strict`.
     """
-    options.skipped = []
-    axes = Axes.of(options)
+    options = TableOptions.of(arguments)
     folder = path if path.is_dir() else path.parent
     sources = _sources(path, folder, options)
     if (folder / LABELS).is_file():
-        sources = _labelled(list(sources), folder / LABELS, options)
-    measured = _measured(sources, axes, options)
+        sources = _labelled(list(sources), folder / LABELS, options.task)
+
+    def understood(source: Source) -> Measured:
+        return _understood(source, options)
+
+    measured = list(tried(sources, understood, options.strict))
     if not measured:
-        raise _nothing(path, options)
+        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
+        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
+    results = _alike(measured, options.strict)
+    usable = [result for result in results if isinstance(result, Measured)]
+    if not usable:
+        yield from refusals(results)
+        return
     skin = json_table(folder / SKIN)
-    shape = _announced(measured[0], skin, axes, options)
-    rest = rest_of([trial.numbers for trial in measured], options)
-    written = 0
-    for trial in measured:
+    shape = _announced(usable[0], skin, options)
+    rest = rest_of([trial.samples for trial in usable], options)
+
+    def recorded(trial: Measured) -> Trial:
         meta: dict[str, Any] = {
             "skin": skin.raw,
             "labels": trial.labels,
             "source": path.name,
             "trial": trial.name,
         }
-        if trial.numbers.joints is not None:
+        if trial.samples.joints is not None:
             meta["arm"] = arm and arm.to_dict()
-        with _skipping(options):
-            recording = rest.recording(trial.numbers, shape, meta)
-            written += 1
-            yield trial.name, recording
-    if not written:
-        raise _nothing(path, options)
+        return Trial(trial.name, rest.recording(trial.samples, shape, meta))
+
+    yield from tried(results, recorded, options.strict)
 
 
-@contextmanager
-def _skipping(options: argparse.Namespace) -> Iterator[None]:
-    """Leave out a file that cannot be used, unless the user is strict."""
+def tried(
+    items: Iterable[Before | Refused],
+    change: Callable[[Before], After],
+    strict: bool,
+) -> Iterator[After | Refused]:
+    """What a function makes of each item, or why it refuses it.
+
+    Raises:
+        InputError: it refuses one, and the user is strict.
+    """
+    for item in items:
+        if isinstance(item, Refused):
+            yield item
+        else:
+            yield from until_refused(map(change, [item]), strict)
+
+
+def until_refused(
+    items: Iterable[After],
+    strict: bool,
+) -> Iterator[After | Refused]:
+    """Some items; if what makes them refuses to go on, in the end why.
+
+    Raises:
+        InputError: it does, and the user is strict.
+    """
     try:
-        yield
+        yield from items
     except InputError as error:
-        if options.strict:
+        if strict:
             raise
-        options.skipped.append(str(error))
+        yield Refused(str(error))
 
 
-def _nothing(path: Path, options: argparse.Namespace) -> InputError:
-    """The error where nothing can be imported."""
-    if options.skipped:
-        (first, *further) = options.skipped
-        more = f"; {len(further)} more cannot be used either" if further else ""
-        return InputError(first + more)
-    kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
-    return InputError(f"{path}: holds no {kind}; give a folder of trials")
+def refusals(items: Iterable[object]) -> list[Refused]:
+    """Those of some items that are refused."""
+    return [item for item in items if isinstance(item, Refused)]
 
 
 def _announced(
     first: Measured,
     skin: ConfigTable,
-    axes: Axes | None,
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints what was taken, once for all files."""
     taxels = len(first.meaning.taxels)
     shape_in_file = first.meaning.shape
     shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = skin_shape(first.numbers, shape_in_file, options)
+    shape = skin_shape(first.samples, shape_in_file, options)
     text = first.meaning.text(first.label, shape)
     say("; ".join([text, *first.form]))
-    if axes is not None:
-        say(axes.text)
+    if options.axes is not None:
+        say(options.axes.text)
     return shape
 
 
 def _labelled(
-    sources: Sequence[Source],
+    sources: Sequence[Source | Refused],
     path: Path,
-    options: argparse.Namespace,
-) -> Iterator[Source]:
+    task: str,
+) -> Iterator[Source | Refused]:
     """The trials with the labels of a labels.csv instead of those of the files' names.
 
     Raises:
         InputError: it names none of the trials.
     """
-    trials = [source.name for source in sources]
+    trials = [source.name for source in sources if isinstance(source, Source)]
     rows = _label_rows(path, trials)
     files = {_name(file, path.parent) for file in _visible(path.parent)}
-    unknown = [row for row in rows if row not in trials and row not in files]
-    options.skipped += [f"{path}: {row} names no file" for row in unknown]
+    for row in rows:
+        if row not in trials and row not in files:
+            yield Refused(f"{path}: {row} names no file")
     for source in sources:
-        labels = {**source.labels}
-        labels.pop(options.task, None)
-        if source.name in rows:
-            labels |= rows[source.name]
-        else:
-            options.skipped.append(
-                f"{path}: has no row for {source.name}, which has no label"
-            )
+        if isinstance(source, Refused):
+            yield source
+            continue
+        if source.name not in rows:
+            yield Refused(f"{path}: has no row for {source.name}, which has no label")
+        others = {key: source.labels[key] for key in source.labels if key != task}
+        labels = others | rows.get(source.name, {})
         yield replace(source, labels=labels, label=LABELS)
 
 
@@ -269,7 +256,11 @@ def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
     return {str(trial): row.dropna().to_dict() for trial, row in rows}
 
 
-def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
+def _sources(
+    path: Path,
+    folder: Path,
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
     """The trials of the file, or of the files or folders in the folder."""
     places = [path]
     if options.frames:
@@ -279,12 +270,11 @@ def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[
     read = _of_frames if options.frames else _of_file
     counting = _counting([place.relative_to(folder) for place in places])
     for place in places:
-        with _skipping(options):
-            for source in read(place, folder, options):
-                if source.label:
-                    yield source
-                    continue
-                labels, label = _label(place.relative_to(folder), counting, options)
+        labels, label = _label(place.relative_to(folder), counting, options.task)
+        for source in until_refused(read(place, folder, options), options.strict):
+            if isinstance(source, Refused) or source.label:
+                yield source
+            else:
                 yield replace(source, labels=labels, label=label)
 
 
@@ -331,7 +321,7 @@ def _counting(places: Sequence[Path]) -> set[str]:
 def _label(
     place: Path,
     counting: Set[str],
-    options: argparse.Namespace,
+    task: str,
 ) -> tuple[dict[str, str], str]:
     """The labels that the names of a file and its folders tell, and how."""
     kind = "folder's"
@@ -342,10 +332,14 @@ def _label(
     label = names[-1]
     if not label:
         return {}, "none, as the files' names only count"
-    return {options.task: label}, f'the {kind} name, such as "{label}"'
+    return {task: label}, f'the {kind} name, such as "{label}"'
 
 
-def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
+def _of_file(
+    file: Path,
+    folder: Path,
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
     """The trials in a file."""
     suffix = suffix_of(file)
     if suffix in arrays.SUFFIXES:
@@ -372,23 +366,27 @@ def _name(file: Path, folder: Path) -> str:
 def _of_arrays(
     file: Path,
     stored: arrays.Arrays,
-    options: argparse.Namespace,
-) -> Iterator[Source]:
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
     """The trials in a file of arrays."""
     with about(str(file)):
         trials = list(arrays.trials_of(stored, options.task))
-    for number, (labels, of_trial) in enumerate(trials):
+
+    def source(numbered: tuple[int, arrays.Labelled]) -> Source:
+        number, (labels, of_trial) = numbered
         name = f"{file.stem}_{number:03}"
         where = f"{file}: trial {name}"
-        with _skipping(options), about(where):
+        with about(where):
             table = arrays.table_of(where, of_trial, options)
-            yield Source(name, table, labels, "the arrays" if labels else "")
+        return Source(name, table, labels, "the arrays" if labels else "")
+
+    return tried(enumerate(trials), source, options.strict)
 
 
 def _of_frames(
     inside: Path,
     folder: Path,
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> Iterator[Source]:
     """The trial of a folder with a file for each frame, if it has files."""
     files = sorted(p for p in inside.glob("[!.]*") if suffix_of(p) in SUFFIXES)
@@ -428,29 +426,29 @@ def _frame(file: Path) -> NDArray[np.float64]:
     return read_frame(file)
 
 
-def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
+def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused]:
     """The trials of a long table."""
     for name in {"trial", "taxel"} & set(table.names):
         require_filled(table.where, table.data, name)
-    tasks = _tasks_in(table, options)
+    tasks = _tasks_in(table, options.task)
     label = f"column {', column '.join(tasks)}" if tasks else "none"
-    for trial, rows in table.data.groupby("trial", sort=False):
-        where = f"{table.where}: trial {trial}"
-        with _skipping(options):
-            labels = _labels_in(where, rows[tasks])
-            data = rows.drop(columns=["trial", *tasks])
-            trial_table = replace(
-                table,
-                where=where,
-                data=data,
-                file_names=tuple(table.names),
-            )
-            if "taxel" in data:
-                trial_table = _pivoted(trial_table, options)
-            yield Source(str(trial), trial_table, labels, label)
+
+    def source(trial: tuple[Any, pd.DataFrame]) -> Source:
+        name, rows = trial
+        where = f"{table.where}: trial {name}"
+        labels = _labels_in(where, rows[tasks])
+        data = rows.drop(columns=["trial", *tasks])
+        names = tuple(table.names)
+        part = replace(table, where=where, data=data, file_names=names)
+        if "taxel" in data:
+            part = _pivoted(part, options.time)
+        return Source(str(name), part, labels, label)
+
+    trials = table.data.groupby("trial", sort=False)
+    return tried(trials, source, options.strict)
 
 
-def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
+def _tasks_in(table: Table, task: str) -> list[str]:
     """The columns of labels of a long table: that of the task, and those of texts, apart
     from times that run within a trial. A number among texts is a label if it stays the
     same within its trial."""
@@ -458,7 +456,7 @@ def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
     for name in table.names:
         column = table.data[name]
         if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
-            is_task = name == options.task
+            is_task = name == task
         else:
             texts = column.astype(str).groupby(table.data["trial"])
             words = pd.to_numeric(column, errors="coerce").isna().all()
@@ -485,11 +483,11 @@ def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
     return labels
 
 
-def _pivoted(table: Table, options: argparse.Namespace) -> Table:
+def _pivoted(table: Table, time_terms: str | None) -> Table:
     """A row for each time and a column for each taxel, of a table with a row for each
     value."""
     further = [name for name in table.names if name not in ("taxel", "value")]
-    time = _time_of_long(table, further, options)
+    time = _time_of_long(table, further, time_terms)
     _check_long(table, time)
     wide = table.data.pivot(index=time, columns="taxel", values="value")
     wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
@@ -510,11 +508,11 @@ def _pivoted(table: Table, options: argparse.Namespace) -> Table:
 def _time_of_long(
     table: Table,
     further: Sequence[str],
-    options: argparse.Namespace,
+    terms: str | None,
 ) -> str:
     times = named_times(table) or further
-    if options.time:
-        times = columns(table, options.time)
+    if terms:
+        times = columns(table, terms)
     if "value" not in table.data or len(times) != 1:
         raise InputError(
             f"{table.where}: needs the columns value and a time beside taxel, which "
@@ -551,38 +549,35 @@ def _natural(name: Any) -> list[Any]:
     return [int(word) if word.isdigit() else word for word in words]
 
 
-def _measured(
-    sources: Iterable[Source],
-    axes: Axes | None,
-    options: argparse.Namespace,
-) -> list[Measured]:
-    """The numbers of the trials whose columns are those of most of them.
+def _alike(
+    measured: Sequence[Measured | Refused],
+    strict: bool,
+) -> list[Measured | Refused]:
+    """The trials, without those whose columns are not those of most of them.
 
     Raises:
         InputError: columns without a name may be no taxels.
     """
-    measured: list[Measured] = []
-    for source in sources:
-        with _skipping(options):
-            measured.append(_understood(source, axes, options))
-    if not measured:
-        return []
-    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in measured]
-    first = measured[kinds.index(mode(kinds))]
-    alike = []
-    for trial in measured:
-        with _skipping(options):
-            _compare(trial, first)
-            alike.append(trial)
+    usable = [trial for trial in measured if isinstance(trial, Measured)]
+    if not usable:
+        return list(measured)
+    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in usable]
+    first = usable[kinds.index(mode(kinds))]
+
+    def compared(trial: Measured) -> Measured:
+        _compare(trial, first)
+        return trial
+
+    alike = list(tried(measured, compared, strict))
     if first.meaning.are_all:
-        _require_taxels(alike)
+        _require_taxels([trial for trial in alike if isinstance(trial, Measured)])
     return alike
 
 
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
-    path = trial.numbers.where
-    first_path = first.numbers.where
+    path = trial.samples.where
+    first_path = first.samples.where
     taxels = trial.meaning.taxels
     first_taxels = first.meaning.taxels
     unit = trial.meaning.unit
@@ -611,7 +606,7 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
     Raises:
         InputError: there is one.
     """
-    values = [trial.numbers.values[..., 0] for trial in measured]
+    values = [trial.samples.values[..., 0] for trial in measured]
     if min(map(len, values)) < FEWEST_ROWS:
         return
     starts = np.array([frames[0] for frames in values])
@@ -621,17 +616,14 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
     if doubtful.any() and not doubtful.all():
         first = measured[0]
         raise InputError(
-            f"{first.numbers.where}: column {first.meaning.taxels[doubtful.argmax()]} "
+            f"{first.samples.where}: column {first.meaning.taxels[doubtful.argmax()]} "
             "counts up, or tells the trials apart; name the taxels by --taxels"
         )
 
 
-def _understood(
-    source: Source,
-    axes: Axes | None,
-    options: argparse.Namespace,
-) -> Measured:
+def _understood(source: Source, options: TableOptions) -> Measured:
     """The numbers of a trial."""
+    axes = options.axes
     table = source.table if axes is None else parted(source.table, axes.normal)
     sense = meaning(table, options)
     values = table.values(sense.taxels)
@@ -640,8 +632,8 @@ def _understood(
         unit = np.pi / 180.0 if options.degrees else 1.0
         joints = unit * table.numbers(sense.joints)
     t = times_of(table, sense, options)
-    numbers = replace(Trial.of(table.where, t, values, axes), joints=joints)
-    if np.isnan(numbers.values[..., 0]).all():
+    samples = replace(Samples.of(table.where, t, values, axes), joints=joints)
+    if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
     # Without the table, which would fill the memory a second time where it is long.
@@ -651,5 +643,5 @@ def _understood(
         source.label,
         source.table.form,
         sense,
-        numbers.in_order(str(rows.name), rows),
+        samples.in_order(str(rows.name), rows),
     )

@@ -1,7 +1,5 @@
 """Arrays: which axis is the time, trials within a file, and sizes."""
 
-import argparse
-
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -9,8 +7,9 @@ from scipy.io import savemat
 from edge.errors import InputError
 from train.importers import arrays
 from train.importers.arrays import read_arrays, table_of, trials_of
+from train.importers.options import TableOptions
 
-OPTIONS = argparse.Namespace(axis=None, taxels=None, joints=None, time=None)
+OPTIONS = TableOptions()
 FRAMES = np.arange(24).reshape(6, 4)
 
 
@@ -53,14 +52,14 @@ def test_what_would_be_guessed_is_asked(stored, sentence):
 def test_an_axis_that_is_named_is_taken():
     square = np.arange(36).reshape(6, 6)
     stored = {"a": square, "b": np.ones((6, 2))}
-    named = argparse.Namespace(axis=2, taxels="a", joints=None, time=None)
+    named = TableOptions(axis=2, taxels="a")
     table = table_of("a.mat", stored, named)
     assert table.data.to_numpy().tolist() == square.T.tolist()
 
 
 def test_the_array_that_is_named_as_the_time_tells_the_frames():
     stored = {"clock": np.arange(6.0), "a": np.ones((6, 4)), "b": np.ones((4, 6))}
-    named = argparse.Namespace(axis=None, taxels=None, joints=None, time="clock")
+    named = TableOptions(time="clock")
     assert len(table_of("a.mat", stored, named).data) == 6
 
 

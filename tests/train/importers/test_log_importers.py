@@ -1,6 +1,5 @@
 """Logs of ROS, made here and imported through the command."""
 
-import argparse
 import json
 import shutil
 from types import SimpleNamespace
@@ -14,6 +13,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from edge.recording import load
 from train.__main__ import main
+from train.importers.axes import Axes
+from train.importers.options import LogOptions
 from train.importers.topics import Log
 
 N = 12
@@ -28,7 +29,6 @@ JOINT_T = 99.99 + np.arange(8) / 50
 JOINTS = RNG.uniform(-1, 1, (8, DOF))
 BESIDE = {"labels": {"object": "cup"}, "skin": {"threshold_counts": 50, "wraps": True}}
 NAMES = tuple(f"j{i}" for i in range(DOF))
-OPTIONS = argparse.Namespace(axes=None, flip=None, field=None, shape=None)
 STORES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
 
 SENSOR = """std_msgs/Header header
@@ -392,16 +392,12 @@ def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
 
 @pytest.mark.parametrize("letters", ["xyz", "XYZ"])
 def test_axes_may_be_letters_at_the_end_of_fields(tmp_path, letters):
-    options = argparse.Namespace(
-        **{**vars(OPTIONS), "field": "taxels.f", "axes": "xyz"}
-    )
+    axes = Axes.of("xyz", None)
+    options = LogOptions(field="taxels.f", axes=axes, shape=(1, 1))
     log = Log(tmp_path / "grasp", None, options)
     values = dict(zip([f"f{letter}" for letter in letters], (1, 2, 3), strict=True))
     message = SimpleNamespace(taxels=[SimpleNamespace(**values)])
-    log.ros("/hub", "maker/msg/State", message, 0.0)
-    options.shape = (1, 1)
-    options.falls = options.signed = False
-    options.scale = 1.0
+    log.add("/hub", "maker/msg/State", message, 0.0)
     recording = log.recording()
     assert recording.frames.ravel().tolist() == [3]
     assert recording.shear.ravel().tolist() == [1, 2]
