@@ -24,6 +24,7 @@ SHARED = {
     "counts",
     "options",
     "reading",
+    "sources",
     "topics",
 }
 """Modules that the formats share."""

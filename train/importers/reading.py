@@ -450,8 +450,8 @@ def _decoded(data: bytes) -> tuple[str, list[str]]:
         return data.decode("cp1252"), ["Windows-1252"]
 
 
-def read_parquet(path: Path, **options: Any) -> Table:
-    """The table in a Parquet file, with further options of pandas.
+def read_parquet(path: Path) -> Table:
+    """The table in a Parquet file.
 
     Raises:
         InputError: it cannot be read, or its reader is not installed.
@@ -461,7 +461,7 @@ def read_parquet(path: Path, **options: Any) -> Table:
         parsing(str(path), "a Parquet table"),
         needs("pyarrow", f"{path}: reading Parquet"),
     ):
-        data = pd.read_parquet(file, **options)
+        data = pd.read_parquet(file)
     if data.empty:
         raise InputError(f"{path}: {EMPTY}")
     if not isinstance(data.index, pd.RangeIndex):

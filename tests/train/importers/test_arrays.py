@@ -127,17 +127,20 @@ def trials_in(path):
 
 @pytest.mark.parametrize(
     "write",
-    [of_structures, several_structures, of_cells, of_cells_in_matlab_7_3, stacked],
+    [
+        of_structures,
+        several_structures,
+        of_cells,
+        of_cells_in_matlab_7_3,
+        of_groups,
+        stacked,
+    ],
 )
-def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
-    path = tmp_path / ("a.h5" if write is of_cells_in_matlab_7_3 else "a.mat")
+def test_trials_are_cells_structures_groups_or_a_first_axis(tmp_path, write):
+    in_hdf5 = write in (of_cells_in_matlab_7_3, of_groups)
+    path = tmp_path / ("a.h5" if in_hdf5 else "a.mat")
     write(path)
     assert trials_in(path) == [{"object": "cup"}, {"object": "pen"}]
-
-
-def test_trials_are_groups(tmp_path):
-    of_groups(tmp_path / "a.h5")
-    assert trials_in(tmp_path / "a.h5") == [{"object": "cup"}, {"object": "pen"}]
 
 
 def test_a_grid_in_matlab_7_3_keeps_its_rows_and_columns(tmp_path):

@@ -100,12 +100,6 @@ def test_shear_stands_where_the_normal_does(sheared):
     assert counted.shear[3].tolist() == [[[5, -10]]]
 
 
-def test_a_missing_value_is_not_valid():
-    counted = recorded(Rest(), trial([1, NAN]))
-    assert counted.valid.tolist() == [[[True, False]]]
-    assert counted.frames.tolist() == [[[1, 0]]]
-
-
 @pytest.mark.parametrize("unknown", [NAN, np.inf, -np.inf])
 def test_a_taxel_without_one_of_its_axes_is_not_valid(unknown):
     shear = np.arange(1.0, 7.0).reshape(1, 3, 2)

@@ -310,8 +310,6 @@ def test_arrays_take_the_shape_from_the_layout_or_from_beside(
     [
         ("Float32", np.float32(0.25), ("--scale", 4)),
         ("Int16", np.int16(1), ()),
-        ("UInt8", np.uint8(1), ()),
-        ("Float64", 0.5, ("--scale", 2)),
     ],
 )
 def test_arrays_of_every_kind_are_frames(bag, imported, kind, scale, options):
