@@ -167,10 +167,9 @@ def test_a_structure_within_a_trial_is_left_out(tmp_path):
     assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
 
 
-@pytest.mark.parametrize("stored", [{}, {"a": np.zeros((0, 3))}])
-def test_a_file_without_trials_holds_no_values(stored):
+def test_a_file_without_trials_holds_no_values():
     with pytest.raises(InputError, match="holds no values"):
-        list(trials_of(stored, "object"))
+        list(trials_of({"a": np.zeros((0, 3))}, "object"))
 
 
 def test_arrays_with_other_numbers_of_trials_are_named():

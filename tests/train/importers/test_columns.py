@@ -158,10 +158,6 @@ def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
         sense_of(table("s1", t=COUNTS * step))
 
 
-def test_a_unit_that_is_named_is_taken():
-    assert sense_of(table("t", "s1"), time_unit="ms").unit == "ms"
-
-
 def test_what_is_no_date_is_named():
     source = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
     with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):

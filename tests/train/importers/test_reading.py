@@ -42,7 +42,6 @@ def rows_of(table):
         .replace("0,01,3", "0,01;3"),
         PLAIN.replace(",", "|"),
         PLAIN.replace(",", " ").replace(".", ","),
-        "% by me\n" + PLAIN,
         "sep=;\n" + PLAIN.replace(",", ";"),
         "\ufeff" + PLAIN,
         PLAIN.encode("utf-16"),
@@ -50,7 +49,6 @@ def rows_of(table):
         "# t,p1,p2\n0,1,2\n0.01,3,4\n",
         PLAIN.replace("\n0.01", "\n# a pause\n0.01"),
         PLAIN.replace("\n", "\n\n"),
-        PLAIN + "\n\n",
         PLAIN[:-1],
     ],
 )
