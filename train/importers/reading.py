@@ -264,17 +264,9 @@ def _text(data: bytes) -> _Text:
     del lines
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(kept)
-    if not _is_plain(kept, mark):
-        numbers = _lines_of_rows(kept, numbers, mark)
+    numbers = _lines_of_rows(kept, numbers, mark)
     rows = [row for _, row in islice(_rows(kept, mark), 2)]
     return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
-
-
-def _is_plain(kept: Sequence[str], mark: str) -> bool:
-    """Whether each line is a row of as many cells, none of which is quoted."""
-    if not mark or any('"' in line for line in kept):
-        return False
-    return len({line.count(mark) for line in kept}) == 1
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
