@@ -13,7 +13,6 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from mcap.writer import CompressionType
 
 from edge.cli import main as edge_main
 from edge.errors import InputError
@@ -26,7 +25,6 @@ from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import (
     FRAMES,
     array,
-    json_topics,
     skin,
     write_bag,
     write_mcap,
@@ -164,12 +162,9 @@ def bytes_of(write):
 
 
 def logs():
-    """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
-    ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
-    return [
-        bytes_of(lambda path, way=way: write_mcap(path, *json_topics(), **way))
-        for way in ways
-    ]
+    """An MCAP file of arrays."""
+    topic = skin([array(frame, dims=frame.shape) for frame in FRAMES])
+    return [bytes_of(lambda path: write_mcap(path.with_suffix(".mcap"), topic))]
 
 
 def bags():
@@ -255,6 +250,6 @@ READERS = (
     Reader("sdh2", ".xml", lambda: [dsa().encode()], mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
-    Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),
+    Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("rosbag")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),
 )
