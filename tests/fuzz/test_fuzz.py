@@ -23,6 +23,7 @@ ENDLESS_S = 60.0
 """Seconds of processor time after which a reader is ended, and pytest with it: it would read
 for ever."""
 
+pytestmark = [pytest.mark.slow] if FILES > 100 else []
 each_reader = pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
 
 
