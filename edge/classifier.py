@@ -157,10 +157,11 @@ class Classifier:
 
             self._policies = policies(model, error)
         self.tracker = model.info.tracker(
-            layout or model.info.layout, max_contacts=max_contacts
+            layout or model.info.layout,
+            max_contacts=max_contacts,
+            motion_on_skin=motion_on_skin,
         )
-        self.tracker.motion_on_skin = motion_on_skin
-        self.layout = self.tracker.layout
+        self.layout = self.tracker.tracker.layout
         self._pending: list[Pending] = []
         self._numbers: dict[Contact, int | None] = {}
         """The numbers of the contacts under way; None if one is followed."""

@@ -13,7 +13,8 @@ from edge.arrays import Floats
 from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import WatchfulTracker
+from edge.touch.still import WatchfulTracker
+from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain
@@ -312,13 +313,21 @@ class ModelInfo:
         none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
-    def tracker(self, layout: SkinLayout, *, max_contacts: int = 1) -> WatchfulTracker:
+    def tracker(
+        self,
+        layout: SkinLayout,
+        *,
+        max_contacts: int = 1,
+        motion_on_skin: bool = False,
+    ) -> WatchfulTracker:
         """A new tracker for a skin, with the model's rules and features.
+
+        The options are those of `ContactTracker`.
 
         Raises:
             InputError: the skin is not the one that the model was made for.
         """
-        return WatchfulTracker(
+        tracker = ContactTracker(
             for_device(self.layout, layout),
             self.debounce,
             chain=self.chain,
@@ -327,3 +336,5 @@ class ModelInfo:
             joints=self.joints,
             max_contacts=max_contacts,
         )
+        tracker.motion_on_skin = motion_on_skin
+        return WatchfulTracker(tracker)

@@ -61,16 +61,16 @@ class Grid:
             beside |= (bits & self._columns[-1]) >> self.cols - 1
         return beside
 
-    def flood(self, seed: int, within: int) -> int:
-        """All taxels of `within` that are connected to `seed`; 0 where that takes more
-        than `MOST_STEPS`."""
+    def flood(self, seed: int, within: int) -> int | None:
+        """All taxels of `within` that are connected to `seed`; None where that takes
+        more than `MOST_STEPS`."""
         region = seed
         for _ in range(MOST_STEPS):
             grown = (region | self.neighbours(region)) & within
             if grown == region:
                 return region
             region = grown
-        return 0
+        return None
 
     def sums(self, bits: int) -> tuple[int, int]:
         """(sum of rows, sum of columns) over the taxels of `bits`.
@@ -206,7 +206,7 @@ class ActiveTaxels:
         # together.
         index = int(self.counts.argmax())
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
-        if 2 * bits.bit_count() > self.bits.bit_count():
+        if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
         return self._largest_of_many(0 if previous is None else previous.bits)
 
