@@ -47,8 +47,7 @@ class Uncertified:
         """The model's answer at the last decision point."""
         if point < self._full:
             return None
-        tie = ("tie",) if _decision(candidate).tie else ()
-        return replace(candidate, flags=(*candidate.flags, *tie, "uncertified"))
+        return candidate.flagged(uncertified=True)
 
 
 class Early:
@@ -121,9 +120,10 @@ class Early:
                 confidence=round(1.0 - rate, 6),
             )
         elif not sure and not self._rule.fixed:
-            candidate = replace(candidate, flags=(*candidate.flags, "unsure"))
+            candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
-        return replace(candidate, error=self._error, stopped_by=stopped_by)
+        answer = replace(candidate, error=self._error, stopped_by=stopped_by)
+        return answer.flagged(tie=False)  # the rule does not go by votes
 
 
 class Product(Early):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from edge.classifier import Classifier, flags_of
+from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.events import Aside, Decided, Onset, Release
 from edge.fake.player import play, skin_file
@@ -234,8 +234,3 @@ def test_a_touch_that_began_before_the_recording_is_flagged_late(model, make_tou
     events = decided(model, cut)
     assert [event.onset_s for event in events] == [cut.t[0]] * 2
     assert ["late" in event.flags for event in events] == [True] * 2
-
-
-def test_only_doubts_that_hold_become_flags_in_their_order():
-    doubts = {"short": True, "gap": False, "missing_taxels": True}
-    assert flags_of(doubts) == ("short", "missing_taxels")

@@ -9,8 +9,8 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
-from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.still import WatchfulTracker
+from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker
 from train.data.dataset import DataSet, contacts, with_thresholds
 from train.data.labels import NO_CONTACT
