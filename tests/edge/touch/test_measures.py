@@ -14,11 +14,10 @@ from edge.errors import InputError
 from edge.model.verify import integers_of
 from edge.touch.cells import MOST_CELLS, Cells
 from edge.touch.contact import feature_types
-from edge.touch.feature import PAPER
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import QUANTITIES, ZONES, feature, names
+from edge.touch.measures import ZONES, names
 from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -163,22 +162,6 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     )
 
 
-def test_a_perfect_line_has_no_width():
-    for line in (np.eye(5, 7), np.eye(5, 7)[::-1], np.ones((1, 7)), np.ones((5, 1))):
-        counts = np.zeros((5, 7))
-        counts[: line.shape[0], : line.shape[1]] = 77 * line
-        assert value(FLAT, counts, "skin_width") == 0.0
-    assert value(FLAT, 99 * np.eye(5, 7), "skin_length") == pytest.approx(2.0)
-
-
-def test_places_on_a_seam_are_measured_on_the_circle():
-    counts = np.zeros((5, 7), dtype=int)
-    counts[2, [6, 0]] = 50
-    assert value(ROUND, counts, "contact_around") == pytest.approx(6.5)
-    assert value(ROUND, counts, "contact_spread_around") == pytest.approx(0.5)
-    assert value(FLAT, counts, "skin_spread_around") == pytest.approx(3.0)
-
-
 def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
     frames = [pressed(ROUND, i / 4, {(2, (5 + i) % 7): 50}) for i in range(5)]
     vector = vector_of(ROUND, frames, ["contact_around"], 5)
@@ -238,12 +221,6 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
 def test_zones_that_no_feature_calls_for_are_not_measured():
     assert list(series_of(FLAT, TWO_FRAMES, ["skin_force"]).zones) == ["skin"]
     assert series_of(FLAT, TWO_FRAMES, ["max_force", "contact_area"]).zones == {}
-
-
-def test_the_papers_three_are_the_default_and_come_first():
-    assert PAPER == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
-    assert [feature(name).name for name in ALL] == ALL
 
 
 @pytest.mark.parametrize(
