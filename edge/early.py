@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
-from edge.model.info import UNKNOWN, ModelInfo, StoppingRule, check_rate
+from edge.model.info import (
+    UNKNOWN,
+    ModelInfo,
+    Stopping,
+    StoppingRule,
+    check_rate,
+    logistic,
+    margin,
+)
 from edge.model.model import Decision, Model
 from edge.model.refusal import refusal
 
@@ -30,6 +38,18 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
             kind = Product if task in model.info.products else Early
             policy_of[task] = kind(model.info, task, rule, error)
     return policy_of
+
+
+def is_sure(
+    stopping: Stopping,
+    rule: StoppingRule,
+    distances: Sequence[float],
+    label: int,
+    excess: float,
+) -> bool:
+    """Whether a label is sure enough for a rule; see `Stopping.confidence`."""
+    log_odds = stopping.slope * margin(distances, label) + stopping.intercept
+    return logistic(log_odds - stopping.doubt * excess) >= rule.confidence
 
 
 class Uncertified:
@@ -107,7 +127,7 @@ class Early:
         label = self._task.labels.index(decision.label)
         excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
-        return self._stopping.sure(self._rule, distances, label, excess)
+        return is_sure(self._stopping, self._rule, distances, label, excess)
 
     def _answered(self, candidate: Decided, point: int, sure: bool) -> Decided:
         """The answer of the rule."""

@@ -36,7 +36,7 @@ def test_a_frame_passes_the_rooms_in_one_direction(ways):
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize(("frame", "most"), [("decision", 16), ("contact", 12)])
+@pytest.mark.parametrize(("frame", "most"), [("decision", 20), ("contact", 13)])
 def test_a_frame_visits_few_files(ways, frame, most):
     assert 0 < len(one_frame.files(ways[frame])) <= most
 

@@ -123,7 +123,8 @@ def margin(distances: Sequence[float], label: int) -> float:
     return nearest_rival - distance if distance < math.inf else -math.inf
 
 
-def _logistic(x: float) -> float:
+def logistic(x: float) -> float:
+    """1 / (1 + exp(-x)), which never overflows."""
     return 0.5 + 0.5 * math.tanh(0.5 * x)
 
 
@@ -205,18 +206,7 @@ class Stopping:
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
-        return _logistic(log_odds - self.doubts[decision_point] * excess)
-
-    def sure(
-        self,
-        rule: StoppingRule,
-        distances: Sequence[float],
-        label: int,
-        excess: float,
-    ) -> bool:
-        """Whether a label is sure enough for a rule; see `confidence`."""
-        log_odds = self.slope * margin(distances, label) + self.intercept
-        return _logistic(log_odds - self.doubt * excess) >= rule.confidence
+        return logistic(log_odds - self.doubts[decision_point] * excess)
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; or None."""

@@ -208,22 +208,11 @@ class ActiveTaxels:
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
         if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        return self._largest_of_many(0 if previous is None else previous.bits)
+        from edge.touch.components import largest_bits  # one flood does for a touch
 
-    def _largest_of_many(self, previous: int) -> Region:
-        if not self.bits & self._grid.neighbours(self.bits):
-            # A flickering skin may have nothing but lone taxels, a hundred and more; this
-            # takes a tenth of the components' time.
-            among = self.bits & previous or self.bits
-            lone = np.flatnonzero(self._grid.unpack(among))
-            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
-            return Region(self._grid, self._grid.bit(index), self.counts.item(index))
-        from edge.touch.components import largest_of  # one flood does for a touch
-
-        before = self._grid.unpack(previous)
-        taxels = largest_of(self._padded, self.counts, self._grid.wraps, before)
-        peak = int(self.counts[taxels[:, :-1]].max())
-        return Region(self._grid, self._grid.pack(taxels), peak)
+        before = 0 if previous is None else previous.bits
+        bits, peak = largest_bits(self._grid, self._padded, self.counts, before)
+        return Region(self._grid, bits, peak)
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""

@@ -14,10 +14,11 @@ from edge.errors import InputError
 from edge.model.verify import integers_of
 from edge.touch.cells import MOST_CELLS, Cells
 from edge.touch.contact import feature_types
+from edge.touch.feature import PAPER
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
-from edge.touch.measures import ZONES, names
+from edge.touch.measures import QUANTITIES, ZONES, feature, names
 from tests.edge.touch.pressed import active_of, followed, pressed, zones_of
 
 FLAT = SkinLayout(5, 7, threshold_counts=10, onset_counts=10, counts_per_newton=100.0)
@@ -295,3 +296,9 @@ def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
     expected = [int(readable[s].sum()) for s in squares if layout.alive[s].any()]
     assert cells.read(Frame(0.0, counts, valid=valid)).tolist() == expected
     assert len(expected) == cells.count
+
+
+def test_the_papers_three_are_the_default_and_come_first():
+    assert PAPER == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
+    assert [feature(name).name for name in ALL] == ALL
