@@ -30,7 +30,7 @@ def test_a_frame_passes_the_rooms_in_one_direction(ways):
         "edge/touch/contact.py:Contact.add",
         "edge/touch/features.py:feature_vector",
         "edge/model/model.py:Model.run",
-        "edge/answers.py:answers_about",
+        "edge/answers.py:_answer",
     ]
     places = [steps.index(step) for step in way]
     assert places == sorted(places)
