@@ -24,7 +24,7 @@ from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
 from export.build import OPSET, Builder, project, widened
 from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
-from train.model.pipeline import ContactClassifier, Space, nearest_of_label
+from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -131,13 +131,13 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         _task(build, points, task, projected[_spaces(points, task)], names)
 
 
-Spaces = tuple[Space, ...]
+Spaces = tuple[FittedSpace, ...]
 """The space of a task at each decision point. Tasks whose spaces are equal at every one
 share the nodes of a projection."""
 
 
 def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
-    return tuple(point.spaces_[task] for point in points)
+    return tuple(point.tasks_[task].space for point in points)
 
 
 def _projected(
@@ -147,11 +147,8 @@ def _projected(
     spaces: Spaces,
 ) -> tuple[str, str]:
     """Nodes that project features x to a task's spaces; see `project`."""
-    projections = []
-    columns = []
-    for point, space in zip(points, spaces, strict=True):
-        projections.append(point.projections_[space])
-        columns.append(point.columns_[space])
+    projections = [space.projection for space in spaces]
+    columns = [space.columns for space in spaces]
     return project(build, x, points[-1].n_features_in_, projections, columns)
 
 
@@ -171,25 +168,25 @@ def _task(
         projected: names of the coordinates, and of the excess over the limits.
         names: {output: its name in the graph}.
     """
-    last = points[-1]
-    members = last.members_[last.spaces_[task]]
-    units = [point.unit(task) for point in points]
+    trials = points[-1].n_trials_
+    at_points = [point.tasks_[task] for point in points]
+    last = at_points[-1]
+    members = last.space.members
+    units = [fitted.unit for fitted in at_points]
     rows = []
-    for point, unit in zip(points, units, strict=True):
-        space = point.spaces_[task]
-        of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
-        of_all[members] = point.rows_[space] / unit
+    for fitted in at_points:
+        of_all = np.zeros((trials, fitted.space.rows.shape[1]))
+        of_all[members] = fitted.space.rows / fitted.unit
         rows.append(of_all)
-    labels = np.full(last.n_trials_, -1)
-    labels[members] = last.labels_[task]
-    classes = len(last.classes_[task])
-    k = last.choices[task].k
+    labels = np.full(trials, -1)
+    labels[members] = last.labels
+    classes = len(last.classes)
     output = names[f"{task}_label"].removesuffix("_label")
     components = [point.choices[task].components for point in points]
     z, off = projected
     rows = widened(rows, max(row.shape[1] for row in rows))
     squares, length = _squares(build, output, z, rows, components, labels < 0)
-    voters = build.constant([k], f"k of {output}")
+    voters = build.constant([last.k], f"k of {output}")
     outputs = ["", names[f"{task}_neighbours"]]
     nearest, neighbours = build.nodes(
         "TopK",
@@ -201,12 +198,11 @@ def _task(
     roots = build.node("Sqrt", build.node("Add", nearest, length))
     scales = build.by_decision_point(units)
     build.node("Mul", roots, scales, output=f"{output}_distances")
-    _vote(build, output, labels, classes, neighbours, k, off)
+    _vote(build, output, labels, classes, neighbours, last.k, off)
     if f"{task}_label_distances" in names:
         all_squares = build.node("Add", squares, length)
-        slopes = [point.slopes_[task] for point in points]
         scales = build.by_decision_point(
-            [u * s for u, s in zip(units, slopes, strict=True)]
+            [fitted.unit * fitted.slope for fitted in at_points]
         )
         roots = _label_distances(build, output, all_squares, labels, classes)
         build.node("Mul", roots, scales, output=names[f"{task}_label_distances"])

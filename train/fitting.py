@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -246,10 +246,9 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
     if points:
-        sequential = calibrate(measured, y, points, settings, fixed)
+        sequential, of_known = calibrate(measured, y, points, settings, fixed)
         classifier = sequential.decision_points_[-1]
-        if not fixed.quick:
-            notes += _early_of_known(measured, y, points, settings, fixed, sequential)
+        notes += of_known
     else:
         classifier = ContactClassifier.of(settings.choices, vectors)
     return Fitted(
@@ -441,9 +440,12 @@ def calibrate(
     points: tuple[float, ...],
     settings: Settings,
     options: FitOptions,
-) -> SequentialClassifier:
-    """A classifier for all decision points, with its stopping rules."""
-    dataset = measured.of(sorted(settings.features(folds=True)))
+) -> tuple[SequentialClassifier, list[str]]:
+    """A classifier for all decision points, with its stopping rules, and sentences that
+    a user should read."""
+    known = settings.of_known
+    names = settings.features(folds=True) | known.features(folds=True)
+    dataset = measured.of(sorted(names))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
         settings.choices,
@@ -453,44 +455,46 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=None if settings.early is None else settings.early.settings,
     )
-    return classifier.fit(
+    classifier.fit(
         at_points,
         y,
         settings.folds,
         settings.without,
         measured.is_own,
     )
+    tasks = [
+        task for task, c in settings.chosen.items() if c.choice_of_known is not None
+    ]
+    if options.quick or not tasks:
+        return classifier, []
+    instead = classifier.smallest_errors(
+        at_points,
+        y,
+        known.without,
+        None if known.early is None else known.early.settings,
+    )
+    return classifier, [_errors_of_known(tasks, classifier, instead)]
 
 
-def _early_of_known(
-    measured: DataSet,
-    y: Labels,
-    points: tuple[float, ...],
-    settings: Settings,
-    options: FitOptions,
+def _errors_of_known(
+    tasks: Sequence[str],
     exported: SequentialClassifier,
-) -> list[str]:
+    instead: Mapping[str, float],
+) -> str:
     """What early decisions about recorded objects would gain by settings for these.
 
     Where groups are left out, settings are chosen for objects never met, though
     certificates are for recorded ones.
     """
-    tasks = [
-        task for task, c in settings.chosen.items() if c.choice_of_known is not None
-    ]
-    if not tasks:
-        return []
-    calibrated = calibrate(measured, y, points, settings.of_known, options)
     errors = []
     for task in tasks:
         smallest = exported.stopping_[task].smallest_error
-        instead = calibrated.stopping_[task].smallest_error
-        errors.append(f"{task} {smallest:.1%}, instead {instead:.1%}")
-    return [
+        errors.append(f"{task} {smallest:.1%}, instead {instead[task]:.1%}")
+    return (
         "the settings are chosen for objects never met; `--leave-out trial` chooses "
         "them for the recorded ones, whose smallest certified errors of early decisions "
         f"(--error) are: {'; '.join(errors)}"
-    ]
+    )
 
 
 def _is_usual(dataset: DataSet, task: str) -> bool:

@@ -81,7 +81,7 @@ def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     queries = 1.01 * fitted.X
     answers = Model(path).run(queries)
     for task in choices:
-        _, rows = classifier.neighbours(task, queries)
+        _, rows = classifier.tasks_[task].neighbours(queries)
         assert (answers[f"{task}_neighbours"] == rows).all()
 
 

@@ -88,13 +88,15 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
     for point, fitted in enumerate(sequential.decision_points_):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
-            squares = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
+            squares = fitted.tasks_["t"].squares(queries)[
+                :, fitted.tasks_["t"].labels == label
+            ]
             assert squares.shape[1] == size
             nearest = np.sort(squares, axis=1)[:, :count]
             distances = model.run(queries, point)["t_label_distances"][:, label]
-            expected = [mean_of_roots(row, fitted.unit("t")) for row in nearest]
+            expected = [mean_of_roots(row, fitted.tasks_["t"].unit) for row in nearest]
             assert distances.tolist() == [
-                fitted.slopes_["t"] * mean for mean in expected
+                fitted.tasks_["t"].slope * mean for mean in expected
             ]
 
 
@@ -126,12 +128,11 @@ def test_decision_points_may_have_features_and_directions_of_their_own(
     for point, fitted in enumerate(sequential.decision_points_):
         answers = model.run(queries, point)
         for task in sequential.choices:
-            distances, rows = fitted.neighbours(task, queries)
+            distances, rows = fitted.tasks_[task].neighbours(queries)
             assert (answers[f"{task}_neighbours"] == rows).all()
             assert (answers[f"{task}_distances"] == distances).all()
-    assert [len(c) for c in sequential.decision_points_[0].columns_.values()] == [
-        len(queries[0]) // len(FEATURES)
-    ]
+    for fitted in sequential.decision_points_[0].tasks_.values():
+        assert len(fitted.space.columns) == len(queries[0]) // len(FEATURES)
 
 
 def test_a_far_feature_matters_only_where_a_decision_point_takes_it(

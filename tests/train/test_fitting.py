@@ -52,7 +52,7 @@ def test_a_data_set_can_be_given_and_single_trials_left_out(recordings):
     assert fitted.sequential is None
     labels = fitted.classifier.decide(fitted.X)["category"].labels
     assert (
-        fitted.classifier.classes_["category"][labels] == data.labels("category")
+        fitted.classifier.tasks_["category"].classes[labels] == data.labels("category")
     ).all()
 
 

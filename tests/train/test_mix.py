@@ -89,7 +89,7 @@ def test_simulated_trials_that_mislead_are_left_out_and_it_is_said(
     assert fitted.chosen["category"].choice.weights == (0, 1)
     # No simulated trial has a room.
     assert fitted.chosen["room"].choice.weights == (0, 1)
-    assert fitted.classifier.rows_[fitted.classifier.spaces_["category"]].shape[0] == 22
+    assert fitted.classifier.tasks_["category"].space.rows.shape[0] == 22
     assert any(
         "simulated trials no longer help category" in note for note in fitted.notes
     )
@@ -120,6 +120,6 @@ def test_a_weight_of_three_is_a_trial_that_stands_three_times():
     oracle = Projection("IV", 2, ("max_force", "contact_area"), "lda").fit(
         X[times], labels[times]
     )
-    space = fitted.spaces_["t"]
-    assert fitted.projections_[space].weights_.tobytes() == oracle.weights_.tobytes()
-    assert (fitted.rows_[space] == oracle.transform(X)).all()
+    space = fitted.tasks_["t"].space
+    assert space.projection.weights_.tobytes() == oracle.weights_.tobytes()
+    assert (space.rows == oracle.transform(X)).all()

@@ -476,14 +476,10 @@ def _right_together(
     folds, choices = plan
     at_end = replace(vectors, X=vectors.X[None])
     of_family = [[_of_tasks(by_task, family)] for by_task in choices]
-    right = {task: np.zeros(len(folds), dtype=bool) for task in family}
-    for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
-        in_fold = folds == fold
-        for task, (labels, _) in answers.items():
-            right[task][in_fold] = labels[0] == vectors.y[task][in_fold]
+    (answered,) = held_out(at_end, folds, [of_family], jobs)
     return {
-        task: hits[(folds >= 0) & (vectors.y[task] != "")]
-        for task, hits in right.items()
+        task: hits[0][(folds >= 0) & (vectors.y[task] != "")]
+        for task, hits in answered.right.items()
     }
 
 

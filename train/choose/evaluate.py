@@ -32,7 +32,7 @@ from edge.statistics import wilson
 from train.choose.crossval import votes_right
 from train.choose.search import Decomposition, SearchGrid
 from train.data.vectors import Strings, Vectors
-from train.model.pipeline import Choice, columns_of, how_often, types_of
+from train.model.pipeline import Choice, how_often
 from train.model.scaling import centred_and_scaled, finite
 from train.threads import single_thread
 
@@ -123,19 +123,17 @@ class _Fit:
 
     def decomposition(self, grid: SearchGrid, counts: Integers) -> Decomposition:
         """The scaled vectors of a grid's features, where each trial counts so often."""
-        vectors = self.vectors
         rows = np.repeat(self.train, counts)
-        columns = columns_of(grid.features, vectors.features, vectors.columns)
-        types = types_of(grid.features, vectors.features, vectors.columns)
-        X = vectors.X
+        vectors = self.vectors.of(grid.features)
         mean, gain, scaled = centred_and_scaled(
-            X[np.ix_(rows, columns)],
+            vectors.X[rows],
             grid.scaling,
-            *types,
+            vectors.features,
+            vectors.columns,
         )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
         first = (np.cumsum(counts) - counts)[counts > 0]
-        new = (X[np.ix_(self.test, columns)] - mean) * gain
+        new = (vectors.X[self.test] - mean) * gain
         return Decomposition(scaled, new, labels_of, first)
 
     def right(

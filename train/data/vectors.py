@@ -1,13 +1,14 @@
 """Feature vectors of trials, with their labels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 
@@ -60,8 +61,23 @@ class Vectors:
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """Columns of each feature type."""
+        """Number of columns of each feature type."""
         return widths_of(self.X.shape[-1], self.features, self.widths)
+
+    def columns_of(self, names: Collection[str]) -> Integers:
+        """The columns of the features with these names, rising; all if empty."""
+        is_named = [not names or name in names for name in self.features]
+        return np.flatnonzero(np.repeat(is_named, self.columns))
+
+    def of(self, names: Collection[str]) -> Self:
+        """The same trials with the features with these names; all if empty."""
+        is_named = [not names or name in names for name in self.features]
+        return replace(
+            self,
+            X=np.ascontiguousarray(self.X[..., self.columns_of(names)]),
+            features=tuple(compress(self.features, is_named)),
+            widths=tuple(compress(self.columns, is_named)),
+        )
 
     def part(self, trials: NDArray[Any]) -> Self:
         """Some of the trials, by a mask (n,) or by their numbers."""

@@ -48,7 +48,7 @@ from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
 from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
-from train.model.pipeline import Choices, ContactClassifier, columns_of, types_of
+from train.model.pipeline import Choices, ContactClassifier, Fits
 from train.model.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
 
@@ -98,7 +98,7 @@ def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
     for model, x in zip(models, X, strict=True):
         for task, (indices, distances) in model.decide(x).items():
             labels, margins = by_task.setdefault(task, ([], []))
-            labels.append(model.classes_[task][indices])
+            labels.append(model.tasks_[task].classes[indices])
             margins.append(list(map(margin, distances.tolist(), indices.tolist())))
     return {
         task: (np.array(labels), np.array(margins))
@@ -106,34 +106,72 @@ def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
     }
 
 
+@dataclass(frozen=True)
+class HeldOut:
+    """Answers to each trial by models that were fitted without it.
+
+    Attributes:
+        right: {task: (decision points, n) whether the label is right}.
+        margins: {task: (decision points, n) the label's margin}.
+    """
+
+    right: dict[str, Booleans]
+    margins: dict[str, Floats]
+
+
 def held_out(
     vectors: Vectors,
     folds: Integers,
-    fold_choices: Sequence[AtPoints],
+    runs: Sequence[Sequence[AtPoints]],
     jobs: int = 1,
-) -> list[Answers]:
-    """[fold] decisions of models without the fold's trials on these, in their order.
+) -> list[HeldOut]:
+    """[run] answers to each trial by models without its fold.
+
+    Runs share the fits of equal settings.
 
     Args:
         vectors: (decision points, n, p).
         folds: (n,) from 0, or -1 for trials that are never left out.
-        fold_choices: [fold][decision point]{task: Choice}.
+        runs: [run][fold][decision point]{task: Choice}.
         jobs: processes.
     """
     work = (
         delayed(_fold)(vectors, folds == fold, choices)
-        for fold, choices in enumerate(fold_choices)
+        for fold, choices in enumerate(zip(*runs, strict=True))
     )
-    return list(Parallel(n_jobs=jobs)(work))
+    by_fold = list(Parallel(n_jobs=jobs)(work))
+    of_runs = []
+    for of_run in zip(*by_fold, strict=True):
+        result = HeldOut({}, {})
+        for fold, of_fold in enumerate(of_run):
+            for task, (labels, margins) in of_fold.items():
+                in_fold = folds == fold
+                shape = vectors.X.shape[:2]
+                right = result.right.setdefault(task, np.zeros(shape, dtype=bool))
+                right[:, in_fold] = labels == vectors.y[task][in_fold]
+                of_all = result.margins.setdefault(task, np.zeros(shape))
+                of_all[:, in_fold] = margins
+        of_runs.append(result)
+    return of_runs
 
 
-def _fold(vectors: Vectors, left_out: Booleans, choices: AtPoints) -> Answers:
+def _fold(
+    vectors: Vectors,
+    left_out: Booleans,
+    runs: Sequence[AtPoints],
+) -> list[Answers]:
+    """[run] answers to the trials that are left out."""
     training = vectors.part(~left_out)
-    models = []
+    fits: list[Fits] = [{} for _ in training.X]
+    by_run = []
     with single_thread():
-        for at_point, x in zip(choices, training.X, strict=True):
-            models.append(ContactClassifier.of(at_point, replace(training, X=x)))
-        return answers(models, vectors.X[:, left_out])
+        for choices in runs:
+            models = []
+            for at_point, x, shared in zip(choices, training.X, fits, strict=True):
+                of_point = replace(training, X=x)
+                models.append(ContactClassifier.of(at_point, of_point, shared))
+            by_run.append(answers(models, vectors.X[:, left_out]))
+    return by_run
 
 
 @dataclass(frozen=True)
@@ -237,16 +275,18 @@ def unlike(novelty: Novelty, scores: Floats) -> Booleans:
 
 
 @dataclass(frozen=True)
-class HeldOut:
-    """Answers to each trial by models that were fitted without it.
+class Certified:
+    """A task's certified rules.
 
     Attributes:
-        right: {task: (decision points, n) whether the label is right}.
-        margins: {task: (decision points, n) the label's margin}.
+        rules: in the order of rising error.
+        trials: number of trials that certify them.
+        wrong: number of these that are wrong at the full window.
     """
 
-    right: dict[str, Booleans]
-    margins: dict[str, Floats]
+    rules: Sequence[StoppingRule]
+    trials: int
+    wrong: int
 
 
 @dataclass(eq=False)
@@ -308,21 +348,21 @@ class SequentialClassifier:
                 "export without decision points"
             )
         vectors = Vectors(X, y, self.features, self.widths, is_own)
-        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
+        self._folds = folds
+        self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(self._fit_points(vectors), folds)
-        without = self._without(fold_choices)
-        chosen_without = self._held_out(vectors, folds, without)
+        of_folds = self.without(fold_choices, self.early)
+        of_all = [self.choices_at] * len(of_folds)
+        chosen_without, chosen_by_all = held_out(
+            vectors,
+            folds,
+            [of_folds, of_all],
+            self.jobs,
+        )
         self.right_ = chosen_without.right
-        rules = self._certify(chosen_without, folds, tested)
-        # Margins are on the scale of the settings. Curves that the exported model uses
-        # come from margins by its own settings, in fits without the trials; as the
-        # trials had a part in the choice of these, the curves' means come from choices
-        # without them.
-        same = [self.choices_at] * len(fold_choices)
-        curves = chosen_without
-        if without != same:
-            curves = self._held_out(vectors, folds, same)
-        self._calibrate(curves, tested, rules)
+        self.stopping_ = self._with_curves(
+            self._certified(chosen_without), chosen_by_all
+        )
         return self
 
     @property
@@ -331,16 +371,16 @@ class SequentialClassifier:
         early = {} if self.early is None else self.early.choices
         return self._at_points(self.choices, early)
 
-    def _without(self, fold_choices: Sequence[Choices]) -> list[AtPoints]:
-        """[fold][decision point]{task: the choice made without the fold's trials}."""
-        early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
-        return list(map(self._at_points, fold_choices, early))
-
-    def _at_points(
+    def without(
         self,
-        full: Choices,
-        early: Choices,
-    ) -> AtPoints:
+        fold_choices: Sequence[Choices],
+        early: Early | None,
+    ) -> list[AtPoints]:
+        """[fold][decision point]{task: the choice made without the fold's trials}."""
+        early_choices = [{}] * len(fold_choices) if early is None else early.by_fold
+        return list(map(self._at_points, fold_choices, early_choices))
+
+    def _at_points(self, full: Choices, early: Choices) -> AtPoints:
         """[decision point]{task: Choice} of choices for the full window and for early
         points."""
         until_s = 0.0 if self.early is None else self.early.until_s
@@ -349,39 +389,16 @@ class SequentialClassifier:
             for seconds in self.decision_points_s
         ]
 
-    def _held_out(
-        self,
-        vectors: Vectors,
-        folds: Integers,
-        fold_choices: Sequence[AtPoints],
-    ) -> HeldOut:
-        """Answers to each trial by models with some settings, without its fold."""
-        by_fold = held_out(vectors, folds, fold_choices, self.jobs)
-        shape = vectors.X.shape[:2]
-        right = {}
-        margins = {}
-        for task in self.choices:
-            right[task] = np.zeros(shape, dtype=bool)
-            margins[task] = np.zeros(shape)
-            for fold, answers_of in enumerate(by_fold):
-                in_fold = folds == fold
-                labels, sure = answers_of[task]
-                right[task][:, in_fold] = labels == vectors.y[task][in_fold]
-                margins[task][:, in_fold] = sure
-        return HeldOut(right, margins)
-
     def _fit_points(self, vectors: Vectors) -> Vectors:
         """Fit the classifier of each decision point; the vectors that these take."""
         choices = [choice for at in self.choices_at for choice in at.values()]
         features = set().union(*(c.features or self.features for c in choices))
-        self.columns_ = columns_of(features, self.features, vectors.columns)
-        names, widths = types_of(features, self.features, vectors.columns)
+        self.columns_ = vectors.columns_of(features)
         self.n_features_in_ = len(self.columns_)
-        X = np.ascontiguousarray(vectors.X[..., self.columns_])
-        vectors = replace(vectors, X=X, features=names, widths=widths)
+        vectors = vectors.of(features)
         self.decision_points_ = []
         with single_thread():
-            for at_point, x in zip(self.choices_at, X, strict=True):
+            for at_point, x in zip(self.choices_at, vectors.X, strict=True):
                 model = ContactClassifier.of(at_point, replace(vectors, X=x))
                 self.decision_points_.append(model)
         return vectors
@@ -404,18 +421,13 @@ class SequentialClassifier:
         self._excess = excess_of(self.novelty_, scores)
         self.unknown_ = unlike(self.novelty_, scores)
 
-    def _certify(
-        self,
-        answered: HeldOut,
-        folds: Integers,
-        tested: Mapping[str, Booleans],
-    ) -> dict[str, tuple[list[StoppingRule], Booleans]]:
-        """{task: its certified rules, and whether the full window is wrong (n,)}."""
+    def _certified(self, answered: HeldOut) -> dict[str, Certified]:
+        """{task: its rules}, by answers whose settings were chosen without the fold."""
         scores = {}
         for task, right in answered.right.items():
             evidence = answered.margins[task], self._excess, right
-            scores[task] = cross_fitted(*evidence, folds, tested[task])
-        courses = self._courses(scores, answered.right, self.unknown_, tested)
+            scores[task] = cross_fitted(*evidence, self._folds, self._tested[task])
+        courses = self._courses(scores, answered.right, self.unknown_, self._tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -427,17 +439,25 @@ class SequentialClassifier:
                     seconds,
                 )
         full, _ = candidates(len(seconds))
-        return {task: (rules[task], courses[task].under(full)[1]) for task in rules}
+        certified = {}
+        for task, of_task in rules.items():
+            _, wrong = courses[task].under(full)
+            certified[task] = Certified(of_task, len(wrong), int(wrong.sum()))
+        return certified
 
-    def _calibrate(
+    def _with_curves(
         self,
+        certified: Mapping[str, Certified],
         answered: HeldOut,
-        tested: Mapping[str, Booleans],
-        rules: Mapping[str, tuple[list[StoppingRule], Booleans]],
-    ) -> None:
-        """Set the stopping rules and curves of each task."""
-        self.stopping_ = {}
-        for task, tests in tested.items():
+    ) -> dict[str, Stopping]:
+        """{task: its rules, with curves by answers of the exported settings}.
+
+        Margins are on the scale of the settings, so slopes come from those that the
+        exported model uses, in fits without the trials. As the trials had a part in the
+        choice of these, the curves' means come from choices without them (`right_`).
+        """
+        stopping = {}
+        for task, tests in self._tested.items():
             evidence = (
                 answered.margins[task][:, tests],
                 self._excess[:, tests],
@@ -447,19 +467,39 @@ class SequentialClassifier:
             together = _curve(*evidence)
             curves = map(_curve, *evidence)
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
-            of_task, wrong = rules[task]
-            self.stopping_[task] = Stopping(
+            stopping[task] = Stopping(
                 slopes=slopes,
                 intercepts=intercepts,
                 doubts=doubts,
                 slope=together.slope,
                 intercept=together.intercept,
                 doubt=together.doubt,
-                rules=tuple(of_task),
-                trials=len(wrong),
-                wrong=int(wrong.sum()),
+                rules=tuple(certified[task].rules),
+                trials=certified[task].trials,
+                wrong=certified[task].wrong,
                 risk=RISK,
             )
+        return stopping
+
+    def smallest_errors(
+        self,
+        X: Floats,
+        y: Mapping[str, Strings],
+        fold_choices: Sequence[Choices],
+        early: Early | None,
+    ) -> dict[str, float]:
+        """{task: the smallest error that would be certified with other settings}, with
+        the novelty of these.
+
+        Args:
+            X, y, fold_choices: as for `fit`.
+            early: settings of early decision points.
+        """
+        vectors = Vectors(X, y, self.features, self.widths)
+        run = self.without(fold_choices, early)
+        (answered,) = held_out(vectors, self._folds, [run], self.jobs)
+        certified = self._certified(answered)
+        return {task: certified[task].rules[0].error for task in certified}
 
     @property
     def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:

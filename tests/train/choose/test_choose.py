@@ -137,11 +137,12 @@ def hits(agreeing):
         X = vectors.X[test]
         model = ContactClassifier.of(choices, vectors.part(~test))
         answers = {task: decision.labels for task, decision in model.decide(X).items()}
-        near = model.nearest("category", model.squares("category", X))
-        answers["alone"] = vote(model.labels_["category"][near])
+        category = model.tasks_["category"]
+        near = category.nearest(category.squares(X))
+        answers["alone"] = vote(category.labels[near])
         for task, labels in answers.items():
             of_task = "category" if task == "alone" else task
-            named = model.classes_[of_task][labels]
+            named = model.tasks_[of_task].classes[labels]
             right[task][test] = named == vectors.y[of_task][test]
     return right
 

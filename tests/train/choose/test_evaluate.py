@@ -45,7 +45,7 @@ def told_right(choice, vectors, train, test):
     """Whether the classifier that is exported tells the tests; both are masks."""
     model = ContactClassifier.of({"t": choice}, vectors.part(train))
     labels = model.decide(vectors.X[test])["t"].labels
-    return model.classes_["t"][labels] == vectors.y["t"][test]
+    return model.tasks_["t"].classes[labels] == vectors.y["t"][test]
 
 
 def assert_exported(table, fold, vectors, train, test):

@@ -38,7 +38,9 @@ def test_equal_distances_go_to_the_earlier_row():
         model = ContactClassifier({"t": Choice("none", 1, k)}, ["max_force"]).fit(
             rows, y
         )
-        assert model.classes_["t"][model.decide(np.array([[0.0]]))["t"].labels] == ["d"]
+        assert model.tasks_["t"].classes[
+            model.decide(np.array([[0.0]]))["t"].labels
+        ] == ["d"]
 
 
 def test_the_projection_works_in_a_scikit_learn_pipeline():
@@ -57,13 +59,13 @@ def test_a_classifier_answers_every_task_by_the_rules():
     y = {"kind": np.repeat(["a", "b"], 15), "object": np.tile(["x", "y", "z"], 10)}
     choices = {"kind": Choice("none", 5, 3), "object": Choice("IV", 40, 1)}
     model = ContactClassifier(choices).fit(X, y)
-    assert model.components_ == {"kind": 5, "object": 29}
-    squares = model.squares("object", X)
+    components = {task: fitted.components for task, fitted in model.tasks_.items()}
+    assert components == {"kind": 5, "object": 29}
+    squares = model.tasks_["object"].squares(X)
     assert (squares.argmin(axis=1) == np.arange(30)).all()
     assert not squares.diagonal().any()
-    assert (
-        model.classes_["object"][model.decide(X)["object"].labels] == y["object"]
-    ).all()
+    labels = model.decide(X)["object"].labels
+    assert (model.tasks_["object"].classes[labels] == y["object"]).all()
 
 
 def test_the_slope_makes_a_share_of_right_answers_their_log_odds():
