@@ -12,7 +12,7 @@ import numpy as np
 from joblib import cpu_count
 from scipy.spatial.distance import cdist
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Floats
 from edge.errors import InputError
 from edge.recording import Recording
 from edge.tools.slips import slips
@@ -33,7 +33,6 @@ from train.data.dataset import (
 )
 from train.data.groups import LEAVE_OUT, Divisions, kinds_of
 from train.data.vectors import Labels, Vectors
-from train.mix import Mixing, mix
 from train.model.pipeline import Choice, ContactClassifier
 from train.model.stopping import FEWEST, Early, SequentialClassifier
 
@@ -234,8 +233,6 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
     _check_size(len(loaded.dataset.trials))
     settings = choose(loaded, y, fixed)
-    if loaded.dataset.is_own is not None:
-        y = {task: y[task] for task in settings.chosen}
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
     notes += [*settings.notes, *_leaks(measured, y)]
@@ -274,7 +271,7 @@ def load(
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
     recordings = read(paths, progress=options.progress)
-    if options.fixed_window_s is None and not (options.quick or recordings.mixed):
+    if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
@@ -314,7 +311,7 @@ def trials_of(
         options,
         joints=recordings.joints,
         shear=recordings.shear,
-        drawn=recordings.mixed or kinds_of(recordings.recordings) is not None,
+        drawn=kinds_of(recordings.recordings) is not None,
         quick=options.quick,
     )
     measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
@@ -381,8 +378,6 @@ def _check_size(trials: int) -> None:
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     """The settings of each task, and the window."""
     dataset = loaded.dataset
-    if dataset.is_own is not None:
-        return _choose_mixed(loaded, y, dataset.is_own, options)
     choosing = options.choosing(dataset, y, drawn=_are_drawn(dataset))
     windows = loaded.windows
     if len(windows) > 1:
@@ -395,43 +390,6 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     if options.quick or not _has_early_points(settings, options):
         return settings
     return replace(settings, early=choosing.early(window_s, chosen))
-
-
-def _choose_mixed(
-    loaded: Loaded,
-    y: Labels,
-    is_own: Booleans,
-    options: FitOptions,
-) -> Settings:
-    """The settings where simulated trials stand beside the owner's."""
-    dataset = loaded.dataset
-    window_s = loaded.windows[0]
-    X = dataset.with_kernels(window_s).features(window_s, options.samples)
-
-    def settings(trials: DataSet, labels: Labels) -> dict[str, Chosen]:
-        return options.choosing(trials, labels, drawn=True).choose(window_s)[0]
-
-    mixing = Mixing(
-        dataset,
-        y,
-        is_own,
-        X,
-        options.samples,
-        options.leave_out,
-        options.quick,
-        options.processes,
-    )
-    mixed = mix(mixing, settings)
-    y = {task: y[task] for task in mixed.chosen}
-    usual = options.candidates_for(dataset, y, drawn=True)
-    return Settings(
-        mixed.chosen,
-        mixed.folds,
-        mixed.without,
-        usual,
-        window_s,
-        mixed.notes,
-    )
 
 
 def calibrate(
@@ -460,7 +418,6 @@ def calibrate(
         y,
         settings.folds,
         settings.without,
-        measured.is_own,
     )
     tasks = [
         task for task, c in settings.chosen.items() if c.choice_of_known is not None
@@ -501,7 +458,7 @@ def _is_usual(dataset: DataSet, task: str) -> bool:
     """Whether most trials have a label for a task, of those that no other task gives."""
     labels = dataset.labels(task)
     labelled = int(np.count_nonzero(labels))
-    return dataset.is_own is not None or 2 * labelled > len(labels)
+    return 2 * labelled > len(labels)
 
 
 def _lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
@@ -550,10 +507,7 @@ def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
 
 def _leaks(dataset: DataSet, y: Labels) -> list[str]:
     """Warnings where the first frame gives labels away, or most recordings begin in
-    contact, of the trials that the owner has felt."""
-    if dataset.is_own is not None:
-        y = {task: labels[dataset.is_own] for task, labels in y.items()}
-        dataset = dataset.part(dataset.is_own)
+    contact."""
     recordings = [t.recording for t in dataset.trials]
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):

@@ -175,7 +175,7 @@ def leaks(frames, labels, onset_s=0.1):
     for of_trial in frames.astype(np.uint16):
         recording = Recording(np.arange(6) / 10.0, of_trial)
         trials.append(SimpleNamespace(recording=recording, onset_s=onset_s))
-    return _leaks(SimpleNamespace(trials=trials, is_own=None), {"kind": labels})
+    return _leaks(SimpleNamespace(trials=trials), {"kind": labels})
 
 
 def test_labels_told_by_the_first_frame_are_a_warning():

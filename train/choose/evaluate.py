@@ -32,7 +32,7 @@ from edge.statistics import wilson
 from train.choose.crossval import votes_right
 from train.choose.search import Decomposition, SearchGrid
 from train.data.vectors import Strings, Vectors
-from train.model.pipeline import Choice, how_often
+from train.model.pipeline import Choice
 from train.model.scaling import centred_and_scaled, finite
 from train.threads import single_thread
 
@@ -110,20 +110,18 @@ class _Fit:
     train: Integers
     test: Integers
 
-    def counted(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
-        """A grid's tasks, by how often each of the `train` trials counts for them."""
-        by_counts: dict[bytes, tuple[list[str], Integers]] = {}
+    def labelled(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
+        """A grid's tasks, by the `train` trials that have labels for them."""
+        by_trials: dict[bytes, tuple[list[str], Integers]] = {}
         for task, labels in self.classes.items():
             if grid.is_for(task):
-                of_all = how_often(labels >= 0, self.vectors.is_own, grid.weights)
-                counts = of_all[self.train]
-                tasks, _ = by_counts.setdefault(counts.tobytes(), ([], counts))
+                trials = self.train[labels[self.train] >= 0]
+                tasks, _ = by_trials.setdefault(trials.tobytes(), ([], trials))
                 tasks.append(task)
-        return list(by_counts.values())
+        return list(by_trials.values())
 
-    def decomposition(self, grid: SearchGrid, counts: Integers) -> Decomposition:
-        """The scaled vectors of a grid's features, where each trial counts so often."""
-        rows = np.repeat(self.train, counts)
+    def decomposition(self, grid: SearchGrid, rows: Integers) -> Decomposition:
+        """The scaled vectors of a grid's features, fitted on some trials."""
         vectors = self.vectors.of(grid.features)
         mean, gain, scaled = centred_and_scaled(
             vectors.X[rows],
@@ -132,9 +130,8 @@ class _Fit:
             vectors.columns,
         )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
-        first = (np.cumsum(counts) - counts)[counts > 0]
         new = (vectors.X[self.test] - mean) * gain
-        return Decomposition(scaled, new, labels_of, first)
+        return Decomposition(scaled, new, labels_of)
 
     def right(
         self,
@@ -166,13 +163,12 @@ def _answers(
     decomposed = None
     with single_thread():
         for grid in grids:
-            for tasks, counts in fit.counted(grid):
-                members = fit.train[counts > 0]
+            for tasks, members in fit.labelled(grid):
                 # Neighbouring grids often differ in the projection alone.
-                scaled = grid.scaling, grid.features, counts.tobytes()
+                scaled = grid.scaling, grid.features, members.tobytes()
                 if decomposed != scaled:
                     decomposed = scaled
-                    decomposition = fit.decomposition(grid, counts)
+                    decomposition = fit.decomposition(grid, members)
                 neighbours = None
                 for task in tasks:
                     if neighbours is None or (

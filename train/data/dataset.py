@@ -58,11 +58,6 @@ class Recordings:
         return recordings or self.recordings
 
     @property
-    def mixed(self) -> bool:
-        """Whether some are simulated, and some are not."""
-        return len(self.of_owner) < len(self.recordings)
-
-    @property
     def joints(self) -> bool:
         """Whether most of the owner's have joint angles."""
         return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
@@ -133,13 +128,6 @@ class DataSet:
     unused: tuple[Path, ...]
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
 
-    @property
-    def is_own(self) -> Booleans | None:
-        """(n,) whether a trial is the owner's; None where all, or none, are
-        simulated."""
-        is_own = ["simulation" not in trial.recording.meta for trial in self.trials]
-        return np.array(is_own) if len(set(is_own)) > 1 else None
-
     def part(self, trials: Booleans) -> DataSet:
         """Some of the trials (n,)."""
         return replace(self, trials=tuple(compress(self.trials, trials)))
@@ -195,7 +183,7 @@ class DataSet:
     def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
         """The feature vectors at a window, with the labels of some tasks."""
         X = self.features(window_s, samples)
-        return Vectors(X, y, self.names, self.widths(samples), self.is_own)
+        return Vectors(X, y, self.names, self.widths(samples))
 
     def with_kernels(self, window_s: float) -> DataSet:
         """The same trials with the tables that features of kernels need, for a window.

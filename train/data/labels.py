@@ -14,8 +14,7 @@ NO_CONTACT = "none"
 ALIKE = "alike"
 """`meta.contacts` of a recording whose contacts all have its labels."""
 ENOUGH = 10
-"""Trials with a label that make a task of what most trials lack, and that choose a
-weight."""
+"""Trials with a label that make a task of what most trials lack."""
 
 
 def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 
@@ -49,15 +49,12 @@ class Vectors:
         y: {task: (n,) labels}.
         features: names of the feature types, in the order of X.
         widths: columns of each; equal where None.
-        is_own: (n,) whether a trial is the owner's, where simulated ones are among them;
-            see `train.model.pipeline.Choice.counts`.
     """
 
     X: Floats = field(repr=False)
     y: Labels = field(repr=False)
     features: Sequence[str] = FEATURES
     widths: Sequence[int] | None = None
-    is_own: Booleans | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -85,5 +82,4 @@ class Vectors:
             self,
             X=self.X[..., trials, :],
             y={task: labels[trials] for task, labels in self.y.items()},
-            is_own=None if self.is_own is None else self.is_own[trials],
         )

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 from scipy.special import expit
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Floats, Integers
 from edge.errors import InputError
 from edge.model.agreement import agreed
 from edge.touch.features import FEATURES
@@ -128,8 +128,6 @@ class Choice:
         features: names of those it takes; all where empty.
         targets: tasks whose discriminants `lda` sets side by side; the task itself
             where empty.
-        weights: how often a simulated trial and one of the owner's count in scaling and
-            projection, where there are both; 0 for trials that are not used at all.
     """
 
     scaling: str
@@ -139,7 +137,6 @@ class Choice:
     shrinkage: float = 0.01
     features: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
-    weights: tuple[int, int] = (1, 1)
 
     def space(self, task: str) -> Space:
         """Tasks whose spaces are equal share a projection, with the components of the
@@ -147,51 +144,22 @@ class Choice:
 
         So they do if they also lack the labels of the same trials.
         """
-        space = (self.projection, self.scaling, self.features, self.weights)
+        space = (self.projection, self.scaling, self.features)
         if self.projection == "pca":
             return space
         return (*space, self.shrinkage, self.targets or (task,))
-
-    def counts(self, labels: Strings, is_own: Booleans | None = None) -> Integers:
-        """(n,) how often each trial counts: 0 without a label, else by the weights.
-
-        Args:
-            labels: (n,) of the task; empty where a trial has none.
-            is_own: (n,) whether a trial is the owner's; None where no weights are needed.
-        """
-        return how_often(labels != "", is_own, self.weights)
 
 
 Choices = Mapping[str, Choice]
 """{task: its settings}."""
 
 
-def how_often(
-    labelled: Booleans,
-    is_own: Booleans | None,
-    weights: tuple[int, int],
-) -> Integers:
-    """(n,) how often each trial counts; see `Choice.counts`."""
-    if is_own is None:
-        return labelled.astype(np.int64)
-    simulated, of_owner = weights
-    return np.where(labelled, np.where(is_own, of_owner, simulated), 0)
-
-
-def fittable(
-    choices: Choices,
-    y: Labels,
-    is_own: Booleans | None,
-) -> dict[str, Choice]:
+def fittable(choices: Choices, y: Labels) -> dict[str, Choice]:
     """The choices of the tasks that y has labels for, with k at most the number of
-    their trials.
-
-    Args:
-        choices, y, is_own: see `ContactClassifier.fit`.
-    """
+    their trials."""
     possible = {}
     for task, choice in choices.items():
-        count = int(np.count_nonzero(choice.counts(y[task], is_own)))
+        count = int(np.count_nonzero(y[task]))
         if count:
             possible[task] = replace(choice, k=min(choice.k, count))
     return possible
@@ -331,20 +299,14 @@ class ContactClassifier:
         model = cls(choices, vectors.features, vectors.widths)
         return model._fit(vectors, {} if fits is None else fits)
 
-    def fit(
-        self,
-        X: Floats,
-        y: Labels,
-        is_own: Booleans | None = None,
-    ) -> ContactClassifier:
+    def fit(self, X: Floats, y: Labels) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
         it.
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
-            is_own: (n,) whether a trial is the owner's, see `Choice.counts`.
         """
-        return self._fit(Vectors(X, y, self.features, self.widths, is_own), {})
+        return self._fit(Vectors(X, y, self.features, self.widths), {})
 
     def _fit(self, vectors: Vectors, fits: Fits) -> ContactClassifier:
         """Fit the tasks that have no fit yet."""
@@ -357,12 +319,7 @@ class ContactClassifier:
                 fits[key] = fit_together(choices, vectors)
             fitted |= fits[key]
         self.tasks_ = {task: fitted[task] for task in self.choices}
-        counting = {}
-        for task, choice in self.choices.items():
-            labels = vectors.y[task]
-            counts = choice.counts(labels, vectors.is_own)
-            counting[task] = np.where(counts > 0, labels, "")
-        self.products_ = factors_of(counting)
+        self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
 
     def decide(self, X: Floats) -> dict[str, Decided]:
@@ -390,13 +347,13 @@ def sharing_a_space(choices: Choices, vectors: Vectors) -> list[dict[str, Choice
     """
     spaces: dict[tuple[object, ...], dict[str, Choice]] = {}
     for task, choice in choices.items():
-        counts = choice.counts(vectors.y[task], vectors.is_own)
-        n = np.count_nonzero(counts)
+        labelled = vectors.y[task] != ""
+        n = np.count_nonzero(labelled)
         if not 1 <= choice.k <= n:
             raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
         if choice.components < 1:
             raise InputError(f"components must be at least 1, not {choice.components}")
-        key = (choice.space(task), counts.tobytes())
+        key = (choice.space(task), labelled.tobytes())
         spaces.setdefault(key, {})[task] = choice
     return list(spaces.values())
 
@@ -418,11 +375,8 @@ def fit_together(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
 def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
     """The tasks in the space that they share, which takes all columns."""
     task, choice = next(iter(choices.items()))
-    counts = choice.counts(vectors.y[task], vectors.is_own)
-    members = np.flatnonzero(counts)
-    # A trial that counts twice is there twice.
-    rows = np.repeat(members, counts[members])
-    targets = [vectors.y[target][rows] for target in choice.targets or (task,)]
+    members = np.flatnonzero(vectors.y[task])
+    targets = [vectors.y[target][members] for target in choice.targets or (task,)]
     projection = Projection(
         choice.scaling,
         max(choice.components for choice in choices.values()),
@@ -431,9 +385,10 @@ def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
         choice.shrinkage,
         vectors.columns,
     )
-    projection.fit(vectors.X[rows], np.column_stack(targets))
-    columns = np.arange(vectors.X.shape[1])
-    projected = projection.transform(vectors.X[members])
+    X = vectors.X[members]
+    projection.fit(X, np.column_stack(targets))
+    columns = np.arange(X.shape[1])
+    projected = projection.transform(X)
     space = FittedSpace(columns, projection, members, projected)
     fitted = {}
     for task, choice in choices.items():
@@ -458,13 +413,12 @@ def _slopes(choices: Choices, vectors: Vectors) -> dict[str, float]:
     for fold in range(SLOPE_FOLDS):
         left_out = folds == fold
         training = vectors.part(~left_out)
-        possible = fittable(choices, training.y, training.is_own)
+        possible = fittable(choices, training.y)
         if not possible:
             continue
         for task, fitted in _fit_space(possible, training).items():
             labels = vectors.y[task]
-            counting = choices[task].counts(labels, vectors.is_own) > 0
-            tested = left_out & counting & np.isin(labels, fitted.classes)
+            tested = left_out & np.isin(labels, fitted.classes)
             if len(fitted.classes) > 1:
                 gaps[task].append(fitted.gaps(vectors.X[tested], labels[tested]))
     return {task: slope(np.concatenate(of_folds)) for task, of_folds in gaps.items()}

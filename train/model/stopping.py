@@ -327,7 +327,6 @@ class SequentialClassifier:
         y: Mapping[str, Strings],
         folds: Integers,
         fold_choices: Sequence[Choices],
-        is_own: Booleans | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
 
@@ -336,7 +335,6 @@ class SequentialClassifier:
             y: {task: (n,) labels}; empty where a trial has none.
             folds: (n,) from 0, or -1 for trials that calibrate nothing.
             fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
-            is_own: see `ContactClassifier.fit`.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
@@ -347,7 +345,7 @@ class SequentialClassifier:
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
                 "export without decision points"
             )
-        vectors = Vectors(X, y, self.features, self.widths, is_own)
+        vectors = Vectors(X, y, self.features, self.widths)
         self._folds = folds
         self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(self._fit_points(vectors), folds)

@@ -94,7 +94,7 @@ def _left_out(
     """
     labels = vectors.y[task]
     classes, index = np.unique(labels, return_inverse=True)
-    counting = choices[task].counts(labels, vectors.is_own) > 0
+    counting = labels != ""
     counting[test] = False
     training = np.flatnonzero(counting)
     quarter_of = stratified_folds(labels[training], QUARTERS)
@@ -103,7 +103,7 @@ def _left_out(
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
-        possible = fittable(choices, fewer.y, fewer.is_own)
+        possible = fittable(choices, fewer.y)
         model = ContactClassifier.of(possible, fewer)
         answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
     _, voters = model.tasks_[task].neighbours(X)

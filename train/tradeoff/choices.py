@@ -40,7 +40,7 @@ class Prepared:
 def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Prepared:
     """The trials of recordings as export takes them."""
     options = FitOptions(quick=quick, jobs=jobs, progress=True)
-    if quick or raw.mixed:
+    if quick:
         loaded = trials_of(raw, CHOSEN_S, options)
         return Prepared(loaded.dataset, CHOSEN_S, loaded.notes)
     seconds = [float(r.t[-1] - r.t[0]) for r in raw.recordings]
