@@ -19,9 +19,9 @@ from edge.tools.slips import slips
 from edge.touch.arm import Chain
 from edge.touch.features import SAMPLES, WINDOW_S
 from train.choose.candidates import Candidate, Fixed, candidates, features_of
-from train.choose.choose import Choosing, Chosen
+from train.choose.choose import Choosing
 from train.choose.decision_points import MOST_TRIALS, usual_points
-from train.choose.settings import Settings
+from train.choose.settings import Chosen, Settings
 from train.data import thresholds
 from train.data.dataset import (
     DataSet,
@@ -385,11 +385,10 @@ def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
             [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
         )
     window_s, notes = choosing.window(windows)
-    chosen, folds, without = choosing.choose(window_s)
-    settings = Settings(chosen, folds, without, choosing.candidates, window_s, notes)
+    settings = replace(choosing.choose(window_s), notes=notes)
     if options.quick or not _has_early_points(settings, options):
         return settings
-    return replace(settings, early=choosing.early(window_s, chosen))
+    return replace(settings, early=choosing.early(window_s, settings.chosen))
 
 
 def calibrate(

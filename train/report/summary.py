@@ -11,7 +11,7 @@ from sklearn.neighbors import NearestNeighbors
 from edge.arrays import Floats, Integers
 from edge.errors import printable
 from edge.touch import measures
-from train.choose.choose import Chosen
+from train.choose.settings import Chosen
 from train.data import outliers
 from train.data.dataset import DataSet
 from train.data.feature_sets import SETS, expand, moves

@@ -7,8 +7,8 @@ from typing import Any
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.candidates import candidates, features_of
-from train.choose.choose import Chosen
 from train.choose.evaluate import Result
+from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import TRIAL, kinds_of

@@ -15,8 +15,11 @@ from train.choose.evaluate import (
     Result,
     Rule,
     averaged,
+    chosen,
+    chosen_by_fold,
     evaluate,
     fits,
+    nested_accuracy,
 )
 from train.choose.search import SearchGrid
 from train.data.folds import group_folds, stratified_folds
@@ -95,7 +98,7 @@ def test_trials_without_a_label_or_a_fold_are_not_tested(partly_labelled):
     table = evaluate(vectors, folds, GRIDS)
     tested = (folds >= 0) & (vectors.y["t"] != "")
     assert (table.tested["t"] == tested).all()
-    assert table.nested("t").total == tested.sum()
+    assert nested_accuracy(table, "t").total == tested.sum()
     for fold in range(3):
         test = tested & (folds == fold)
         assert_exported(table, fold, vectors, folds != fold, test)
@@ -120,7 +123,7 @@ def test_nested_accuracy_is_that_of_choosing_anew_without_each_fold():
                 ).sum()
         best = choices[inner.argmax()]
         right += told_right(best, vectors, folds != fold, folds == fold).sum()
-    assert table.nested("t").right == right
+    assert nested_accuracy(table, "t").right == right
 
 
 def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
@@ -137,8 +140,8 @@ def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_
         X = rng.normal(size=(40, 12))
         y = rng.choice(["a", "b"], 40)
         table = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 5), GRIDS[1:2])
-        best.append(table.held_out("t").mean(axis=1).max())
-        honest.append(table.nested("t").accuracy)
+        best.append(table.plain("t").mean(axis=1).max())
+        honest.append(nested_accuracy(table, "t").accuracy)
     assert np.mean(best) > 0.55
     assert abs(np.mean(honest) - 0.5) < 0.1
 
@@ -152,8 +155,8 @@ def test_twins_of_a_group_do_not_tell_each_other():
     grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
     by_object = evaluate(Vectors(X, {"t": y}, TWO), group_folds(objects), grids)
     by_trial = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y), grids)
-    assert by_trial.nested("t").accuracy == 1.0
-    assert by_object.nested("t").accuracy < 0.8
+    assert nested_accuracy(by_trial, "t").accuracy == 1.0
+    assert nested_accuracy(by_object, "t").accuracy < 0.8
     few = group_folds(objects, count=5)
     assert all(len(set(few[objects == name])) == 1 for name in objects)
 
@@ -206,12 +209,13 @@ def test_further_divisions_count_in_the_choice_by_all_trials_alone():
         )
 
     repeated_table = table(first, repeated=(table(second),))
-    assert repeated_table.held_out("t").tolist() == [
+    assert repeated_table.plain("t").tolist() == [
         [0.5, 0.5, 0.5, 0.0],
         [1.0, 1.0, 0.5, 0.5],
     ]
-    assert repeated_table.chosen("t") == 1
-    assert repeated_table.by_fold("t") == table(first).by_fold("t") == [0, 0]
+    assert chosen(repeated_table, "t") == 1
+    assert chosen_by_fold(repeated_table, "t") == [0, 0]
+    assert chosen_by_fold(table(first), "t") == [0, 0]
 
 
 def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
@@ -223,9 +227,7 @@ def test_the_choice_of_several_windows_is_by_the_mean_of_their_answers():
         for window in (right, ~right)
     ]
     mean = averaged([tables[0], tables[0], tables[1]])
-    assert mean.held_out("t") == pytest.approx(
-        np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3
-    )
+    assert mean.plain("t") == pytest.approx(np.array([[2, 2, 2, 1], [2, 2, 1, 1]]) / 3)
 
 
 def test_of_candidates_that_cost_the_same_the_best_is_chosen():
