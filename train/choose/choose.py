@@ -16,11 +16,9 @@ from train.choose.evaluate import (
     Result,
     Rule,
     averaged,
-    chosen_by_other_fold,
     evaluate,
     fits,
 )
-from train.choose.evaluate import chosen as best
 from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
 from train.choose.search import SearchGrid
 from train.choose.settings import Chosen, EarlySettings, Settings
@@ -234,13 +232,15 @@ class Choosing:
             return None
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
         trials, groups = self._protocols(*map(averaged, zip(*tables, strict=True)))
+        folds = self._divisions.folds
         of_known = {}
         usual = {}
         for task in self._y:
+            # The graph has one number of neighbours for all decision points.
             k = chosen[task].choice.k
             protocol = self._protocol(task, trials, groups)
-            of_known[task] = self._settle_early(task, trials, k)
-            usual[task] = self._settle_early(task, protocol, k)
+            of_known[task] = trials.with_neighbours(task, k, folds)
+            usual[task] = protocol.with_neighbours(task, k, folds)
         return EarlySettings(_early(window_s, usual), _early(window_s, of_known))
 
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
@@ -250,18 +250,6 @@ class Choosing:
         vectors = dataset.vectors(window_s, self._samples, self._y)
         what = f"{window_s:g} s"
         return self._tables(vectors, candidates, what, nested=False, repeated=False)
-
-    def _settle_early(self, task: str, protocol: TrialsLeftOut, k: int) -> list[Choice]:
-        """A task's settings, and those chosen without each fold of the trials.
-
-        The graph has one number of neighbours, `k`, for all decision points.
-        """
-        table = protocol.table
-        choices = table.choices[task]
-        allowed = np.flatnonzero([choice.k == k for choice in choices])
-        rule = replace(protocol.rule(task), allowed=allowed)
-        others = chosen_by_other_fold(table, task, self._divisions.folds, rule)
-        return [choices[place] for place in (best(table, task, rule), *others)]
 
     def _settle(
         self,

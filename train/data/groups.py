@@ -53,6 +53,11 @@ def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
     return np.array(kinds) if several else None
 
 
+def are_drawn(dataset: DataSet) -> bool:
+    """Whether the trials are of things that a scene drew from kinds."""
+    return kinds_of([trial.recording for trial in dataset.trials]) is not None
+
+
 def groupable(labels: Strings, groups: Strings) -> bool:
     """Whether every class has enough groups that entire groups can be left out."""
     classes = set(labels.tolist())
