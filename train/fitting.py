@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,11 @@ class Fitted:
         their own."""
         return None if self.sequential is None else self.sequential.early
 
+    @cached_property
+    def _vectors(self) -> Vectors:
+        """The trials with the features of every candidate."""
+        return self.measured.vectors(self.window_s, self.samples, {})
+
     def selection(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
         """The trials, and their vectors, with the features and labels that some
         settings of the tasks take."""
@@ -71,9 +77,8 @@ class Fitted:
         for choice in choices:
             tasks.update(choice.targets)
             features += choice.features
-        dataset = self.measured.of(features)
-        y = {task: dataset.labels(task) for task in tasks}
-        return dataset, dataset.vectors(self.window_s, self.samples, y)
+        y = {task: self.measured.labels(task) for task in tasks}
+        return self.measured.of(features), replace(self._vectors.of(features), y=y)
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:

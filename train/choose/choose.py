@@ -26,8 +26,9 @@ from train.data.dataset import DataSet
 from train.data.groups import TRIAL, Divisions, Groups
 from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
+from train.model.held_out import held_out
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early, held_out
+from train.model.stopping import Early
 from train.progress import bar
 
 EARLY_SHARES = (0.25, 0.5, 0.75)

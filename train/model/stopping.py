@@ -31,9 +31,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
-from scipy.optimize import brentq
-from scipy.special import expit
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
@@ -42,35 +39,19 @@ from edge.model.info import (
     Novelty,
     Stopping,
     StoppingRule,
-    margin,
 )
 from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
+from train.model.curves import Curve, cross_fitted
+from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
-from train.model.pipeline import Choices, ContactClassifier, Fits
+from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
 
 FEWEST = 20
 """Trials that calibration needs."""
-PULL = 0.5
-"""Weight of the prior of a margin's slope, 1 a standard deviation, and of the
-intercept's, 0."""
-DOUBT = 1.0
-"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
-DOUBT_PULL = 10.0
-"""Weight of this prior for an excess of a standard deviation. It is heavy because few
-held-out trials are as novel as what a robot may meet."""
-LEAST_DOUBT = 0.5
-"""The odds fall at least by the root of the novelty, for the same reason."""
-LEAST_SLOPE = 1e-3
-"""Smallest slope a standard deviation: a larger margin never makes a label less
-likely."""
-
-
-AtPoints = Sequence[Choices]
-"""[decision point]{task: Choice}."""
 
 
 @dataclass(frozen=True)
@@ -86,178 +67,6 @@ class Early:
     until_s: float
     choices: Choices
     by_fold: Sequence[Choices]
-
-
-Answers = dict[str, tuple[Strings, Floats]]
-"""{task: labels and margins, (decision points, m) each}."""
-
-
-def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
-    """The answers of models, one for each decision point, to vectors (points, m, p)."""
-    by_task: dict[str, tuple[list[Strings], list[list[float]]]] = {}
-    for model, x in zip(models, X, strict=True):
-        for task, (indices, distances) in model.decide(x).items():
-            labels, margins = by_task.setdefault(task, ([], []))
-            labels.append(model.tasks_[task].classes[indices])
-            margins.append(list(map(margin, distances.tolist(), indices.tolist())))
-    return {
-        task: (np.array(labels), np.array(margins))
-        for task, (labels, margins) in by_task.items()
-    }
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Answers to each trial by models that were fitted without it.
-
-    Attributes:
-        right: {task: (decision points, n) whether the label is right}.
-        margins: {task: (decision points, n) the label's margin}.
-    """
-
-    right: dict[str, Booleans]
-    margins: dict[str, Floats]
-
-
-def held_out(
-    vectors: Vectors,
-    folds: Integers,
-    runs: Sequence[Sequence[AtPoints]],
-    jobs: int = 1,
-) -> list[HeldOut]:
-    """[run] answers to each trial by models without its fold.
-
-    Runs share the fits of equal settings.
-
-    Args:
-        vectors: (decision points, n, p).
-        folds: (n,) from 0, or -1 for trials that are never left out.
-        runs: [run][fold][decision point]{task: Choice}.
-        jobs: processes.
-    """
-    work = (
-        delayed(_fold)(vectors, folds == fold, choices)
-        for fold, choices in enumerate(zip(*runs, strict=True))
-    )
-    by_fold = list(Parallel(n_jobs=jobs)(work))
-    of_runs = []
-    for of_run in zip(*by_fold, strict=True):
-        result = HeldOut({}, {})
-        for fold, of_fold in enumerate(of_run):
-            for task, (labels, margins) in of_fold.items():
-                in_fold = folds == fold
-                shape = vectors.X.shape[:2]
-                right = result.right.setdefault(task, np.zeros(shape, dtype=bool))
-                right[:, in_fold] = labels == vectors.y[task][in_fold]
-                of_all = result.margins.setdefault(task, np.zeros(shape))
-                of_all[:, in_fold] = margins
-        of_runs.append(result)
-    return of_runs
-
-
-def _fold(
-    vectors: Vectors,
-    left_out: Booleans,
-    runs: Sequence[AtPoints],
-) -> list[Answers]:
-    """[run] answers to the trials that are left out."""
-    training = vectors.part(~left_out)
-    fits: list[Fits] = [{} for _ in training.X]
-    by_run = []
-    with single_thread():
-        for choices in runs:
-            models = []
-            for at_point, x, shared in zip(choices, training.X, fits, strict=True):
-                of_point = replace(training, X=x)
-                models.append(ContactClassifier.of(at_point, of_point, shared))
-            by_run.append(answers(models, vectors.X[:, left_out]))
-    return by_run
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The probability that a label is right.
-
-    It is the logistic function of slope * margin + intercept - doubt * excess, where the
-    excess is the part of the novelty above that of half of the trials (`excess_of`).
-    """
-
-    slope: float
-    intercept: float
-    doubt: float
-
-    @classmethod
-    def of(
-        cls,
-        margins: Floats,
-        excess: Floats,
-        right: Booleans,
-    ) -> Curve:
-        """The most likely curve for some answers; arrays of one shape."""
-        columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
-        middle = columns.mean(axis=0)
-        spread = columns.std(axis=0)
-        # The spread of equal values is the rounding of their mean.
-        spread[spread <= 1e-12 * np.abs(middle)] = 1.0
-        constant = np.ones((len(columns), 1))
-        scaled = np.hstack([(columns - middle) / spread, constant])
-        prior = np.array([1.0, DOUBT * spread[1], 0.0])
-        solution = _logistic(scaled, right.ravel(), prior)
-        slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
-        intercept = float(solution[2] - slopes @ middle)
-        return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
-
-    def with_mean(
-        self,
-        margins: Floats,
-        excess: Floats,
-        share: float,
-    ) -> Curve:
-        """The curve with the intercept at which the mean probability is `share`."""
-        half_a_trial = 0.5 / margins.size
-        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
-
-        def surplus(shift: float) -> float:
-            shifted = replace(self, intercept=self.intercept + shift)
-            return float(shifted.probabilities(margins, excess).mean()) - target
-
-        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
-        shift = float(brentq(surplus, -reach, reach))
-        return replace(self, intercept=self.intercept + shift)
-
-    def probabilities(self, margins: Floats, excess: Floats) -> Floats:
-        """That labels with these margins are right, in the shape of the margins."""
-        logits = self.slope * margins + self.intercept - self.doubt * excess
-        return np.asarray(expit(logits))
-
-
-def _logistic(
-    columns: Floats,
-    right: Booleans,
-    prior: Floats,
-) -> Floats:
-    """(3,) weights of columns (m, 3) for the log odds of being right."""
-    solution = prior
-    pull = np.array([PULL, DOUBT_PULL, PULL])
-
-    def loss(parameters: Floats) -> float:
-        logits = columns @ parameters
-        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
-        return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
-
-    for _ in range(500):
-        p = expit(columns @ solution)
-        gradient = columns.T @ (p - right) + pull * (solution - prior)
-        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
-        step = np.linalg.solve(hessian, gradient)
-        # Far from the optimum, whole steps may go back and forth for ever. Near it,
-        # they converge, and rounding hides what the loss gains.
-        while np.abs(step).max() > 1e-3 and loss(solution - step) > loss(solution):
-            step /= 2.0
-        solution = solution - step
-        if np.abs(step).max() < 1e-10:
-            break
-    return solution
 
 
 def excess_of(novelty: Novelty, scores: Floats) -> Floats:
@@ -572,22 +381,3 @@ def _curve(
     """The curve of answers, with the mean probability of honest ones."""
     share = float(honest.mean())
     return Curve.of(margins, excess, right).with_mean(margins, excess, share)
-
-
-def cross_fitted(
-    margins: Floats,
-    excess: Floats,
-    right: Booleans,
-    folds: Integers,
-    tested: Booleans,
-) -> Floats:
-    """(points, n) confidences for rules, each fold's by the curve of the other folds'
-    tested."""
-    confidences = np.zeros(right.shape)
-    for fold in range(int(folds.max()) + 1):
-        left_out = folds == fold
-        outside = tested & ~left_out
-        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
-        evidence = margins[:, left_out], excess[:, left_out]
-        confidences[:, left_out] = curve.probabilities(*evidence)
-    return confidences

@@ -132,33 +132,10 @@ def test_a_promise_is_as_wide_as_two_fifths_of_its_trials_make_it():
     assert Promise(90, 100, variance=10.0).interval == wilson(9, 10)
 
 
-def test_labels_that_say_nothing_are_told_by_chance_whatever_the_best_candidate_scores():
-    rng = np.random.default_rng(2)
-    best = []
-    honest = []
-    for _ in range(6):
-        X = rng.normal(size=(40, 12))
-        y = rng.choice(["a", "b"], 40)
-        table = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y, 5), GRIDS[1:2])
-        best.append(table.plain("t").mean(axis=1).max())
-        honest.append(nested_accuracy(table, "t").accuracy)
-    assert np.mean(best) > 0.55
-    assert abs(np.mean(honest) - 0.5) < 0.1
-
-
-def test_twins_of_a_group_do_not_tell_each_other():
-    """Trials of one object are copies: only other objects may tell them."""
-    rng = np.random.default_rng(3)
-    objects = np.repeat([f"{i}" for i in range(12)], 4)
-    X = np.repeat(rng.normal(size=(12, 12)), 4, axis=0)
-    y = np.repeat(np.tile(["a", "b"], 6), 4)
-    grids = [SearchGrid("none", "pca", components=(6,), neighbours=(1,))]
-    by_object = evaluate(Vectors(X, {"t": y}, TWO), group_folds(objects), grids)
-    by_trial = evaluate(Vectors(X, {"t": y}, TWO), stratified_folds(y), grids)
-    assert nested_accuracy(by_trial, "t").accuracy == 1.0
-    assert nested_accuracy(by_object, "t").accuracy < 0.8
-    few = group_folds(objects, count=5)
-    assert all(len(set(few[objects == name])) == 1 for name in objects)
+def test_folds_of_groups_part_no_group():
+    groups = np.repeat([f"{i}" for i in range(12)], 4)
+    few = group_folds(groups, count=5)
+    assert all(len(set(few[groups == name])) == 1 for name in groups)
 
 
 @pytest.mark.parametrize("most", [None, 2])
