@@ -13,13 +13,8 @@ from edge.touch.features import SAMPLES
 from train.choose.candidates import Candidate, Fixed, candidates, features_of
 from train.choose.choose import Choosing
 from train.data import thresholds
-from train.data.dataset import (
-    DataSet,
-    Measurement,
-    Recordings,
-    Untouched,
-    load_trials,
-)
+from train.data.contacts import Untouched
+from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.groups import LEAVE_OUT, Divisions, are_drawn, kinds_of
 from train.data.tasks import labels_of_tasks
 from train.data.vectors import Labels
