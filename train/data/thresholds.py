@@ -12,7 +12,8 @@ from edge.touch.layout import for_device
 from edge.touch.still import WatchfulTracker
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, ContactTracker
-from train.data.dataset import DataSet, contacts, with_thresholds
+from train.data.contacts import contacts, with_thresholds
+from train.data.dataset import DataSet
 from train.data.labels import NO_CONTACT
 
 MARGINS = (MARGIN, 1.0)

@@ -9,7 +9,8 @@ from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.contact import FeatureSeries
 from train.choose.evaluate import Result
-from train.data.dataset import DataSet, Trial
+from train.data.contacts import Trial
+from train.data.dataset import DataSet
 from train.report import figures
 from train.report.score import grid_search, score, transfer
 from train.report.section import Figure, Row, Section, Table
