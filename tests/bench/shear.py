@@ -16,7 +16,6 @@ from scipy.stats import sem, t
 from tests.bench import tables
 from tests.bench.program import start
 from train.data.dataset import read
-from train.report.figures import legend, picture
 from train.report.work import Workers
 from train.simulate import run, scene
 from train.tradeoff import shear
@@ -25,8 +24,6 @@ from train.tradeoff.choices import WINDOWS_S, followed
 SCENE = tables.SCENES / "cody18_shear.toml"
 SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the table of gains."""
-PICTURE = tables.ROOT / "docs" / "shear.png"
-PICTURED = "mobility"
 
 
 def compared(seed, folder, jobs):
@@ -96,20 +93,8 @@ def gains(runs):
     return rows
 
 
-def draw(means):
-    """The picture of README: mobility against time."""
-
-    def paint(canvas, phone):
-        axes = canvas.subplots()
-        shear.draw_task(axes, means, PICTURED, 4.0)
-        axes.set(title="", ylim=(40, 103), ylabel=f"right about {PICTURED}, %")
-        legend(canvas, axes, 2)
-
-    return picture("shear", "Mobility with shear and without", paint, (3.4, 3.4)).png
-
-
 def measure(seeds, jobs, out):
-    """Measure, and write the tables and the picture."""
+    """Measure, and write the tables."""
     first = scene.load(SCENE).seed
     runs = []
     for seed in range(first, first + seeds):
@@ -121,7 +106,6 @@ def measure(seeds, jobs, out):
     rows = shear.times(means)
     reached = [row for row in rows if {row["with s"], row["without s"]} != {"-"}]
     tables.write("shear", [reached, gains(runs)], "make shear")
-    PICTURE.write_bytes(draw(means))
 
 
 if __name__ == "__main__":
