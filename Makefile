@@ -9,14 +9,15 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 # Several threads slow down matrices as small as ours, and disturb the processes beside them.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help venv test test-all lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
+.PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
+  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
   stopping soak soak-day constraints clean
 
 help:
 	@echo "Everyday"
 	@echo "  make test          lint, types and the fast tests"
 	@echo "  make test-all      the slow tests too, as CI runs them"
+	@echo "  make test-busy     the fast tests five times beside eight busy processes"
 	@echo "  make export        fit a model to DATA (a folder of recordings; default: simulated ones)"
 	@echo "                     and write model.onnx, golden.npz and report.html to OUT (default:"
 	@echo "                     build); NAME=... names the model"
@@ -32,6 +33,7 @@ help:
 	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
 	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
+	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
 	@echo "  make service-test  start, hang and restart the service under a systemd of its own (root)"
 	@echo "  make requirements-board.txt   pin the board's packages with hashes"
 	@echo "Measurements"
@@ -49,10 +51,10 @@ help:
 	@echo "  make soak-day      24 hours of the same at 15 Hz"
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
-	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes, and not from OpenVINO"
+	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
 	@echo "  make mutants       make 200 random changes to the code: does a test notice each?"
 	@echo "  make fuzz          read 5,000 damaged files of each kind: no crash, no traceback, small memory"
-	@echo "  make kills         kill record, label, teach, a map and export 60 times each: no damaged file"
+	@echo "  make kills         kill record, label and export 60 times each: no damaged file"
 	@echo "Upkeep"
 	@echo "  make golden        renew the small model and outputs that the tests compare with"
 	@echo "  make demo-data     renew the model and the touches that the wheel carries"
@@ -89,6 +91,9 @@ test: lint types
 
 test-all: lint types
 	$(PYTEST) $(TESTS)
+
+test-busy: $(DEV)
+	$(BIN)/python -m tests.busy $(PYTEST) -m "not slow" $(TESTS)
 
 # The recordings to fit: DATA, or the simulated default set.
 SCENE := train/scenes/cody18.toml
@@ -266,6 +271,9 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 	$(PEERS)/bin/$(PINNED) $(PEERS)/constraints.txt -e . --group peers
 	@touch $@
 
+peers-test: $(PEERS)/.ready
+	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
+
 stopping: $(PEERS)/.ready
 	$(PEERS)/bin/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
@@ -333,11 +341,9 @@ HARD := $(OUT)/hard-cases
 hard-cases: hard-cases-versions
 	$(BIN)/python -m tests.hard_cases
 
-# Writes golden files of the hard cases, then checks them with other ONNX Runtimes, and that
-# verify refuses an engine that computes in float32.
+# Writes golden files of the hard cases, then checks them with other ONNX Runtimes.
 OTHER_RUNTIMES ?= 1.22.1 1.26.0 1.32.0
 OTHERS := $(OTHER_RUNTIMES:%=$(HARD)/onnxruntime-%)
-FLOAT32 := $(HARD)/openvino-2026.4.1
 ELSEWHERE = -m pip install --quiet --disable-pip-version-check \
   $$(grep -E '^(numpy|smbus2)==' constraints.txt)
 
@@ -346,17 +352,11 @@ $(OTHERS:%=%/.ready): $(HARD)/onnxruntime-%/.ready: constraints.txt
 	$(@D)/bin/python $(ELSEWHERE) onnxruntime==$*
 	@touch $@
 
-$(FLOAT32)/.ready: constraints.txt
-	$(PYTHON) -m venv $(@D)
-	$(@D)/bin/python $(ELSEWHERE) openvino==$(lastword $(subst -, ,$(@D)))
-	@touch $@
-
-hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready) $(FLOAT32)/.ready
+hard-cases-versions: $(DEV) $(OTHERS:%=%/.ready)
 	$(BIN)/python -m tests.hard_cases.golden --out $(HARD)/golden
 	for other in $(OTHERS); do \
 	  $(BIN)/python -m tests.hard_cases.elsewhere --golden $(HARD)/golden $$other/bin/python \
 	  || exit 1; done
-	$(FLOAT32)/bin/python -m tests.hard_cases.float32 --golden $(HARD)/golden
 
 $(VENV)/.mutants: $(DEV)
 	$(PIP) --group mutants
@@ -379,7 +379,7 @@ constraints: $(VENV)/.upkeep
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
-# KILLS="--count 10 --only teach": fewer of them, and of one command.
+# KILLS="--count 10 --only record": fewer of them, and of one command.
 kills: $(DEV)
 	$(BIN)/python -m tests.kills $(KILLS)
 

@@ -50,8 +50,8 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         description="Tells from a robot's skin what the robot has touched.",
         epilog="`edge-classify COMMAND --help` explains a command. Commands print text to a "
         "terminal, and one JSON object per line to a pipe or a file. In a checkout of the "
-        "project, edge-classify export, import, simulate, study, tradeoff, show, split, "
-        "thresholds and save run the workstation's commands.",
+        "project, edge-classify export, import, simulate, study, tradeoff, show, split "
+        "and thresholds run the workstation's commands.",
     )
     top.add_argument(
         "--version",

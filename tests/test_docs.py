@@ -35,6 +35,7 @@ def objects(text):
     return [event["label"] for event in events if event.get("task") == "object"]
 
 
+@pytest.mark.slow
 def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     ran = []
@@ -54,6 +55,7 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
     assert {*objects(capsys.readouterr().out)} >= {"pillow", "foam block"}
 
 
+@pytest.mark.slow
 def test_the_two_evenings_mend_a_mistake(tmp_path):
     text = (DOCS / "evenings.md").read_text()
     script = "".join(re.findall(r"```sh\n(.*?)```", text, re.S))
@@ -72,7 +74,7 @@ def test_the_notebook_runs(tmp_path):
     notebook = nbformat.read(DOCS / "first-touch.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
     resources = {"metadata": {"path": ROOT}}
-    nbclient.NotebookClient(notebook, timeout=120, resources=resources).execute()
+    nbclient.NotebookClient(notebook, resources=resources).execute()
     outputs = [o for cell in notebook.cells for o in cell.get("outputs", ())]
     (printed,) = (o.text for o in outputs if o.output_type == "stream")
     assert "label='soft-fixed'" in printed

@@ -11,12 +11,15 @@ from dataclasses import replace
 from importlib import import_module
 from types import ModuleType, SimpleNamespace
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import edge
 from edge import demo
 from edge.fake.player import play, skin_file
 from tests.conftest import ROOT, python, save_touches
+from train.__main__ import main as train_main
 
 EXAMPLES = ROOT / "docs" / "examples"
 PACKAGE = EXAMPLES / "ros2" / "edge_classify_ros"
@@ -68,6 +71,103 @@ def test_tables_are_written_into_their_folder_whatever_the_objects_name(
     assert result.stderr == ""
     paths = [path.relative_to(tables).as_posix() for path in tables.rglob("*.csv")]
     assert sorted(paths) == ["-etc-x/2.csv", "-up/1.csv", "foam-block/0.csv"]
+
+
+def program(name):
+    """The function `main` of an example."""
+    return runpy.run_path(str(EXAMPLES / name))["main"]
+
+
+def imported(table, *options):
+    """The recordings that `import csv` makes of a table."""
+    out = table.parent / "recordings"
+    words = ["import", "csv", table, "--out", out, *options]
+    assert train_main([*map(str, words)]) == 0
+    return [edge.load(path) for path in sorted(out.glob("*.npz"))]
+
+
+EPISODES = np.arange(2)
+TASKS = ("grasp the cup", "grasp the box")
+
+
+def data_set(folder, *, in_parts, axes):
+    """A LeRobot data set of two episodes: v2.1 has a file for each, v3 one for many."""
+    (folder / "meta").mkdir(parents=True)
+    (folder / "data" / "chunk-000").mkdir(parents=True)
+    counts = np.arange(30)[:, None] + 10 * np.arange(6)
+    values = np.stack([counts // 2, -(counts // 4), counts], axis=2)
+    episodes = [
+        pd.DataFrame(
+            {
+                "observation.tactile": (values if axes else counts + number).tolist(),
+                "observation.state": np.full((30, 2), [0.1, -0.2]).tolist(),
+                "timestamp": 0.02 * np.arange(30),
+                "episode_index": number,
+                "task_index": number,
+            }
+        )
+        for number in EPISODES
+    ]
+    tasks = pd.DataFrame({"task_index": EPISODES}, index=pd.Index(TASKS, name="task"))
+    if in_parts:
+        lines = tasks.reset_index().to_json(orient="records", lines=True)
+        (folder / "meta" / "tasks.jsonl").write_text(lines)
+    else:
+        tasks.to_parquet(folder / "meta" / "tasks.parquet")
+        episodes = [pd.concat(episodes)]
+    for number, data in enumerate(episodes):
+        data.to_parquet(folder / "data" / "chunk-000" / f"file-{number:03}.parquet")
+    return folder
+
+
+@pytest.mark.parametrize("in_parts", [True, False], ids=["v2.1", "v3"])
+@pytest.mark.parametrize("axes", [False, True])
+def test_a_lerobot_data_set_is_imported(tmp_path, in_parts, axes):
+    pytest.importorskip("pyarrow")
+    folder = data_set(tmp_path / "set", in_parts=in_parts, axes=axes)
+    table = tmp_path / "all.parquet"
+    main = program("import_lerobot.py")
+    main(str(folder), str(table), "observation.tactile", "observation.state")
+    options = ("--axes", "xyz") if axes else ()
+    joints = ("--joints", "joint_1-joint_2")
+    trials = imported(table, "--shape", "2x3", *joints, *options)
+    assert [trial.labels for trial in trials] == [{"object": task} for task in TASKS]
+    second = trials[1]
+    assert second.frames[7].ravel().tolist() == [
+        7 + 10 * taxel + (not axes) for taxel in range(6)
+    ]
+    assert second.t[-1] == pytest.approx(0.58)
+    assert second.joints[9].tolist() == [0.1, -0.2]
+    if axes:
+        assert second.shear[8, 1, 2].tolist() == [58 // 2, -(58 // 4)]
+
+
+@pytest.mark.parametrize("axes", [1, 3])
+def test_import_reads_a_table_of_recordings_back(make_touch, tmp_path, axes):
+    pytest.importorskip("pyarrow")
+    trials = []
+    for number in range(2):
+        trial = make_touch(seed=number, labels={"object": f"thing {number}"})
+        valid = np.ones(trial.frames.shape, dtype=bool)
+        valid[3, 4, 5] = number == 0
+        quarter = (trial.frames // 4).astype(np.int16)
+        shear = np.stack([quarter, -quarter], axis=3) if axes == 3 else None
+        trials.append(replace(trial, valid=valid, shear=shear))
+        edge.save(tmp_path / "in" / f"touch_{number}.npz", trials[-1])
+    table = tmp_path / "all.parquet"
+    program("save_table.py")(str(tmp_path / "in"), str(table))
+    names = trials[0].joint_names or range(1, 6)
+    joints = ",".join(f"joint_{name}" for name in names)
+    options = ("--axes", "xyz") if axes == 3 else ()
+    read = imported(table, "--joints", joints, "--shape", "16x24", *options)
+    for trial, back in zip(trials, read, strict=True):
+        assert back.labels == trial.labels
+        assert (back.frames == trial.frames * trial.valid).all()
+        assert back.t == pytest.approx(trial.t - trial.t[0])
+        assert back.joints == pytest.approx(trial.joints)
+    assert not read[1].valid[3, 4, 5]
+    if axes == 3:
+        assert (read[0].shear == trials[0].shear).all()
 
 
 def test_the_fitting_program_finds_its_packages_as_its_first_line_says():
@@ -191,7 +291,7 @@ class Ros:
             self.modules[f"{package}.msg"] = messages
 
     def spin(self, node):
-        node._reading.join(timeout=30)
+        node._reading.join()
         node.diagnose()
 
     def run(self, monkeypatch):
@@ -305,7 +405,7 @@ def test_the_ros_node_names_the_chips_that_are_not_read(monkeypatch):
     ros = Ros()
 
     def spin(node):
-        node._reading.join(timeout=30)
+        node._reading.join()
         first, second, *_ = node._skin.status()
         down = [replace(first, state="down"), second]
         monkeypatch.setattr(node._skin, "status", lambda: down)

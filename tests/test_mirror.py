@@ -9,8 +9,8 @@ THROUGH = {
     "train/study": "train/study/test_study_report.py",
     "train/tradeoff": "train/tradeoff/test_tradeoff.py",
     "train/report/work.py": "train/study/test_study_report.py",
-    "train/importers/mcap.py": "train/importers/test_log_importers.py",
     "train/importers/rosbag.py": "train/importers/test_log_importers.py",
+    "train/importers/sources.py": "train/importers/test_csv.py",
     "train/importers/topics.py": "train/importers/test_log_importers.py",
     "train/simulate/truth.py": "train/simulate/test_simulate_truth.py",
 }

@@ -15,7 +15,6 @@ COMMANDS = {
     "show": "train.commands.show",
     "split": "train.commands.split",
     "thresholds": "train.commands.thresholds",
-    "save": "train.commands.save",
 }
 """Modules by command; see `edge.cli.add_commands`."""
 

@@ -18,7 +18,6 @@ COMMANDS = (
     "show",
     "split",
     "thresholds",
-    "save",
 )
 """`export` is a program of its own; `python -m train` runs the others."""
 

@@ -24,6 +24,7 @@ from tests.hard_cases import elsewhere
 from tests.hard_cases import golden as hard_golden
 
 AARCH64 = CHECKOUT / "build" / "aarch64"
+pytestmark = pytest.mark.slow
 CPU = "cortex-a72"
 """The Raspberry Pi 4's: nothing may need the instructions that newer boards add."""
 SYSTEM = ("python3-minimal", "libpython3-stdlib", "libstdc++6", "libgomp1")

@@ -22,6 +22,7 @@ from edge.skin import file as skinfile
 from tests.board.debian import CHECKOUT, Unavailable, program, skipping, unpacked
 from tests.conftest import ended
 
+pytestmark = pytest.mark.slow
 FOLDER = CHECKOUT / "build" / "kernel"
 PACKAGES = ("qemu-system-x86", "linux-image-amd64", "busybox-static")
 MODULES = """\

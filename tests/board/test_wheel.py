@@ -17,7 +17,8 @@ import edge
 from tests.board.debian import CHECKOUT
 from tests.conftest import ended
 
-LARGEST = 320_000
+pytestmark = pytest.mark.slow
+LARGEST = 290_000
 
 
 @pytest.fixture(scope="session")

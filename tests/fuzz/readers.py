@@ -3,7 +3,6 @@
 import bz2
 import contextlib
 import io
-import json
 import re
 import shutil
 import tempfile
@@ -14,7 +13,6 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from mcap.writer import CompressionType
 
 from edge.cli import main as edge_main
 from edge.errors import InputError
@@ -27,14 +25,12 @@ from tests.train.importers.test_importers import dsa
 from tests.train.importers.test_log_importers import (
     FRAMES,
     array,
-    json_topics,
     skin,
     write_bag,
     write_mcap,
 )
 from train.__main__ import main as train_main
 from train.simulate.scene import load as load_scene
-from train.touch_map import TouchMap
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "edge" / "demo"
@@ -151,20 +147,6 @@ def read_chain(path):
         raise Wrong("a pose is not finite")
 
 
-HEAD = {"event": "map", "frame": "torso", "unit": "metre", "tasks": ["object"]}
-TOUCH = {
-    "event": "decision",
-    "task": "object",
-    "contact": 1,
-    "onset_s": 1.5,
-    "label": "cup",
-    "place": [0.1, 0.2, 0.3],
-    "confidence": 0.5,
-    "flags": ["tie"],
-}
-MAP = "".join(json.dumps(line) + "\n" for line in (HEAD, TOUCH, TOUCH, HEAD, TOUCH))
-
-
 def read_grasp(path):
     """Import the XML as the only grasp of a folder."""
     folder = path.parent / "grasps"
@@ -180,12 +162,9 @@ def bytes_of(write):
 
 
 def logs():
-    """MCAP files of JSON messages: not in chunks, in chunks, compressed by LZ4."""
-    ways = {"use_chunking": False}, {}, {"compression": CompressionType.LZ4}
-    return [
-        bytes_of(lambda path, way=way: write_mcap(path, *json_topics(), **way))
-        for way in ways
-    ]
+    """An MCAP file of arrays."""
+    topic = skin([array(frame, dims=frame.shape) for frame in FRAMES])
+    return [bytes_of(lambda path: write_mcap(path.with_suffix(".mcap"), topic))]
 
 
 def bags():
@@ -258,13 +237,6 @@ READERS = (
     Reader("arm", ".toml", files("edge/arms/cody.toml"), mutate.of_text, read_chain),
     Reader("urdf", ".urdf", lambda: [ARM.encode()], mutate.of_text, read_chain),
     Reader(
-        "map",
-        ".jsonl",
-        lambda: [MAP.encode()],
-        mutate.of_text,
-        lambda path: list(TouchMap(path)),
-    ),
-    Reader(
         "scene",
         ".toml",
         files("train/scenes/*.toml"),
@@ -278,6 +250,6 @@ READERS = (
     Reader("sdh2", ".xml", lambda: [dsa().encode()], mutate.of_text, read_grasp),
     Reader("csv", ".csv", lambda: TABLES, mutate.of_text, importing("csv", "--falls")),
     Reader("csv_frames", ".one", lambda: FRAME_FILES, of_frames, read_frames),
-    Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("mcap")),
+    Reader("mcap", ".mcap", logs, mutate.of_bytes, importing("rosbag")),
     Reader("rosbag", ".bag", bags, mutate.of_bytes, importing("rosbag")),
 )

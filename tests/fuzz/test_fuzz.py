@@ -1,13 +1,11 @@
-"""A damaged file ends in an answer or in one sentence, within five seconds and little
-memory.
+"""A damaged file ends in an answer or in one sentence, and takes little memory.
 
 `make fuzz` reads 5,000 files with each reader; `make test` reads a few.
 """
 
-import faulthandler
 import os
 import resource
-import time
+import signal
 from pathlib import Path
 
 import pytest
@@ -20,10 +18,12 @@ from tests.fuzz.readers import READERS, UNPRINTABLE
 CORPUS = Path(__file__).parent / "corpus"
 BY_NAME = {reader.name: reader for reader in READERS}
 FILES = int(os.environ.get("FUZZ_FILES", "30"))
-SECONDS = 5.0
 MEGABYTES = 100.0
-HANGS_S = 180.0
+ENDLESS_S = 60.0
+"""Seconds of processor time after which a reader is ended, and pytest with it: it would read
+for ever."""
 
+pytestmark = [pytest.mark.slow] if FILES > 100 else []
 each_reader = pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
 
 
@@ -54,16 +54,14 @@ def refusal(reader, path):
 
 
 def limited_refusal(reader, path):
-    """The same of a damaged file, within the limits of time and memory."""
+    """The same of a damaged file, within the limit of memory."""
     Path("/proc/self/clear_refs").write_text("5")  # VmHWM, the peak, starts anew
     before = memory("VmRSS")
-    began = time.process_time()
-    faulthandler.dump_traceback_later(HANGS_S, exit=True)
+    signal.setitimer(signal.ITIMER_VIRTUAL, ENDLESS_S)
     try:
         sentence = refusal(reader, path)
     finally:
-        faulthandler.cancel_dump_traceback_later()
-    assert time.process_time() - began < SECONDS
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     assert memory("VmHWM") - before < MEGABYTES
     return sentence
 
@@ -113,11 +111,6 @@ BROKE = {
     "arm-deep.toml": "it is nested too deeply",
     "arm-digits.toml": DIGITS,
     "csv_frames-utf8.one": "line 2 has 1 value, and the first row 2",
-    "mcap-key.mcap": "255 is missing; copy it again",
-    "mcap-lz4.mcap": "ERROR_decompressionFailed; copy it again",
-    "mcap-short.mcap": "unpack requires a buffer of 8 bytes; copy it again",
-    "mcap-utf8.mcap": "it is not UTF-8 text; copy it again",
-    "mcap-zstd.mcap": "Data corruption detected; copy it again",
     "model-gather.onnx": "indices element out of data bounds, idx=99 must be",
     "recording-token.npz": "('EOF in multi-line statement', (2, 0)); copy or record it again",
     "rosbag-header.bag": "Header field could not be parsed.; copy it again",

@@ -7,7 +7,6 @@ from timeit import repeat
 import numpy as np
 
 from edge.errors import EdgeError
-from edge.touch.arm import Chain
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
 from edge.touch.region import largest_region
@@ -73,36 +72,24 @@ def prices():
     counts = np.zeros((16, 24), np.uint16)
     counts[4:12, 20:24] = counts[4:12, 0:4] = 65535
     series = contact_of(Frame(0.01 * i, counts) for i in range(4)).series()
-    chain = Chain.cody()
-    angles = np.full(chain.dof, 0.5)
-    t = 0.01 * np.arange(120.0)
     calls = (
         lambda: exported.run(["t_label", "t_neighbours"], {"features": x}),
         lambda: theirs(x),
         lambda: largest_region(counts, 50),
         lambda: feature_vector(series, 0.03),
-        lambda: np.isfinite(x).all(),
-        lambda: chain.point(angles, (0.04, 0.0, 0.1)),
-        lambda: np.diff(np.minimum(t, 1.2)).max(initial=0.0) > 0.3,
     )
-    graph, usual, region, vector, finite, point, clock = (
+    graph, usual, region, vector = (
         1e6 * min(repeat(call, number=1, repeat=2000)) for call in calls
     )
     decision = f"{graph:.0f} us a decision in all, by skl2onnx {usual:.0f}"
     fit = "none on the board: paid when the model is fitted"
-    touch = f"{region:.0f} us a frame in all"
     return {
         "neighbours": decision,
         "outputs": decision,
         "everywhere": decision,
-        "scaling": fit,
         "PCA": fit,
         "simulator": "none on the board: paid when trials are simulated",
-        "features": f"{touch}, {vector:.0f} us a feature vector",
-        "limits": touch,
-        "clock": f"{clock:.1f} us a decision",
-        "kinematics": f"{point:.0f} us a point on an arm of five joints in all",
-        "refusals": f"{finite:.1f} us a vector",
+        "features": f"{region:.0f} us a frame in all, {vector:.0f} us a feature vector",
     }
 
 

@@ -298,7 +298,7 @@ CASES = [
         {"factor": powers_of_ten(0.0, 8.0), "seed": SEEDS},
         Ladder("times as far out", decades(0, 12, 0.5), "factor", "1"),
         outlier_price,
-        guard="scaling",
+        guard="PCA",
         examples=4,
         bound=0.02,
     ),

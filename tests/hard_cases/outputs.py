@@ -283,9 +283,8 @@ def confidence_error(kind, point, factor, seed):
 
 
 HAZARDS = [
-    {"kind": kind, "point": i % 3, "factor": factor, "seed": 0}
+    {"kind": kind, "point": i % 3, "factor": (1.0, 1e12)[i % 2], "seed": 0}
     for i, kind in enumerate(KINDS)
-    for factor in (1.0, 1e12)
 ]
 AROUND = {
     "kind": st.sampled_from(KINDS),
@@ -310,6 +309,7 @@ CASES = [
         HAZARDS,
         AROUND,
         FARTHER,
+        examples=6,
     ),
     Case(
         "outputs: a product and its factors agree; ties of votes",

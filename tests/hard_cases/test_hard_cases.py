@@ -8,6 +8,7 @@ from tests.hard_cases.margins import margin
 from tests.hard_cases.registry import CASES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.key)
 def test_the_largest_error_is_within_the_bound(case):
     worst = case.worst()

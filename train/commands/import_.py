@@ -28,7 +28,7 @@ from edge.tools.trial_options import add_arm, open_arm
 from edge.touch.arm import Chain
 from train import former_recordings
 from train.data.thresholds import count_felt, proposed
-from train.importers import names
+from train.importers import Refused, Trial, names
 from train.progress import bar, say
 
 LOG = logging.getLogger(__name__)
@@ -109,7 +109,7 @@ def kind_of(message: str) -> str:
 
 
 def write(
-    trials: Iterator[tuple[str, Recording]],
+    trials: Iterator[Trial | Refused],
     arm: Chain | None,
     arguments: argparse.Namespace,
 ) -> int:
@@ -118,7 +118,11 @@ def write(
     paths: set[Path] = set()
     frames: dict[str, list[str]] = {}
     skipped: list[str] = []
-    for name, recording in bar(trials, desc="importing", unit=" trials"):
+    for result in bar(trials, desc="importing", unit=" trials"):
+        if isinstance(result, Refused):
+            skipped.append(result.sentence)
+            continue
+        name, recording = result
         _require_joints(recording, arm, arguments.file)
         try:
             path = _path(arguments, name, paths)
@@ -135,9 +139,9 @@ def write(
             save(path, recording)
         else:
             without_threshold.append((path, recording))
-    skipped += getattr(arguments, "skipped", [])
     if skipped and not paths:
-        raise InputError(skipped[0])
+        more = f"; {len(skipped) - 1} more cannot be used either" * (len(skipped) > 1)
+        raise InputError(skipped[0] + more)
     report = [set_thresholds(without_threshold)] if without_threshold else []
     print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
     warn_of_copies(list(frames.values()))

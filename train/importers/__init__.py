@@ -2,18 +2,46 @@
 
 A module `NAME.py` here adds `python -m train import NAME FILE --out DIR`. It has
 
-    def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]
+    def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial | Refused]
 
-which yields each trial's file name (without `.npz`) and recording, and raises
-`edge.errors.InputError` if the file is not of the format. `arm` is the one that the
-user names, for formats with joint angles. A format with options of its own also has
+which yields each trial, and a sentence for each file or trial that is left out, and
+raises `edge.errors.InputError` if the file is not of the format. `arm` is the one that
+the user names, for formats with joint angles. A format with options of its own also has
 `add_options(parser)`; its `trials` then gets the parsed options as a third argument.
 """
 
 import pkgutil
+from dataclasses import dataclass
+from typing import NamedTuple
 
-SHARED = {"arrays", "axes", "clock", "columns", "counts", "reading", "topics"}
+from edge.recording import Recording
+
+SHARED = {
+    "arrays",
+    "axes",
+    "clock",
+    "columns",
+    "counts",
+    "options",
+    "reading",
+    "sources",
+    "topics",
+}
 """Modules that the formats share."""
+
+
+class Trial(NamedTuple):
+    """A trial by the name of its file, without `.npz`."""
+
+    name: str
+    recording: Recording
+
+
+@dataclass(frozen=True)
+class Refused:
+    """What is left out: a sentence that names it and says why."""
+
+    sentence: str
 
 
 def names() -> list[str]:

@@ -1,6 +1,5 @@
 """Arrays in .npy, .npz, .mat and HDF5 files, as tables with a row for each frame."""
 
-import argparse
 import io
 import math
 import zipfile
@@ -18,6 +17,7 @@ from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing, read_bytes
 from train.importers.columns import TIME
+from train.importers.options import TableOptions
 from train.importers.reading import (
     EMPTY,
     LARGEST_BYTES,
@@ -31,6 +31,8 @@ SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5")
 MOST_VALUES = LARGEST_BYTES // 8
 """Values of all arrays of a file."""
 Arrays = dict[str, NDArray[Any]]
+Labelled = tuple[dict[str, str], Arrays]
+"""The labels and the arrays of a trial."""
 
 
 def read_arrays(path: Path) -> Arrays:
@@ -106,7 +108,7 @@ def _check_size(values: int) -> None:
         )
 
 
-def table_of(where: str, arrays: Arrays, options: argparse.Namespace) -> Table:
+def table_of(where: str, arrays: Arrays, options: TableOptions) -> Table:
     """A row for each frame of some arrays, and a column for each of their other values.
 
     Args:
@@ -144,7 +146,7 @@ def table_of(where: str, arrays: Arrays, options: argparse.Namespace) -> Table:
     return Table(where, data, named="" not in numbers, shape=shape, form=tuple(form))
 
 
-def _numbers(arrays: Arrays, options: argparse.Namespace) -> Arrays:
+def _numbers(arrays: Arrays, options: TableOptions) -> Arrays:
     """The arrays of numbers that are used.
 
     Raises:
@@ -225,7 +227,7 @@ def _time_axis(title: str, array: NDArray[Any], frames: int, axis: int | None) -
     return places[0]
 
 
-def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Arrays]]:
+def trials_of(arrays: Arrays, task: str) -> Iterator[Labelled]:
     """The labels and arrays of each trial of a file that holds several.
 
     Trials are the groups or structures of the file, the entries of a cell array or of a
@@ -250,7 +252,7 @@ def trials_of(arrays: Arrays, task: str) -> Iterator[tuple[dict[str, str], Array
 
 def _labels_and_arrays(
     fields: Sequence[tuple[str, NDArray[Any]]], task: str
-) -> tuple[dict[str, str], Arrays]:
+) -> Labelled:
     """A trial's texts and single numbers, and its arrays."""
     labels: dict[str, str] = {}
     of_trial: Arrays = {}

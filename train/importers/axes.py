@@ -1,6 +1,5 @@
 """Taxels of three axes in a table: which columns belong to which axis of which taxel."""
 
-import argparse
 import re
 from collections import defaultdict
 from collections.abc import Sequence
@@ -22,32 +21,6 @@ FIRST = re.compile(r"(?P<word>[a-z]*?)(?P<axis>[xyz])[ _.-]*(?P<rest>\d.*)", re.
 """A name with its axis before its number, such as Fx_1, z12, or x.3 of an array x."""
 
 
-def axis_letters(text: str) -> str:
-    """The letters of the axes along the rows, around the columns, and of the normal.
-
-    Raises:
-        ArgumentTypeError: they are not x, y and z in some order.
-    """
-    if sorted(text.lower()) != LETTERS:
-        raise argparse.ArgumentTypeError(
-            f"must be x, y and z in some order, such as xyz, not {text[:20]!r}"
-        )
-    return text.lower()
-
-
-def flipped_letters(text: str) -> str:
-    """The letters of the axes whose sign is turned round.
-
-    Raises:
-        ArgumentTypeError: one of them is not x, y or z.
-    """
-    if not text or not set(text.lower()) <= set(LETTERS):
-        raise argparse.ArgumentTypeError(
-            f"must be some of x, y and z, such as x or xz, not {text[:20]!r}"
-        )
-    return text.lower()
-
-
 @dataclass(frozen=True)
 class Axes:
     """How the axes of a taxel are named.
@@ -63,16 +36,15 @@ class Axes:
     flipped: str = ""
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> Self | None:
-        """The axes that the options name; None for one axis.
+    def of(cls, letters: str | None, flipped: str | None) -> Self | None:
+        """The axes of `--axes` and `--flip`; None for one axis.
 
         Raises:
             InputError: axes are turned round that are not named.
         """
-        if options.axes is not None:
-            along, around, normal = options.axes
-            return cls(along, around, normal, options.flip or "")
-        if options.flip:
+        if letters is not None:
+            return cls(letters[0], letters[1], letters[2], flipped or "")
+        if flipped:
             raise InputError("--flip needs --axes, such as --axes xyz")
         return None
 

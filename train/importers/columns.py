@@ -1,7 +1,6 @@
 """What the columns of a table mean: times, taxels, joint angles, and what is left
 out."""
 
-import argparse
 import math
 import re
 from collections.abc import Sequence
@@ -16,10 +15,9 @@ from numpy.typing import NDArray
 from edge.config import short_text
 from edge.errors import InputError
 from train.importers.axes import lettered
+from train.importers.options import UNITS_S, TableOptions
 from train.importers.reading import Table, numbered, numbers_of, require_converted
 
-UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-UNITS = (*UNITS_S, "iso")
 OTHER_UNITS = {"sec": "s", "seconds": "s", "µs": "us"}
 """{another name of a unit: its name here}."""
 TIME = re.compile(
@@ -134,7 +132,7 @@ def _term(table: Table, term: str) -> list[str]:
     )
 
 
-def meaning(table: Table, options: argparse.Namespace) -> Meaning:
+def meaning(table: Table, options: TableOptions) -> Meaning:
     """What the columns of a table are taken for.
 
     Args:
@@ -163,7 +161,7 @@ def meaning(table: Table, options: argparse.Namespace) -> Meaning:
 def _time_column(
     table: Table,
     joints: Sequence[str],
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> str | None:
     """The column of times; None where --rate gives them."""
     if options.time:
@@ -205,7 +203,7 @@ def is_date(table: Table, name: str) -> bool:
 def _taxels(
     table: Table,
     rest: list[str],
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> tuple[list[str], tuple[int, ...]]:
     """The taxels, and their shape where their names tell it."""
     if options.taxels:
@@ -264,7 +262,7 @@ def _grids(*names: str) -> list[tuple[list[str], tuple[int, ...]]]:
 def _unit(
     table: Table,
     time: str | None,
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> tuple[str, str]:
     """The unit of times, and how it is known."""
     if time is None:
@@ -304,11 +302,12 @@ def _likely_unit(table: Table, time: str) -> tuple[str, str]:
 def times_of(
     table: Table,
     meaning: Meaning,
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> NDArray[np.float64]:
     """(n,) seconds from the first row; NaN where a time is missing."""
     if meaning.time is None:
-        return np.asarray(np.arange(len(table.data)) / options.rate)
+        rate_hz = options.rate or math.nan  # without a time there is a rate
+        return np.asarray(np.arange(len(table.data)) / rate_hz)
     if meaning.unit == "iso":
         column = table.data[meaning.time]
         dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)

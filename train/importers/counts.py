@@ -1,9 +1,7 @@
 """Values of any sensor as counts: what they are at rest, and their scale."""
 
-import argparse
 import logging
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -12,12 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.options import within
 from edge.commands.output import counted
 from edge.errors import InputError
 from edge.recording import Recording
 from train.importers import clock
-from train.importers.axes import Axes, axis_letters, flipped_letters
+from train.importers.axes import Axes
+from train.importers.options import ValueOptions
 from train.progress import say
 
 LOG = logging.getLogger(__name__)
@@ -32,63 +30,8 @@ PART = 1 << 16
 """Frames that are converted at a time."""
 
 
-def shape_of_skin(text: str) -> tuple[int, int]:
-    """The rows and columns of `--shape`.
-
-    Raises:
-        ArgumentTypeError: the text is no shape.
-    """
-    shape = re.fullmatch(r"([0-9]{1,4})x([0-9]{1,4})", text)
-    if shape is None:
-        raise argparse.ArgumentTypeError(
-            f"must be ROWSxCOLS, such as 16x24, not {text[:40]!r}"
-        )
-    return int(shape[1]), int(shape[2])
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add options on the meaning of values."""
-    add = parser.add_argument
-    add(
-        "--shape",
-        type=shape_of_skin,
-        metavar="ROWSxCOLS",
-        help="of the skin (default: as the file tells it, or one row)",
-    )
-    add(
-        "--falls",
-        action="store_true",
-        help="values fall under pressure: subtract them from those at rest, which are "
-        "those of the trial with the quietest start",
-    )
-    add(
-        "--signed",
-        action="store_true",
-        help="values rise and fall: count how far they are from those at rest",
-    )
-    add(
-        "--scale",
-        type=within(float, 1e-12, 1e12),
-        default=1.0,
-        help="counts in a unit of values with fractions",
-    )
-    add(
-        "--axes",
-        type=axis_letters,
-        metavar="XYZ",
-        help="taxels of three axes, such as s1_x, s1_y, s1_z: the letters of the axes "
-        "along the rows, around the columns, and of the normal force",
-    )
-    add(
-        "--flip",
-        type=flipped_letters,
-        metavar="XYZ",
-        help="letters of the axes whose sign is turned round",
-    )
-
-
 @dataclass(frozen=True)
-class Trial:
+class Samples:
     """The numbers of a trial.
 
     Attributes:
@@ -149,9 +92,9 @@ class Trial:
 
 
 def skin_shape(
-    trial: Trial,
+    trial: Samples,
     stated_shape: Sequence[int],
-    options: argparse.Namespace,
+    options: ValueOptions,
 ) -> tuple[int, int]:
     """The rows and columns of a trial's skin: those of --shape, or those that are told.
 
@@ -184,7 +127,7 @@ class Rest:
 
     def recording(
         self,
-        trial: Trial,
+        trial: Samples,
         shape: tuple[int, int],
         meta: Mapping[str, Any],
     ) -> Recording:
@@ -230,7 +173,7 @@ class Rest:
 
     def _counts(
         self,
-        trial: Trial,
+        trial: Samples,
         valid: NDArray[np.bool_],
         rows: slice,
     ) -> NDArray[np.int32]:
@@ -246,7 +189,7 @@ class Rest:
         return np.rint(counts).astype(np.int32)
 
 
-def rest_of(trials: Sequence[Trial], options: argparse.Namespace) -> Rest:
+def rest_of(trials: Sequence[Samples], options: ValueOptions) -> Rest:
     """The values at rest, and the scale that keeps all digits of signed ones; says
     which values are missing, or are lost.
 
@@ -279,9 +222,7 @@ def _say_lost(deviations: Sequence[NDArray[np.float64]]) -> None:
         say(f"values above those at rest, by up to {rise:g}, count as 0; see --signed")
 
 
-def _quietest(
-    trials: Sequence[Trial], options: argparse.Namespace
-) -> NDArray[np.float64]:
+def _quietest(trials: Sequence[Samples], options: ValueOptions) -> NDArray[np.float64]:
     """(taxels, axes) the values of the quietest start, of those that lack fewest."""
     starts = np.array([np.median(trial.values[:START], axis=0) for trial in trials])
     unrest = -starts[..., 0]

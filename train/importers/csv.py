@@ -16,115 +16,29 @@ Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see 
 """
 
 import argparse
-import re
-from collections.abc import Iterable, Iterator, Sequence, Set
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mode
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 
-from edge.commands.options import within
-from edge.commands.output import counted
 from edge.config import ConfigTable, short_text
-from edge.errors import InputError, about
-from edge.files import parsing
-from edge.recording import Recording
+from edge.errors import InputError
 from edge.touch.arm import Chain
-from train.importers import arrays, counts
-from train.importers.axes import Axes, parted
-from train.importers.columns import (
-    UNITS,
-    Meaning,
-    columns,
-    is_date,
-    meaning,
-    named_times,
-    times_of,
-)
-from train.importers.counts import Trial, rest_of, skin_shape
-from train.importers.reading import (
-    TEXTS,
-    Table,
-    inner,
-    numbered,
-    read_frame,
-    read_labels,
-    read_parquet,
-    read_text,
-    require_filled,
-    suffix_of,
-)
+from train.importers import Refused, Trial
+from train.importers.axes import parted
+from train.importers.columns import Meaning, meaning, times_of
+from train.importers.counts import Samples, rest_of, skin_shape
+from train.importers.options import TableOptions, add_table_options
+from train.importers.sources import SKIN, SUFFIXES, Source, sources_in, tried
 from train.json_files import json_table
 from train.progress import say
 
-LABELS = "labels.csv"
-SKIN = "skin.json"
-SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
-FASTEST_HZ = 1e6
-"""A higher frame rate must be a mistake."""
-NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
-"""Names of folders that only count trials."""
 FEWEST_ROWS = 8
 """Rows of a trial from which on a column is seen to count them."""
-SPARSEST = 64
-"""Cells for each value of a long table; more would be nearly empty."""
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add options for the facts that a table lacks."""
-    rate = within(float, 1e-3, FASTEST_HZ)
-    add = parser.add_argument
-    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
-    add(
-        "--frames",
-        action="store_true",
-        help="a folder is a trial, and a file in it a frame, named by its time in "
-        "seconds, or by its number if --rate is given",
-    )
-    add(
-        "--trials",
-        action="store_true",
-        help="a file of arrays holds several trials: cells, structures, or a first axis",
-    )
-    add("--time", metavar="COL", help="the time (default: a column of such a name)")
-    add(
-        "--time-unit",
-        choices=UNITS,
-        help="unit of the times (default: by name or steps, where they leave no doubt)",
-    )
-    add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
-    add("--joints", metavar="COLS", help="joint angles in radians")
-    add("--degrees", action="store_true", help="joint angles are in degrees")
-    add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
-    add(
-        "--task",
-        default="object",
-        help="the task of these labels (default: %(default)s)",
-    )
-    add("--strict", action="store_true", help="stop at the first file that is unusable")
-    counts.add_options(parser)
-
-
-@dataclass(frozen=True)
-class Source:
-    """A trial before its columns are understood.
-
-    Attributes:
-        name: of the trial.
-        table: its values.
-        labels: {task: label}.
-        label: where the label comes from; empty if the names of its file tell it.
-    """
-
-    name: str
-    table: Table
-    labels: dict[str, str] = field(default_factory=dict)
-    label: str = ""
+add_options = add_table_options
 
 
 @dataclass(frozen=True)
@@ -135,7 +49,7 @@ class Measured:
         name, labels, label: as those of its source.
         form: of its table.
         meaning: of the columns.
-        numbers: of the trial.
+        samples: the numbers of the trial.
     """
 
     name: str
@@ -143,464 +57,116 @@ class Measured:
     label: str
     form: tuple[str, ...]
     meaning: Meaning
-    numbers: Trial
+    samples: Samples
 
 
 def trials(
     path: Path,
     arm: Chain | None,
-    options: argparse.Namespace,
-) -> Iterator[tuple[str, Recording]]:
+    arguments: argparse.Namespace,
+) -> Iterator[Trial | Refused]:
     """One recording for each file of a folder, or for each trial of a long table.
 
-    Prints what was taken. Files that cannot be used are appended to `options.skipped`.
+    Prints what was taken.
 
     Raises:
-        InputError: no file can be used, or one cannot with `--strict`.
+        InputError: there is no file, or one cannot be used with `--strict`.
     """
-    options.skipped = []
-    axes = Axes.of(options)
-    folder = path if path.is_dir() else path.parent
-    sources = _sources(path, folder, options)
-    if (folder / LABELS).is_file():
-        sources = _labelled(list(sources), folder / LABELS, options)
-    measured = _measured(sources, axes, options)
+    options = TableOptions.of(arguments)
+
+    def understood(source: Source) -> Measured:
+        return _understood(source, options)
+
+    measured = list(tried(sources_in(path, options), understood, options.strict))
     if not measured:
-        raise _nothing(path, options)
+        kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
+        raise InputError(f"{path}: holds no {kind}; give a folder of trials")
+    results = _alike(measured, options.strict)
+    usable = [result for result in results if isinstance(result, Measured)]
+    if not usable:
+        yield from (result for result in results if isinstance(result, Refused))
+        return
+    folder = path if path.is_dir() else path.parent
     skin = json_table(folder / SKIN)
-    shape = _announced(measured[0], skin, axes, options)
-    rest = rest_of([trial.numbers for trial in measured], options)
-    written = 0
-    for trial in measured:
+    shape = _announced(usable[0], skin, options)
+    rest = rest_of([trial.samples for trial in usable], options)
+
+    def recorded(trial: Measured) -> Trial:
         meta: dict[str, Any] = {
             "skin": skin.raw,
             "labels": trial.labels,
             "source": path.name,
             "trial": trial.name,
         }
-        if trial.numbers.joints is not None:
+        if trial.samples.joints is not None:
             meta["arm"] = arm and arm.to_dict()
-        with _skipping(options):
-            recording = rest.recording(trial.numbers, shape, meta)
-            written += 1
-            yield trial.name, recording
-    if not written:
-        raise _nothing(path, options)
+        return Trial(trial.name, rest.recording(trial.samples, shape, meta))
 
-
-@contextmanager
-def _skipping(options: argparse.Namespace) -> Iterator[None]:
-    """Leave out a file that cannot be used, unless the user is strict."""
-    try:
-        yield
-    except InputError as error:
-        if options.strict:
-            raise
-        options.skipped.append(str(error))
-
-
-def _nothing(path: Path, options: argparse.Namespace) -> InputError:
-    """The error where nothing can be imported."""
-    if options.skipped:
-        (first, *further) = options.skipped
-        more = f"; {len(further)} more cannot be used either" if further else ""
-        return InputError(first + more)
-    kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
-    return InputError(f"{path}: holds no {kind}; give a folder of trials")
+    yield from tried(results, recorded, options.strict)
 
 
 def _announced(
     first: Measured,
     skin: ConfigTable,
-    axes: Axes | None,
-    options: argparse.Namespace,
+    options: TableOptions,
 ) -> tuple[int, int]:
     """The rows and columns of the skin; prints what was taken, once for all files."""
     taxels = len(first.meaning.taxels)
     shape_in_file = first.meaning.shape
     shape_in_file = shape_in_file or (skin.whole("rows", 1), skin.whole("cols", taxels))
-    shape = skin_shape(first.numbers, shape_in_file, options)
+    shape = skin_shape(first.samples, shape_in_file, options)
     text = first.meaning.text(first.label, shape)
     say("; ".join([text, *first.form]))
-    if axes is not None:
-        say(axes.text)
+    if options.axes is not None:
+        say(options.axes.text)
     return shape
 
 
-def _labelled(
-    sources: Sequence[Source],
-    path: Path,
-    options: argparse.Namespace,
-) -> Iterator[Source]:
-    """The trials with the labels of a labels.csv instead of those of the files' names.
-
-    Raises:
-        InputError: it names none of the trials.
-    """
-    trials = [source.name for source in sources]
-    rows = _label_rows(path, trials)
-    files = {_name(file, path.parent) for file in _visible(path.parent)}
-    unknown = [row for row in rows if row not in trials and row not in files]
-    options.skipped += [f"{path}: {row} names no file" for row in unknown]
-    for source in sources:
-        labels = {**source.labels}
-        labels.pop(options.task, None)
-        if source.name in rows:
-            labels |= rows[source.name]
-        else:
-            options.skipped.append(
-                f"{path}: has no row for {source.name}, which has no label"
-            )
-        yield replace(source, labels=labels, label=LABELS)
-
-
-def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
-    """{trial: {task: label}} of a labels.csv."""
-    data = read_labels(path)
-    if "trial" not in data or not data["trial"].isin(trials).any():
-        raise InputError(
-            f"{path}: needs a column trial with names such as {short_text(trials)}"
-        )
-    require_filled(path, data, "trial")
-    repeated = data["trial"][data["trial"].duplicated()]
-    if len(repeated):
-        raise InputError(f"{path}: {repeated.iloc[0]} has two rows; remove one of them")
-    rows = data.set_index("trial").iterrows()
-    return {str(trial): row.dropna().to_dict() for trial, row in rows}
-
-
-def _sources(path: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
-    """The trials of the file, or of the files or folders in the folder."""
-    places = [path]
-    if options.frames:
-        places = [place for place in _visible(path) if place.is_dir()]
-    elif path.is_dir():
-        places = _files(_visible(path))
-    read = _of_frames if options.frames else _of_file
-    counting = _counting([place.relative_to(folder) for place in places])
-    for place in places:
-        with _skipping(options):
-            for source in read(place, folder, options):
-                if source.label:
-                    yield source
-                    continue
-                labels, label = _label(place.relative_to(folder), counting, options)
-                yield replace(source, labels=labels, label=label)
-
-
-def _visible(folder: Path) -> list[Path]:
-    """What a folder holds, without what is hidden."""
-    return [
-        place
-        for place in sorted(folder.rglob("*"))
-        if not any(part.startswith(".") for part in place.relative_to(folder).parts)
-    ]
-
-
-def _files(paths: Iterable[Path]) -> list[Path]:
-    """The tables among paths; says how many files are none."""
-    tables = []
-    foreign = []
-    for path in paths:
-        if path.name in (LABELS, SKIN):
-            continue
-        if suffix_of(path) in SUFFIXES:
-            tables.append(path)
-        elif path.is_file():
-            foreign.append(path)
-    if tables and foreign:
-        count = counted(len(foreign), "file")
-        say(f"left out {count} of another format, such as {foreign[0]}")
-    return tables
-
-
-def _counting(places: Sequence[Path]) -> set[str]:
-    """The names of folders that only count trials: words such as trial_1, and on each
-    level below the first, names that differ in their numbers alone."""
-    counting = set()
-    levels = max((len(place.parts) for place in places), default=0)
-    for level in range(levels):
-        names = {place.parts[level] for place in places if place.parts[level + 1 :]}
-        stems = {re.sub(r"[\d\W_]+$", "", name) for name in names}
-        if level and len(stems) == 1 and stems.isdisjoint(names):
-            counting |= names
-        counting |= set(filter(NUMBERED.fullmatch, names))
-    return counting
-
-
-def _label(
-    place: Path,
-    counting: Set[str],
-    options: argparse.Namespace,
-) -> tuple[dict[str, str], str]:
-    """The labels that the names of a file and its folders tell, and how."""
-    kind = "folder's"
-    names = [part for part in place.parts[:-1] if part not in counting]
-    if not names:
-        kind = "file's"
-        names = [re.sub(r"[\s_.-]*\d+$", "", inner(place).stem)]
-    label = names[-1]
-    if not label:
-        return {}, "none, as the files' names only count"
-    return {options.task: label}, f'the {kind} name, such as "{label}"'
-
-
-def _of_file(file: Path, folder: Path, options: argparse.Namespace) -> Iterator[Source]:
-    """The trials in a file."""
-    suffix = suffix_of(file)
-    if suffix in arrays.SUFFIXES:
-        stored = arrays.read_arrays(file)
-        if options.trials:
-            yield from _of_arrays(file, stored, options)
-            return
-        with about(str(file)):
-            table = arrays.table_of(str(file), stored, options)
-    else:
-        table = read_parquet(file) if suffix == ".parquet" else read_text(file)
-    if "trial" in table.names:
-        with parsing(str(file), "a table of trials"):
-            yield from _trials_in(table, options)
-    else:
-        yield Source(_name(file, folder), table)
-
-
-def _name(file: Path, folder: Path) -> str:
-    """The name of the trial in a file."""
-    return "_".join(inner(file.relative_to(folder)).with_suffix("").parts)
-
-
-def _of_arrays(
-    file: Path,
-    stored: arrays.Arrays,
-    options: argparse.Namespace,
-) -> Iterator[Source]:
-    """The trials in a file of arrays."""
-    with about(str(file)):
-        trials = list(arrays.trials_of(stored, options.task))
-    for number, (labels, of_trial) in enumerate(trials):
-        name = f"{file.stem}_{number:03}"
-        where = f"{file}: trial {name}"
-        with _skipping(options), about(where):
-            table = arrays.table_of(where, of_trial, options)
-            yield Source(name, table, labels, "the arrays" if labels else "")
-
-
-def _of_frames(
-    inside: Path,
-    folder: Path,
-    options: argparse.Namespace,
-) -> Iterator[Source]:
-    """The trial of a folder with a file for each frame, if it has files."""
-    files = sorted(p for p in inside.glob("[!.]*") if suffix_of(p) in SUFFIXES)
-    if not files:
-        return
-    frames = [_frame(file) for file in files]
-    shape = frames[0].shape
-    for file, frame in zip(files, frames, strict=True):
-        if frame.shape != shape:
-            sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
-            raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
-    values = np.reshape(frames, (len(files), -1))
-    data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
-    if options.rate is None:
-        data.insert(0, "time_s", _times_in_names(inside, files))
-        data = data.sort_values("time_s", kind="stable", ignore_index=True)
-    table = Table(str(inside), data, named=False, shape=shape)
-    yield Source("_".join(inside.relative_to(folder).parts), table)
-
-
-def _times_in_names(inside: Path, files: Sequence[Path]) -> list[float]:
-    """The times that the names of a folder's files are."""
-    kind = "a folder of files that are named by their times"
-    with parsing(str(inside), kind, "; give --rate"):
-        t = [float(inner(file).stem) for file in files]
-        if not np.isfinite(t).all():
-            raise ValueError("a time is not finite")
-    return t
-
-
-def _frame(file: Path) -> NDArray[np.float64]:
-    """(rows, columns) of the numbers in a file."""
-    if suffix_of(file) == ".npy":
-        frame = np.atleast_2d(arrays.read_arrays(file)[""])
-        with parsing(str(file), "a frame"):
-            return frame.astype(np.float64)
-    return read_frame(file)
-
-
-def _trials_in(table: Table, options: argparse.Namespace) -> Iterator[Source]:
-    """The trials of a long table."""
-    for name in {"trial", "taxel"} & set(table.names):
-        require_filled(table.where, table.data, name)
-    tasks = _tasks_in(table, options)
-    label = f"column {', column '.join(tasks)}" if tasks else "none"
-    for trial, rows in table.data.groupby("trial", sort=False):
-        where = f"{table.where}: trial {trial}"
-        with _skipping(options):
-            labels = _labels_in(where, rows[tasks])
-            data = rows.drop(columns=["trial", *tasks])
-            trial_table = replace(
-                table,
-                where=where,
-                data=data,
-                file_names=tuple(table.names),
-            )
-            if "taxel" in data:
-                trial_table = _pivoted(trial_table, options)
-            yield Source(str(trial), trial_table, labels, label)
-
-
-def _tasks_in(table: Table, options: argparse.Namespace) -> list[str]:
-    """The columns of labels of a long table: that of the task, and those of texts, apart
-    from times that run within a trial. A number among texts is a label if it stays the
-    same within its trial."""
-    tasks = []
-    for name in table.names:
-        column = table.data[name]
-        if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
-            is_task = name == options.task
-        else:
-            texts = column.astype(str).groupby(table.data["trial"])
-            words = pd.to_numeric(column, errors="coerce").isna().all()
-            runs = texts.nunique().max() > 1
-            is_task = not runs or (words and not is_date(table, name))
-        if is_task:
-            tasks.append(name)
-    return tasks
-
-
-def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
-    """The labels in the rows of a trial."""
-    labels = {}
-    for task, column in rows.items():
-        first, *further = [
-            _plain(cell) for cell in column.astype(object).fillna("").unique()
-        ]
-        if further:
-            raise InputError(
-                f"{where}: {task} changes, from {short_text(first)} to {short_text(further[0])}"
-            )
-        if first:
-            labels[str(task)] = first
-    return labels
-
-
-def _pivoted(table: Table, options: argparse.Namespace) -> Table:
-    """A row for each time and a column for each taxel, of a table with a row for each
-    value."""
-    further = [name for name in table.names if name not in ("taxel", "value")]
-    time = _time_of_long(table, further, options)
-    _check_long(table, time)
-    wide = table.data.pivot(index=time, columns="taxel", values="value")
-    wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
-    if not wide.columns.is_unique or time in wide:
-        raise InputError(
-            f"{table.where} has two taxels of one name; rename one of them"
-        )
-    form = [f'left out: "{name}"' for name in further if name != time]
-    return replace(
-        table,
-        data=wide.reset_index(),
-        named=False,
-        form=(*table.form, *form),
-        file_names=tuple(wide.columns),
-    )
-
-
-def _time_of_long(
-    table: Table,
-    further: Sequence[str],
-    options: argparse.Namespace,
-) -> str:
-    times = named_times(table) or further
-    if options.time:
-        times = columns(table, options.time)
-    if "value" not in table.data or len(times) != 1:
-        raise InputError(
-            f"{table.where}: needs the columns value and a time beside taxel, which "
-            "--time names"
-        )
-    return times[0]
-
-
-def _check_long(table: Table, time: str) -> None:
-    """Refuse two values of a taxel at one time, and taxels without times in common."""
-    data = table.data
-    repeated = data[data.duplicated([time, "taxel"])]
-    if len(repeated):
-        row = repeated.iloc[0]
-        raise InputError(
-            f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
-            f"{row[time]}"
-        )
-    cells = data[time].nunique() * data["taxel"].nunique()
-    if cells > SPARSEST * len(data):
-        raise InputError(
-            f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
-            "of a table; the taxels need times in common"
-        )
-
-
-def _plain(name: Any) -> str:
-    return f"{name:g}" if isinstance(name, float) else str(name)
-
-
-def _natural(name: Any) -> list[Any]:
-    """A key that sorts s2 before s10."""
-    words = re.split(r"(\d+)", _plain(name))
-    return [int(word) if word.isdigit() else word for word in words]
-
-
-def _measured(
-    sources: Iterable[Source],
-    axes: Axes | None,
-    options: argparse.Namespace,
-) -> list[Measured]:
-    """The numbers of the trials whose columns are those of most of them.
+def _alike(
+    measured: Sequence[Measured | Refused],
+    strict: bool,
+) -> list[Measured | Refused]:
+    """The trials, without those whose columns are not those of most of them.
 
     Raises:
         InputError: columns without a name may be no taxels.
     """
-    measured: list[Measured] = []
-    for source in sources:
-        with _skipping(options):
-            measured.append(_understood(source, axes, options))
-    if not measured:
-        return []
-    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in measured]
-    first = measured[kinds.index(mode(kinds))]
-    alike = []
-    for trial in measured:
-        with _skipping(options):
-            _compare(trial, first)
-            alike.append(trial)
+    usable = [trial for trial in measured if isinstance(trial, Measured)]
+    if not usable:
+        return list(measured)
+    kinds = [str((trial.meaning.taxels, trial.meaning.unit)) for trial in usable]
+    first = usable[kinds.index(mode(kinds))]
+
+    def compared(trial: Measured) -> Measured:
+        _compare(trial, first)
+        return trial
+
+    alike = list(tried(measured, compared, strict))
     if first.meaning.are_all:
-        _require_taxels(alike)
+        _require_taxels([trial for trial in alike if isinstance(trial, Measured)])
     return alike
 
 
 def _compare(trial: Measured, first: Measured) -> None:
     """Refuse a trial with other columns than the first."""
-    path = trial.numbers.where
-    first_path = first.numbers.where
-    taxels = trial.meaning.taxels
-    first_taxels = first.meaning.taxels
-    unit = trial.meaning.unit
-    first_unit = first.meaning.unit
-    if len(taxels) != len(first_taxels):
+    path = trial.samples.where
+    first_path = first.samples.where
+    sense = trial.meaning
+    first_sense = first.meaning
+    if len(sense.taxels) != len(first_sense.taxels):
         raise InputError(
-            f"{path}: has {len(taxels)} taxels, and {first_path} {len(first_taxels)}; "
-            "name them by --taxels"
+            f"{path}: has {len(sense.taxels)} taxels, and {first_path} "
+            f"{len(first_sense.taxels)}; name them by --taxels"
         )
-    if taxels != first_taxels:
+    if sense.taxels != first_sense.taxels:
         raise InputError(
-            f"{path}: its taxels are {short_text(taxels)}, and those of {first_path} "
-            f"{short_text(first_taxels)}"
+            f"{path}: its taxels are {short_text(sense.taxels)}, and those of "
+            f"{first_path} {short_text(first_sense.taxels)}"
         )
-    if unit != first_unit:
+    if sense.unit != first_sense.unit:
         raise InputError(
-            f"{path}: its time seems to be in {unit}, and that of {first_path} in "
-            f"{first_unit}; give --time-unit"
+            f"{path}: its time seems to be in {sense.unit}, and that of {first_path} in "
+            f"{first_sense.unit}; give --time-unit"
         )
 
 
@@ -611,7 +177,7 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
     Raises:
         InputError: there is one.
     """
-    values = [trial.numbers.values[..., 0] for trial in measured]
+    values = [trial.samples.values[..., 0] for trial in measured]
     if min(map(len, values)) < FEWEST_ROWS:
         return
     starts = np.array([frames[0] for frames in values])
@@ -621,17 +187,14 @@ def _require_taxels(measured: Sequence[Measured]) -> None:
     if doubtful.any() and not doubtful.all():
         first = measured[0]
         raise InputError(
-            f"{first.numbers.where}: column {first.meaning.taxels[doubtful.argmax()]} "
+            f"{first.samples.where}: column {first.meaning.taxels[doubtful.argmax()]} "
             "counts up, or tells the trials apart; name the taxels by --taxels"
         )
 
 
-def _understood(
-    source: Source,
-    axes: Axes | None,
-    options: argparse.Namespace,
-) -> Measured:
+def _understood(source: Source, options: TableOptions) -> Measured:
     """The numbers of a trial."""
+    axes = options.axes
     table = source.table if axes is None else parted(source.table, axes.normal)
     sense = meaning(table, options)
     values = table.values(sense.taxels)
@@ -640,8 +203,8 @@ def _understood(
         unit = np.pi / 180.0 if options.degrees else 1.0
         joints = unit * table.numbers(sense.joints)
     t = times_of(table, sense, options)
-    numbers = replace(Trial.of(table.where, t, values, axes), joints=joints)
-    if np.isnan(numbers.values[..., 0]).all():
+    samples = replace(Samples.of(table.where, t, values, axes), joints=joints)
+    if np.isnan(samples.values[..., 0]).all():
         raise InputError(f"{table.where}: none of its values is a finite number")
     rows = table.data.index
     # Without the table, which would fill the memory a second time where it is long.
@@ -651,5 +214,5 @@ def _understood(
         source.label,
         source.table.form,
         sense,
-        numbers.in_order(str(rows.name), rows),
+        samples.in_order(str(rows.name), rows),
     )

@@ -264,17 +264,9 @@ def _text(data: bytes) -> _Text:
     del lines
     comments = [line for line in above if line[:1] in set("#%")]
     body = "\n".join(kept)
-    if not _is_plain(kept, mark):
-        numbers = _lines_of_rows(kept, numbers, mark)
+    numbers = _lines_of_rows(kept, numbers, mark)
     rows = [row for _, row in islice(_rows(kept, mark), 2)]
     return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
-
-
-def _is_plain(kept: Sequence[str], mark: str) -> bool:
-    """Whether each line is a row of as many cells, none of which is quoted."""
-    if not mark or any('"' in line for line in kept):
-        return False
-    return len({line.count(mark) for line in kept}) == 1
 
 
 def _lines_of_rows(kept: list[str], numbers: Sequence[int], mark: str) -> Sequence[int]:
@@ -450,8 +442,8 @@ def _decoded(data: bytes) -> tuple[str, list[str]]:
         return data.decode("cp1252"), ["Windows-1252"]
 
 
-def read_parquet(path: Path, **options: Any) -> Table:
-    """The table in a Parquet file, with further options of pandas.
+def read_parquet(path: Path) -> Table:
+    """The table in a Parquet file.
 
     Raises:
         InputError: it cannot be read, or its reader is not installed.
@@ -461,7 +453,7 @@ def read_parquet(path: Path, **options: Any) -> Table:
         parsing(str(path), "a Parquet table"),
         needs("pyarrow", f"{path}: reading Parquet"),
     ):
-        data = pd.read_parquet(file, **options)
+        data = pd.read_parquet(file)
     if data.empty:
         raise InputError(f"{path}: {EMPTY}")
     if not isinstance(data.index, pd.RangeIndex):

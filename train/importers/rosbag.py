@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (`.bag`) or ROS 2 (a folder): one recording each; see
+"""Logs of ROS 1 (`.bag`) or ROS 2 (a folder, `.mcap` or `.db3`): one recording each; see
 train/importers/topics.py.
 
 Needs the dependency group `ros`, which `make venv` installs: pip install --group ros
@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from edge.files import open_regular, parsing
-from edge.recording import Recording
 from edge.touch.arm import Chain
+from train.importers import Trial
+from train.importers.options import LogOptions
 from train.importers.reading import needs
 from train.importers.topics import Log, add_options
 
@@ -21,8 +22,8 @@ __all__ = ["add_options", "trials"]
 def trials(
     path: Path,
     arm: Chain | None,
-    options: argparse.Namespace,
-) -> Iterator[tuple[str, Recording]]:
+    arguments: argparse.Namespace,
+) -> Iterator[Trial]:
     """The one trial of the bag."""
     with needs("rosbags", "this"):
         from rosbags.highlevel import AnyReader
@@ -30,7 +31,7 @@ def trials(
     if not path.is_dir():
         with open_regular(path, sys.maxsize):  # a FIFO would be waited for
             pass
-    log = Log(path, arm, options)
+    log = Log(path, arm, LogOptions.of(arguments))
     # ROS 2 bags from before 2024 do not contain the definitions of their types.
     types = get_typestore(Stores.ROS2_HUMBLE)
     with (
@@ -42,5 +43,5 @@ def trials(
         messages = reader.messages(connections) if connections else ()
         for connection, logged_ns, raw in messages:
             message = reader.deserialize(raw, connection.msgtype)
-            log.ros(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
-    yield path.stem, log.recording()
+            log.add(connection.topic, connection.msgtype, message, logged_ns * 1e-9)
+    yield Trial(path.stem, log.recording())

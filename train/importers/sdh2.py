@@ -23,7 +23,7 @@ from edge.files import open_regular, parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.layout import RELEASE_S, SkinLayout
-from train.importers import clock
+from train.importers import Trial, clock
 
 PADS = (1, 5)
 """The matrices that touch: the distal pads of the two fingers that close. In 3 of 856
@@ -38,7 +38,7 @@ LARGEST_BYTES = 1 << 26
 """Largest size of an unpacked file; the longest published grasp takes 1 MB."""
 
 
-def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recording]]:
+def trials(path: Path, arm: Chain | None = None) -> Iterator[Trial]:
     """One recording for each file: the two pads side by side, with an invalid column
     between them.
 
@@ -57,7 +57,7 @@ def trials(path: Path, arm: Chain | None = None) -> Iterator[tuple[str, Recordin
         )
     for i, file in enumerate(paths):
         recording = grasp(file)
-        yield f"{i:04d}_{recording.labels['object']}", recording
+        yield Trial(f"{i:04d}_{recording.labels['object']}", recording)
 
 
 def files(folder: Path) -> list[Path]:

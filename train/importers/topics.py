@@ -1,13 +1,12 @@
 """Topics of frames and joint angles in a robot's log, turned into one recording.
 
 Frames are `sensor_msgs/Image` (`mono16`, `16UC1`, `mono8` or `8UC1`), an array of
-`std_msgs` (`UInt16MultiArray`, `Int16MultiArray`, `Float32MultiArray` and so on), or
-JSON `{"counts": [[...], ...]}`. A sensor's own message is read by the definition that
-the log carries: `--field forces.z` names the values in it, and with `--axes` the field
-whose parts are x, y and z. Joint angles are `sensor_msgs/JointState`, or JSON `{"q":
-[...]}`, optionally with `"names": [...]`. A message may carry its own time
-(`header.stamp`, `"t"`); otherwise the time at which it was logged is used. Where the
-clocks of frames and angles never meet, both are taken by the time of logging.
+`std_msgs` (`UInt16MultiArray`, `Int16MultiArray`, `Float32MultiArray` and so on). A
+sensor's own message is read by the definition that the log carries: `--field forces.z`
+names the values in it, and with `--axes` the field whose parts are x, y and z. Joint
+angles are `sensor_msgs/JointState`. A message may carry its own time (`header.stamp`);
+otherwise the time at which it was logged is used. Where the clocks of frames and angles
+never meet, both are taken by the time of logging.
 
 Joints are identified by name, in any order, and several messages may share them. With
 an arm, its joints are selected in the arm's order, and a warning names the others.
@@ -19,8 +18,8 @@ the ones to use: `frames_topic` and `joints_topic`. Other topics are not read.
 """
 
 import argparse
-import json
 import logging
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -32,17 +31,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.output import counted
-from edge.config import ConfigTable, short_text
+from edge.config import short_text
 from edge.errors import InputError
-from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.arm import Chain
 from edge.touch.joint_angles import joint_columns
 from edge.touch.layout import RELEASE_S
-from train.importers import clock, counts
-from train.importers.axes import Axes
-from train.importers.counts import Trial, rest_of, skin_shape
+from train.importers import clock
+from train.importers.counts import Samples, rest_of, skin_shape
+from train.importers.options import LogOptions, add_value_options
 from train.json_files import json_table
 from train.progress import say
 
@@ -53,11 +50,13 @@ ARRAYS = tuple(
     f"std_msgs/msg/{name}MultiArray"
     for name in "UInt8 Int8 UInt16 Int16 UInt32 Int32 Float32 Float64".split()
 )
-JSON = "json"
 JOINTS = "sensor_msgs/msg/JointState"
 FRAMES = (IMAGE, *ARRAYS)
-CLOCKS = ["stamp", "logged"]
-"""Seconds by a message's own clock, or by logging where it has none; and by logging."""
+FRAME = ["stamp", "logged", "values"]
+ANGLE = ["stamp", "logged", "joint", "angle"]
+"""Columns of the tables of frames and of joint angles: seconds by a message's own clock,
+or by logging where it has none; seconds by logging; and a joint by its name or else
+its place."""
 ENCODINGS = {"mono16": 2, "16UC1": 2, "mono8": 1, "8UC1": 1}
 """Bytes of a pixel."""
 
@@ -69,7 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the values in a sensor's own message, such as data or taxels.force",
     )
-    counts.add_options(parser)
+    add_value_options(parser)
 
 
 class Unusable(ValueError):
@@ -77,22 +76,17 @@ class Unusable(ValueError):
 
 
 class Log:
-    """The messages of one log, collected by topic.
+    """The messages of one log: collected as a table for each topic, then read as
+    frames, joint angles and a recording.
 
     Attributes:
         path: of the log.
         beside: the JSON file beside it.
         arm: whose joint angles are wanted, or None for all.
         options: of the command.
-        axes: of the taxels; None for one.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        arm: Chain | None,
-        options: argparse.Namespace,
-    ) -> None:
+    def __init__(self, path: Path, arm: Chain | None, options: LogOptions) -> None:
         """Read the JSON file beside a log; `arm` has precedence over the file's.
 
         Raises:
@@ -105,13 +99,10 @@ class Log:
             arm = Chain.from_dict(self.beside.get("arm"), where=f"{file}: arm")
         self.arm = arm
         self.options = options
-        self.axes = Axes.of(options)
         self._frames: dict[str, list[Any]] = defaultdict(list)
-        """{topic: (stamp, time of logging, values) of each message}; the stamp is the
-        time of logging where a message has none."""
-        self._joints: dict[str, list[Any]] = defaultdict(list)
-        """{topic: (stamp, time of logging, name of a joint or else its place, its
-        angle)}"""
+        """{topic: a row of FRAME for each message}."""
+        self._angles: dict[str, list[Any]] = defaultdict(list)
+        """{topic: a row of ANGLE for each angle of a message}."""
         self._left_out: dict[str, list[str]] = defaultdict(list)
         """{topic: why no frame can be read from each of some messages}."""
         self._topics: dict[str, set[str]] = defaultdict(set)
@@ -128,104 +119,23 @@ class Log:
             return bool(self.beside.get("frames_topic") == topic)
         return kind in FRAMES or self.options.field is not None
 
-    def ros(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
-        """Take in a ROS message that is wanted."""
+    def add(self, topic: str, kind: str, message: Any, logged_s: float) -> None:
+        """Collect a message that is wanted."""
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         # Some drivers leave the stamp empty, which is the time 0.
         t = (0.0 if stamp is None else stamp.sec + stamp.nanosec * 1e-9) or logged_s
-        times = (t, logged_s)
         if kind == JOINTS:
-            angles = np.asarray(message.position, dtype=np.float64)
-            self._pose(topic, times, list(message.name), angles)
-        else:
-            self._frame(topic, times, kind, message)
-
-    def json(self, topic: str, data: bytes, logged_s: float) -> None:
-        """Take in a JSON message."""
-        where = f"{self.path}: a message of {topic}"
-        try:
-            message = json.loads(data)
-        except (ValueError, RecursionError):
-            message = None
-        if not isinstance(message, dict):
-            self.leave_out(topic, "has a message that is no JSON table")
-        elif "q" in message and self.takes(topic, JOINTS):
-            with parsing(where, "usable"):
-                t = ConfigTable(message, where).number("t", logged_s)
-                angles = np.asarray(message["q"], dtype=np.float64)
-                names = list(map(str, message.get("names", ())))
-                self._pose(topic, (t, logged_s), names, angles)
-        elif "counts" in message and self.takes(topic, IMAGE):
-            t = ConfigTable(message, where).number("t", logged_s)
-            self._frame(topic, (t, logged_s), JSON, message["counts"])
-
-    def leave_out(self, topic: str, reason: str) -> None:
-        """Note why a message of a topic that may hold frames is not read."""
-        if self.beside.get("frames_topic", topic) == topic:
-            self._left_out[topic].append(reason)
-
-    def _frame(
-        self,
-        topic: str,
-        times: tuple[float, float],
-        kind: str,
-        message: Any,
-    ) -> None:
-        """Take in a message's values, or leave it out where it has none."""
-        try:
-            values = self._values(kind, message)
-        except Unusable as reason:
-            self.leave_out(topic, str(reason))
-        else:
-            self._frames[topic].append((*times, values))
-
-    def _pose(
-        self,
-        topic: str,
-        times: tuple[float, float],
-        names: list[str],
-        angles: NDArray[np.float64],
-    ) -> None:
-        """Take in a message's angles.
-
-        A message without positions, and an angle that is not finite, tell nothing.
-        """
-        if not angles.size:
+            angles = angles_of(message, f"{self.path}: a message of {topic}")
+            rows = [(t, logged_s, joint, angle) for joint, angle in angles.items()]
+            if rows:
+                self._angles[topic] += rows
             return
-        where = f"{self.path}: a message of {topic}"
-        if angles.ndim != 1 or (names and len(names) != len(angles)):
-            raise InputError(
-                f"{where}: its names are {len(names)} and angles {angles.size}"
-            )
-        if len(set(names)) < len(names):
-            raise InputError(f"{where} names a joint twice")
-        keys: Sequence[str | int] = names or range(len(angles))
-        for name, angle in zip(keys, angles.tolist(), strict=True):
-            if np.isfinite(angle):
-                self._joints[topic].append((*times, name, angle))
-
-    def _values(self, kind: str, message: Any) -> NDArray[np.float64]:
-        """The values of a message, in the shape that it tells.
-
-        Raises:
-            Unusable: it has none.
-        """
-        if kind == IMAGE:
-            return image_values(message)
-        if kind in ARRAYS:
-            return array_values(message)
-        if kind == JSON:
-            return json_values(message)
-        name = self.options.field
-        if name is None:
-            raise Unusable(f"is {kind}; give --field, the name of the values in it")
-        if self.axes is None:
-            return field_values(message, name)
-        for axes in (".x .y .z", "x y z", "X Y Z"):
-            with suppress(Unusable):
-                values = [field_values(message, name + axis) for axis in axes.split()]
-                return np.stack(values, axis=-1)
-        return field_values(message, name)
+        try:
+            values = values_of(kind, message, self.options)
+        except Unusable as reason:
+            self._left_out[topic].append(str(reason))
+        else:
+            self._frames[topic].append((t, logged_s, values))
 
     def recording(self) -> Recording:
         """The frames in the order of the log, from 0, with joint angles at the frames'
@@ -235,64 +145,62 @@ class Log:
             InputError: the log has no topic of frames or several, or the frames' shapes
                 or times cannot be used.
         """
-        name = self._topic("frames", self._frames)
-        if name is None:
-            raise InputError(f"{self.path}: {self._why_empty()}")
-        frames = self._frames_of(name)
-        topic = self._topic("joints", self._joints)
-        poses = self._joints.get(topic or "", [])
-        angles = pd.DataFrame(poses, columns=[*CLOCKS, "joint", "angle"])
-        t = self._clock(frames, angles)
+        topic, frames = self._table_of_frames()
+        joints_topic = self._topic("joints", self._angles)
+        angles = pd.DataFrame(self._angles.get(joints_topic or "", []), columns=ANGLE)
+        times = self._clock(frames, angles)
+        axes = self.options.axes
+        t = frames[times].to_numpy()
         values = np.stack(frames["values"])
-        where = f"{self.path}: {name}"
-        trial = Trial.of(where, frames[t].to_numpy(), values, self.axes)
-        trial = trial.in_order("message")
+        samples = Samples.of(f"{self.path}: {topic}", t, values, axes)
+        samples = samples.in_order("message")
         meta: dict[str, Any] = {
             "labels": dict(self.beside.table("labels", {}).raw),
-            "source": f"{self.path.name} {name}",
+            "source": f"{self.path.name} {topic}",
             "skin": self.beside.table("skin", {}).raw,
         }
         if self.arm is not None:
             meta["arm"] = self.arm.to_dict()
-        if topic is not None:
-            names = self._joint_names(topic, angles["joint"].unique().tolist())
-            angles = angles.rename(columns={t: "t"})
-            joints = self._joints_at(trial.t, topic, angles, names)
-            trial = replace(trial, joints=joints)
+        if joints_topic is not None:
+            where = f"{self.path}: {joints_topic}"
+            names = self._joint_names(where, angles["joint"].unique().tolist())
+            angles = angles[[times, "joint", "angle"]]
+            joints = self._joints_at(samples.t, where, angles, names)
+            samples = replace(samples, joints=joints)
             if isinstance(names[0], str):
                 meta["joint_names"] = names
-        if self.axes is not None:
-            say(self.axes.text)
-        shape = skin_shape(trial, self._stated_shape(values.shape[1:]), self.options)
-        return rest_of([trial], self.options).recording(trial, shape, meta)
+        if axes is not None:
+            say(axes.text)
+        shape = skin_shape(samples, self._stated_shape(values.shape[1:]), self.options)
+        return rest_of([samples], self.options).recording(samples, shape, meta)
 
-    def _frames_of(self, name: str) -> pd.DataFrame:
-        """The frames of a topic, with their times; says what is left out."""
-        frames = pd.DataFrame(self._frames[name], columns=[*CLOCKS, "values"])
+    def _table_of_frames(self) -> tuple[str, pd.DataFrame]:
+        """The topic of the frames, and its table; says what is left out."""
+        name = self._topic("frames", self._frames)
+        if name is None:
+            raise InputError(f"{self.path}: holds no frames{self._why_empty()}")
+        frames = pd.DataFrame(self._frames[name], columns=FRAME)
         for topic, reasons in self._left_out.items():
             part = f"{topic},"
             if topic == name:
                 count = len(reasons)
                 messages = f"{count + len(frames)} messages of {topic}"
                 part = f"{count} of {messages}, the first of"
-            elif topic in self._joints:
-                part = f"{counted(len(reasons), 'message')} of {topic}, the first of"
             say(f"{self.path}: left out {part} which {reasons[0]}")
         shapes = {values.shape for values in frames["values"]}
         if len(shapes) > 1:
             raise InputError(
                 f"{self.path}: frames of {name} have the shapes {sorted(shapes)}"
             )
-        return frames
+        return name, frames
 
     def _why_empty(self) -> str:
-        """The sentence for a log without frames."""
+        """Why a log has no frames, behind a sentence."""
         for topic, reasons in self._left_out.items():
-            return f"holds no frames: {topic} {reasons[0]}"
-        kinds = f"{IMAGE}, {ARRAYS[2]} or another array"
+            return f": {topic} {reasons[0]}"
         return (
-            f'holds no frames; they must be {kinds}, JSON {{"counts": [[...]]}}, or a '
-            "message of a sensor's own with --field"
+            f"; they must be {IMAGE}, {ARRAYS[2]} or another array, or a message of a "
+            "sensor's own with --field"
         )
 
     def _stated_shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -301,7 +209,7 @@ class Log:
         Raises:
             InputError: neither does, nor --shape.
         """
-        if self.axes is not None:
+        if self.options.axes is not None:
             shape = shape[:-1]
         if len(shape) == 2 or self.options.shape is not None:
             return shape
@@ -314,16 +222,18 @@ class Log:
             f"{self.path.stem}.json beside it"
         )
 
-    def _clock(self, frames: pd.DataFrame, joints: pd.DataFrame) -> str:
+    def _clock(self, frames: pd.DataFrame, angles: pd.DataFrame) -> str:
         """The clock of the times: that of the stamps; but that of logging, which is
         said, where the stamps of frames and angles are of clocks that never meet."""
-        first, last = frames["stamp"].agg(["min", "max"])
-        stamps = joints["stamp"]
-        if not (stamps.min() > last or stamps.max() < first):
+        stamps = frames["stamp"]
+        joints_stamps = angles["stamp"]
+        before = joints_stamps.max() < stamps.min()
+        after = joints_stamps.min() > stamps.max()
+        if not (before or after):
             return "stamp"
         say(
-            f"{self.path}: the clocks of frames (from {frames['stamp'][0]:.3f} s) and joint "
-            f"angles (from {stamps[0]:.3f} s) never meet; both are taken by the "
+            f"{self.path}: the clocks of frames (from {stamps[0]:.3f} s) and joint "
+            f"angles (from {joints_stamps[0]:.3f} s) never meet; both are taken by the "
             "time at which they were logged"
         )
         return "logged"
@@ -331,34 +241,36 @@ class Log:
     def _joints_at(
         self,
         t: NDArray[np.float64],
-        topic: str,
+        where: str,
         angles: pd.DataFrame,
         names: Sequence[str | int],
     ) -> NDArray[np.float64]:
-        """(n, dof) angles of some joints at the frames' times."""
+        """(n, dof) angles of some joints at the frames' times, of a table of time,
+        joint and angle."""
         release_s = self.beside.table("skin", {}).number("release_s", RELEASE_S)
         columns = []
         for name in names:
-            rows = angles.loc[angles["joint"] == name, ["t", "angle"]].to_numpy()
-            order = clock.order(rows[:, 0], f"{self.path}: {topic}", "message")
-            rows = rows[order.kept]
-            columns.append(clock.angles_at(t, rows[:, 0], rows[:, 1:], release_s))
+            joint = angles[angles["joint"] == name]
+            joint_t = joint.iloc[:, 0].to_numpy()
+            kept = clock.order(joint_t, where, "message").kept
+            radians = joint[["angle"]].to_numpy()[kept]
+            columns.append(clock.angles_at(t, joint_t[kept], radians, release_s))
         at_frames = np.hstack(columns)
         unknown = ~np.isfinite(at_frames).all(axis=1)
         at_frames[unknown] = np.nan
         if unknown.all():
             raise InputError(
-                f"{self.path}: {topic} has no joint angle at the time of any frame; "
-                "record both with one clock"
+                f"{where} has no joint angle at the time of any frame; record both with "
+                "one clock"
             )
         if unknown.any():
             say(
-                f"{self.path}: {topic} lacks joint angles for {int(unknown.sum())} of "
-                f"{len(t)} frames, where they are unknown"
+                f"{where} lacks joint angles for {int(unknown.sum())} of {len(t)} "
+                "frames, where they are unknown"
             )
         return at_frames
 
-    def _joint_names(self, topic: str, logged: list[str | int]) -> list[str | int]:
+    def _joint_names(self, where: str, logged: list[str | int]) -> list[str | int]:
         """The joints whose angles are taken, in their order."""
         if self.arm is None:
             return logged
@@ -366,19 +278,17 @@ class Log:
         if not names:
             if len(logged) != self.arm.dof:
                 raise InputError(
-                    f"{self.path}: {topic} has {len(logged)} angles without names, but "
-                    f"the arm has {self.arm.dof} joints"
+                    f"{where} has {len(logged)} angles without names, but the arm has "
+                    f"{self.arm.dof} joints"
                 )
             return logged
         try:
             joint_columns(names, self.arm.names)
         except InputError as error:
-            raise InputError(f"{self.path}: {topic} has {error}") from None
+            raise InputError(f"{where} has {error}") from None
         outside = [name for name in names if name not in self.arm.names]
         if outside:
-            LOG.warning(
-                f"{self.path}: {topic}: joints outside the arm: {', '.join(outside)}"
-            )
+            LOG.warning(f"{where}: joints outside the arm: {', '.join(outside)}")
         return list(self.arm.names)
 
     def _topic(self, kind: str, topics: Mapping[str, Any]) -> str | None:
@@ -400,6 +310,47 @@ class Log:
                 f"{sorted(self._topics[kind])}, not {short_text(name)}{why}"
             )
         return name
+
+
+def angles_of(message: Any, where: str) -> dict[str | int, float]:
+    """{joint, by its name or else its place: angle in radians} of a `JointState`.
+
+    A message without positions, and an angle that is not finite, tell nothing.
+
+    Raises:
+        InputError: its names and angles do not belong together.
+    """
+    names = list(message.name)
+    angles = message.position.tolist()
+    if angles and names and len(names) != len(angles):
+        raise InputError(
+            f"{where}: its names are {len(names)} and angles {len(angles)}"
+        )
+    if angles and len(set(names)) < len(names):
+        raise InputError(f"{where} names a joint twice")
+    joints = zip(names or range(len(angles)), angles, strict=False)
+    return {joint: angle for joint, angle in joints if math.isfinite(angle)}
+
+
+def values_of(kind: str, message: Any, options: LogOptions) -> NDArray[np.float64]:
+    """The values of a message, in the shape that it tells.
+
+    Raises:
+        Unusable: it has none.
+    """
+    if kind == IMAGE:
+        return image_values(message)
+    if kind in ARRAYS:
+        return array_values(message)
+    name = options.field
+    if name is None:
+        raise Unusable(f"is {kind}; give --field, the name of the values in it")
+    if options.axes is not None:
+        for axes in (".x .y .z", "x y z", "X Y Z"):
+            with suppress(Unusable):
+                values = [field_values(message, name + axis) for axis in axes.split()]
+                return np.stack(values, axis=-1)
+    return field_values(message, name)
 
 
 def image_values(message: Any) -> NDArray[np.float64]:
@@ -444,29 +395,8 @@ def field_values(message: Any, name: str) -> NDArray[np.float64]:
     value: Any = message
     for part in name.split("."):
         value = _part(value, part)
-    return np.atleast_1d(numbers_in(value, name))
-
-
-def json_values(counts: Any) -> NDArray[np.float64]:
-    """(rows, columns) values of a JSON message.
-
-    Raises:
-        Unusable: they are no numbers in rows and columns.
-    """
-    values = numbers_in(counts, "counts")
-    if values.ndim != 2:
-        raise Unusable(f"has counts of {values.shape} instead of rows and columns")
-    return values
-
-
-def numbers_in(value: Any, name: str) -> NDArray[np.float64]:
-    """Numbers in lists of any depth.
-
-    Raises:
-        Unusable: they are no numbers, or of no shape; the sentence names them.
-    """
     try:
-        return np.asarray(value, dtype=np.float64)
+        return np.atleast_1d(np.asarray(value, dtype=np.float64))
     except (TypeError, ValueError):
         raise Unusable(f"has no numbers in {name}") from None
 

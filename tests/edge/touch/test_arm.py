@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -105,6 +106,17 @@ def test_a_wrong_toml_chain_is_named(text, word, tmp_path):
 def test_an_axis_of_any_length_is_a_direction(axis):
     expected = Chain([Joint("j", (1.0, 1.0, 0.0))]).pose([1.0])
     assert Chain([Joint("j", axis)]).pose([1.0]) == pytest.approx(expected, abs=4e-16)
+
+
+@pytest.mark.parametrize("angle", [1e-300, 1e-5, math.pi, 1e6, 1e15])
+def test_a_turn_of_any_size_loses_no_digit(angle):
+    """Rodrigues' formula about (1, 1, 0), in 60 digits."""
+    turned = Chain([Joint("j", (1.0, 1.0, 0.0))]).pose([angle])[:3, :3]
+    with mpmath.workdps(60):
+        half = mpmath.sin(mpmath.mpf(angle) / 2) ** 2
+        across = mpmath.sin(angle) / mpmath.sqrt(2)
+    assert turned[0, 1] == pytest.approx(float(half), rel=4e-15)
+    assert turned[0, 2] == pytest.approx(float(across), rel=4e-15)
 
 
 def test_a_joint_that_slides_moves_along_its_axis():

@@ -1,6 +1,7 @@
 """Joint angles from outside: their own clock, and never a stale pose."""
 
 import json
+import math
 import os
 import socket
 import time
@@ -69,6 +70,16 @@ def test_the_senders_clock_need_not_be_ours(wire, ahead):
 def test_a_pose_between_two_lines_is_interpolated(wire):
     stream(wire)
     assert wire.at(0.0645) == pytest.approx([0.0625, -0.0625])
+
+
+def test_between_two_lines_an_angle_that_wraps_goes_the_shorter_way(wire):
+    """Half a turn is not crossed backwards through zero."""
+    for t, q in ((0.0, 3.14), (0.01, -3.14)):
+        wire.now = t
+        wire.send(t, [q, 0.0])
+        wire.at()
+    between = wire.at(0.005)
+    assert abs(math.remainder(between[0], 2.0 * math.pi)) == pytest.approx(math.pi)
 
 
 def test_the_last_pose_holds_no_longer_than_allowed(wire):

@@ -75,6 +75,7 @@ def test_every_share_is_that_of_a_loop_of_whole_numbers(biases, channels):
     assert len(set(expected)) > 20
 
 
+@pytest.mark.slow  # aeon compiles its functions
 @pytest.mark.parametrize(("biases", "channels"), [(1008, 32), (504, 36)])
 def test_every_share_is_that_of_aeon_s_minirocket_with_the_same_kernels(
     biases, channels

@@ -1,7 +1,5 @@
 """Arrays: which axis is the time, trials within a file, and sizes."""
 
-import argparse
-
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -9,8 +7,9 @@ from scipy.io import savemat
 from edge.errors import InputError
 from train.importers import arrays
 from train.importers.arrays import read_arrays, table_of, trials_of
+from train.importers.options import TableOptions
 
-OPTIONS = argparse.Namespace(axis=None, taxels=None, joints=None, time=None)
+OPTIONS = TableOptions()
 FRAMES = np.arange(24).reshape(6, 4)
 
 
@@ -53,14 +52,14 @@ def test_what_would_be_guessed_is_asked(stored, sentence):
 def test_an_axis_that_is_named_is_taken():
     square = np.arange(36).reshape(6, 6)
     stored = {"a": square, "b": np.ones((6, 2))}
-    named = argparse.Namespace(axis=2, taxels="a", joints=None, time=None)
+    named = TableOptions(axis=2, taxels="a")
     table = table_of("a.mat", stored, named)
     assert table.data.to_numpy().tolist() == square.T.tolist()
 
 
 def test_the_array_that_is_named_as_the_time_tells_the_frames():
     stored = {"clock": np.arange(6.0), "a": np.ones((6, 4)), "b": np.ones((4, 6))}
-    named = argparse.Namespace(axis=None, taxels=None, joints=None, time="clock")
+    named = TableOptions(time="clock")
     assert len(table_of("a.mat", stored, named).data) == 6
 
 
@@ -128,17 +127,20 @@ def trials_in(path):
 
 @pytest.mark.parametrize(
     "write",
-    [of_structures, several_structures, of_cells, of_cells_in_matlab_7_3, stacked],
+    [
+        of_structures,
+        several_structures,
+        of_cells,
+        of_cells_in_matlab_7_3,
+        of_groups,
+        stacked,
+    ],
 )
-def test_trials_are_cells_structures_or_a_first_axis(tmp_path, write):
-    path = tmp_path / ("a.h5" if write is of_cells_in_matlab_7_3 else "a.mat")
+def test_trials_are_cells_structures_groups_or_a_first_axis(tmp_path, write):
+    in_hdf5 = write in (of_cells_in_matlab_7_3, of_groups)
+    path = tmp_path / ("a.h5" if in_hdf5 else "a.mat")
     write(path)
     assert trials_in(path) == [{"object": "cup"}, {"object": "pen"}]
-
-
-def test_trials_are_groups(tmp_path):
-    of_groups(tmp_path / "a.h5")
-    assert trials_in(tmp_path / "a.h5") == [{"object": "cup"}, {"object": "pen"}]
 
 
 def test_a_grid_in_matlab_7_3_keeps_its_rows_and_columns(tmp_path):
@@ -165,10 +167,9 @@ def test_a_structure_within_a_trial_is_left_out(tmp_path):
     assert [list(arrays) for _, arrays in trials] == [["frames"], ["frames"]]
 
 
-@pytest.mark.parametrize("stored", [{}, {"a": np.zeros((0, 3))}])
-def test_a_file_without_trials_holds_no_values(stored):
+def test_a_file_without_trials_holds_no_values():
     with pytest.raises(InputError, match="holds no values"):
-        list(trials_of(stored, "object"))
+        list(trials_of({"a": np.zeros((0, 3))}, "object"))
 
 
 def test_arrays_with_other_numbers_of_trials_are_named():

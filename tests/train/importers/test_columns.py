@@ -1,13 +1,12 @@
 """What the columns of a table are taken for, and what is asked instead of guessed."""
 
-import argparse
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from edge.errors import InputError
 from train.importers.columns import meaning, times_of
+from train.importers.options import TableOptions
 from train.importers.reading import Table
 
 COUNTS = np.arange(5)
@@ -18,13 +17,8 @@ def table(*names, **columns):
     return Table("a.csv", data)
 
 
-def options(**words):
-    usual = dict.fromkeys(("time", "taxels", "joints", "time_unit", "rate"))
-    return argparse.Namespace(**{**usual, **words})
-
-
 def sense_of(source, **words):
-    return meaning(source, options(**words))
+    return meaning(source, TableOptions(**words))
 
 
 def test_taxels_are_those_of_a_stem_with_running_numbers():
@@ -136,7 +130,7 @@ def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit
     sense = sense_of(table("s1", **{name: COUNTS * step}))
     assert sense.unit == unit
     seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
-    times = times_of(table("s1", **{name: COUNTS * step}), sense, options())
+    times = times_of(table("s1", **{name: COUNTS * step}), sense, TableOptions())
     assert times == pytest.approx(COUNTS * step * seconds)
 
 
@@ -152,7 +146,7 @@ def test_iso_dates_are_times_whatever_their_column_is_called():
     source = table("s1", zeit=dates)
     sense = sense_of(source)
     assert sense.unit == "iso"
-    assert times_of(source, sense, options()) == pytest.approx(0.1 * COUNTS)
+    assert times_of(source, sense, TableOptions()) == pytest.approx(0.1 * COUNTS)
 
 
 @pytest.mark.parametrize(
@@ -164,14 +158,10 @@ def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
         sense_of(table("s1", t=COUNTS * step))
 
 
-def test_a_unit_that_is_named_is_taken():
-    assert sense_of(table("t", "s1"), time_unit="ms").unit == "ms"
-
-
 def test_what_is_no_date_is_named():
     source = table("s1", t=["2024-03-01T10:00", "noon", None, None, None])
     with pytest.raises(InputError, match=r"'noon' in column t is no ISO date \(row 2"):
-        times_of(source, sense_of(source, time_unit="iso"), options())
+        times_of(source, sense_of(source, time_unit="iso"), TableOptions())
 
 
 def test_a_line_says_what_was_taken():

@@ -6,23 +6,19 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from train.importers.counts import Rest, Trial, rest_of, shape_of_skin
+from train.importers.counts import Rest, Samples, rest_of
+from train.importers.options import ValueOptions, shape_of_skin
 
 NAN = float("nan")
 
 
-def options(**words):
-    usual = {"falls": False, "signed": False, "scale": 1.0}
-    return argparse.Namespace(**{**usual, **words})
-
-
-def trial(*rows, shear=None) -> Trial:
+def trial(*rows, shear=None) -> Samples:
     """A frame of some taxels each 10 ms."""
     t = 5.0 + 0.01 * np.arange(len(rows))
     values = np.array(rows, dtype=float)[..., None]
     if shear is not None:
         values = np.concatenate([values, shear], axis=2)
-    return Trial("a.csv", t, values)
+    return Samples("a.csv", t, values)
 
 
 def recorded(rest, trial):
@@ -32,11 +28,11 @@ def recorded(rest, trial):
 
 def signed(trial):
     """The recording of a trial whose values rise and fall."""
-    return recorded(rest_of([trial], options(signed=True)), trial)
+    return recorded(rest_of([trial], ValueOptions(signed=True)), trial)
 
 
 def test_counts_stay_as_they_are():
-    counted = recorded(rest_of([trial([0, 5], [7, 9])], options()), trial([0, 5]))
+    counted = recorded(rest_of([trial([0, 5], [7, 9])], ValueOptions()), trial([0, 5]))
     assert counted.frames.tolist() == [[[0, 5]]]
     assert counted.valid is None
     assert counted.shear is None
@@ -47,19 +43,19 @@ def test_counts_stay_as_they_are():
 def test_values_that_fall_are_subtracted_from_the_quietest_start():
     quiet = trial([100, 90], [100, 90], [100, 90], [60, 90])
     touched = trial([50, 90], [50, 90], [50, 90], [40, 90])
-    rest = rest_of([touched, quiet], options(falls=True))
+    rest = rest_of([touched, quiet], ValueOptions(falls=True))
     assert rest.values.tolist() == [[100], [90]]
     assert recorded(rest, quiet).frames[3].tolist() == [[40, 0]]
 
 
 def test_values_that_rise_where_they_should_fall_are_said(capsys):
-    rest_of([trial([100], [100], [100], [140])], options(falls=True))
+    rest_of([trial([100], [100], [100], [140])], ValueOptions(falls=True))
     sentence = "values above those at rest, by up to 40, count as 0; see --signed"
     assert sentence in capsys.readouterr().out
 
 
 def test_missing_values_are_counted_and_said(capsys):
-    rest_of([trial([1, NAN], [NAN, 2]), trial([1, NAN])], options())
+    rest_of([trial([1, NAN], [NAN, 2]), trial([1, NAN])], ValueOptions())
     assert "missing: 3 values" in capsys.readouterr().out
 
 
@@ -67,13 +63,13 @@ def test_missing_values_are_counted_and_said(capsys):
 def test_a_start_with_a_missing_value_is_not_the_quietest(kind, capsys):
     incomplete = trial([100, NAN], [100, 90], [100, 90])
     complete = trial([90, 80], [90, 80], [90, 80])
-    rest = rest_of([incomplete, complete], options(**{kind: True}))
+    rest = rest_of([incomplete, complete], ValueOptions(**{kind: True}))
     assert rest.values.tolist() == [[90], [80]]
     assert "at rest, which is never" not in capsys.readouterr().out
 
 
 def test_taxels_without_a_value_at_rest_are_said(capsys):
-    rest_of([trial([100, NAN], [100, 90], [100, 90])], options(falls=True))
+    rest_of([trial([100, NAN], [100, 90], [100, 90])], ValueOptions(falls=True))
     sentence = "1 taxel without a value at rest, which is never valid"
     assert sentence in capsys.readouterr().out
 
@@ -100,14 +96,8 @@ def test_shear_loses_its_rest_where_the_normal_does(sheared):
 
 
 def test_shear_stands_where_the_normal_does(sheared):
-    counted = recorded(rest_of([sheared], options()), sheared)
+    counted = recorded(rest_of([sheared], ValueOptions()), sheared)
     assert counted.shear[3].tolist() == [[[5, -10]]]
-
-
-def test_a_missing_value_is_not_valid():
-    counted = recorded(Rest(), trial([1, NAN]))
-    assert counted.valid.tolist() == [[[True, False]]]
-    assert counted.frames.tolist() == [[[1, 0]]]
 
 
 @pytest.mark.parametrize("unknown", [NAN, np.inf, -np.inf])
@@ -158,7 +148,7 @@ def test_a_long_recording_is_counted_in_parts(monkeypatch):
 
 def test_values_cannot_fall_and_be_signed():
     with pytest.raises(InputError, match="exclude each other"):
-        rest_of([trial([1])], options(falls=True, signed=True))
+        rest_of([trial([1])], ValueOptions(falls=True, signed=True))
 
 
 def test_a_shape_is_rows_and_columns():

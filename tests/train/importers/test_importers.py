@@ -103,10 +103,6 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
     ("content", "word"),
     [
         (b"BZh9 no bzip2", "Invalid data stream"),
-        (
-            bz2.compress(dsa().encode())[:-20],
-            "file ended before the end-of-stream marker",
-        ),
         (dsa()[:-20], "unclosed token"),
         ('<!DOCTYPE x [<!ENTITY a "b">]>' + dsa(), "declares a document type"),
         (dsa(frames=[], stamps=()), "has no frame"),
@@ -115,11 +111,6 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa(width="-1"), "texel_width must be"),
         (dsa(frames=[[-485]], stamps=(0,)), "does not unpack to 486"),
         (dsa(frames=[[-485, 0.5]], stamps=(0,)), "no whole number"),
-        (dsa(frames=[[float("nan")]], stamps=(0,)), "no whole number"),
-        (
-            dsa().replace("C3F30000", "C3F3"),
-            "buffer size must be a multiple of element size",
-        ),
         (dsa().replace("C3F30000", "hello"), "non-hexadecimal number"),
         (dsa().replace('index="0"', f'index="{"1" * 5000}"'), "limit (4300 digits)"),
         (dsa().replace("<time_stamp>1032</time_stamp>", ""), "time_stamp must be"),

@@ -1,0 +1,175 @@
+"""What a user says of the values in a file: options of the command, and their record."""
+
+import argparse
+import re
+from dataclasses import dataclass, fields
+from typing import Self
+
+from edge.commands.options import within
+from train.importers.axes import LETTERS, Axes
+
+UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+FASTEST_HZ = 1e6
+"""A higher frame rate must be a mistake."""
+
+
+def shape_of_skin(text: str) -> tuple[int, int]:
+    """The rows and columns of `--shape`.
+
+    Raises:
+        ArgumentTypeError: the text is no shape.
+    """
+    shape = re.fullmatch(r"([0-9]{1,4})x([0-9]{1,4})", text)
+    if shape is None:
+        raise argparse.ArgumentTypeError(
+            f"must be ROWSxCOLS, such as 16x24, not {text[:40]!r}"
+        )
+    return int(shape[1]), int(shape[2])
+
+
+def axis_letters(text: str) -> str:
+    """The letters of the axes along the rows, around the columns, and of the normal.
+
+    Raises:
+        ArgumentTypeError: they are not x, y and z in some order.
+    """
+    if sorted(text.lower()) != LETTERS:
+        raise argparse.ArgumentTypeError(
+            f"must be x, y and z in some order, such as xyz, not {text[:20]!r}"
+        )
+    return text.lower()
+
+
+def flipped_letters(text: str) -> str:
+    """The letters of the axes whose sign is turned round.
+
+    Raises:
+        ArgumentTypeError: one of them is not x, y or z.
+    """
+    if not text or not set(text.lower()) <= set(LETTERS):
+        raise argparse.ArgumentTypeError(
+            f"must be some of x, y and z, such as x or xz, not {text[:20]!r}"
+        )
+    return text.lower()
+
+
+def add_value_options(parser: argparse.ArgumentParser) -> None:
+    """Add options on the meaning of values."""
+    add = parser.add_argument
+    add(
+        "--shape",
+        type=shape_of_skin,
+        metavar="ROWSxCOLS",
+        help="of the skin (default: as the file tells it, or one row)",
+    )
+    add(
+        "--falls",
+        action="store_true",
+        help="values fall under pressure: subtract them from those at rest, which are "
+        "those of the trial with the quietest start",
+    )
+    add(
+        "--signed",
+        action="store_true",
+        help="values rise and fall: count how far they are from those at rest",
+    )
+    add(
+        "--scale",
+        type=within(float, 1e-12, 1e12),
+        default=1.0,
+        help="counts in a unit of values with fractions",
+    )
+    add(
+        "--axes",
+        type=axis_letters,
+        metavar="XYZ",
+        help="taxels of three axes, such as s1_x, s1_y, s1_z: the letters of the axes "
+        "along the rows, around the columns, and of the normal force",
+    )
+    add(
+        "--flip",
+        type=flipped_letters,
+        metavar="XYZ",
+        help="letters of the axes whose sign is turned round",
+    )
+
+
+def add_table_options(parser: argparse.ArgumentParser) -> None:
+    """Add options for the facts that a table lacks."""
+    rate = within(float, 1e-3, FASTEST_HZ)
+    add = parser.add_argument
+    add("--rate", type=rate, metavar="HZ", help="frames a second, without a time")
+    add(
+        "--frames",
+        action="store_true",
+        help="a folder is a trial, and a file in it a frame, named by its time in "
+        "seconds, or by its number if --rate is given",
+    )
+    add(
+        "--trials",
+        action="store_true",
+        help="a file of arrays holds several trials: cells, structures, or a first axis",
+    )
+    add("--time", metavar="COL", help="the time (default: a column of such a name)")
+    add(
+        "--time-unit",
+        choices=(*UNITS_S, "iso"),
+        help="unit of the times (default: by name or steps, where they leave no doubt)",
+    )
+    add("--taxels", metavar="COLS", help="the taxels (default: by running numbers)")
+    add("--joints", metavar="COLS", help="joint angles in radians")
+    add("--degrees", action="store_true", help="joint angles are in degrees")
+    add("--axis", type=within(int, 1, 4), help="axis of time of arrays, from 1")
+    add(
+        "--task",
+        default="object",
+        help="the task of these labels (default: %(default)s)",
+    )
+    add("--strict", action="store_true", help="stop at the first file that is unusable")
+    add_value_options(parser)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValueOptions:
+    """The options on the meaning of values, by their names; `axes` with their signs."""
+
+    shape: tuple[int, int] | None = None
+    falls: bool = False
+    signed: bool = False
+    scale: float = 1.0
+    axes: Axes | None = None
+
+    @classmethod
+    def of(cls, arguments: argparse.Namespace) -> Self:
+        """The record of parsed options.
+
+        Raises:
+            InputError: axes are turned round that are not named.
+        """
+        words = {field.name: getattr(arguments, field.name) for field in fields(cls)}
+        words["axes"] = Axes.of(arguments.axes, arguments.flip)
+        return cls(**words)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableOptions(ValueOptions):
+    """The options for the facts that a table lacks, by their names."""
+
+    rate: float | None = None
+    frames: bool = False
+    trials: bool = False
+    time: str | None = None
+    time_unit: str | None = None
+    taxels: str | None = None
+    joints: str | None = None
+    degrees: bool = False
+    axis: int | None = None
+    task: str = "object"
+    strict: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogOptions(ValueOptions):
+    """The options for a log; `field` names the values in a sensor's own message."""
+
+    field: str | None = None

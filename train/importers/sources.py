@@ -1,0 +1,444 @@
+"""The trials of a table, a folder of tables or a folder of frames, with their labels,
+before their columns are understood."""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from edge.commands.output import counted
+from edge.config import short_text
+from edge.errors import InputError, about
+from edge.files import parsing
+from train.importers import Refused, arrays
+from train.importers.columns import columns, is_date, named_times
+from train.importers.options import TableOptions
+from train.importers.reading import (
+    TEXTS,
+    Table,
+    inner,
+    numbered,
+    read_frame,
+    read_labels,
+    read_parquet,
+    read_text,
+    require_filled,
+    suffix_of,
+)
+from train.progress import say
+
+LABELS = "labels.csv"
+SKIN = "skin.json"
+SUFFIXES = (*TEXTS, ".parquet", *arrays.SUFFIXES)
+NUMBERED = re.compile(r"(?:trial|rec|recording|run|take|sample|test)?[\s_.-]*\d+", re.I)
+"""Names of folders that only count trials."""
+SPARSEST = 64
+"""Cells for each value of a long table; more would be nearly empty."""
+Before = TypeVar("Before")
+After = TypeVar("After")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A trial before its columns are understood.
+
+    Attributes:
+        name: of the trial.
+        table: its values.
+        labels: {task: label}.
+        label: where the label comes from; empty if the names of its file tell it.
+    """
+
+    name: str
+    table: Table
+    labels: dict[str, str] = field(default_factory=dict)
+    label: str = ""
+
+
+def tried(
+    items: Iterable[Before | Refused],
+    change: Callable[[Before], After],
+    strict: bool,
+) -> Iterator[After | Refused]:
+    """What a function makes of each item, or why it refuses it.
+
+    Raises:
+        InputError: it refuses one, and the user is strict.
+    """
+    for item in items:
+        if isinstance(item, Refused):
+            yield item
+        else:
+            yield from until_refused(map(change, [item]), strict)
+
+
+def until_refused(
+    items: Iterable[After],
+    strict: bool,
+) -> Iterator[After | Refused]:
+    """Some items; if what makes them refuses to go on, in the end why.
+
+    Raises:
+        InputError: it does, and the user is strict.
+    """
+    try:
+        yield from items
+    except InputError as error:
+        if strict:
+            raise
+        yield Refused(str(error))
+
+
+def sources_in(path: Path, options: TableOptions) -> Iterator[Source | Refused]:
+    """The trials of a file or folder, with the labels that labels.csv beside them or
+    else the names of files and folders tell.
+
+    Raises:
+        InputError: labels.csv names none of the trials, or a file cannot be used with
+            `--strict`.
+    """
+    folder = path if path.is_dir() else path.parent
+    sources = _sources(path, folder, options)
+    if (folder / LABELS).is_file():
+        return _labelled(list(sources), folder / LABELS, options.task)
+    return sources
+
+
+def _labelled(
+    sources: Sequence[Source | Refused],
+    path: Path,
+    task: str,
+) -> Iterator[Source | Refused]:
+    """The trials with the labels of a labels.csv instead of those of the files' names.
+
+    Raises:
+        InputError: it names none of the trials.
+    """
+    trials = [source.name for source in sources if isinstance(source, Source)]
+    rows = _label_rows(path, trials)
+    files = {_name(file, path.parent) for file in _visible(path.parent)}
+    for row in rows:
+        if row not in trials and row not in files:
+            yield Refused(f"{path}: {row} names no file")
+    for source in sources:
+        if isinstance(source, Refused):
+            yield source
+            continue
+        if source.name not in rows:
+            yield Refused(f"{path}: has no row for {source.name}, which has no label")
+        others = {key: source.labels[key] for key in source.labels if key != task}
+        labels = others | rows.get(source.name, {})
+        yield replace(source, labels=labels, label=LABELS)
+
+
+def _label_rows(path: Path, trials: list[str]) -> dict[str, dict[str, str]]:
+    """{trial: {task: label}} of a labels.csv."""
+    data = read_labels(path)
+    if "trial" not in data or not data["trial"].isin(trials).any():
+        raise InputError(
+            f"{path}: needs a column trial with names such as {short_text(trials)}"
+        )
+    require_filled(path, data, "trial")
+    repeated = data["trial"][data["trial"].duplicated()]
+    if len(repeated):
+        raise InputError(f"{path}: {repeated.iloc[0]} has two rows; remove one of them")
+    rows = data.set_index("trial").iterrows()
+    return {str(trial): row.dropna().to_dict() for trial, row in rows}
+
+
+def _sources(
+    path: Path,
+    folder: Path,
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
+    """The trials of the file, or of the files or folders in the folder."""
+    places = [path]
+    if options.frames:
+        places = [place for place in _visible(path) if place.is_dir()]
+    elif path.is_dir():
+        places = _files(_visible(path))
+    read = _of_frames if options.frames else _of_file
+    counting = _counting([place.relative_to(folder) for place in places])
+    for place in places:
+        labels, label = _label(place.relative_to(folder), counting, options.task)
+        for source in until_refused(read(place, folder, options), options.strict):
+            if isinstance(source, Refused) or source.label:
+                yield source
+            else:
+                yield replace(source, labels=labels, label=label)
+
+
+def _visible(folder: Path) -> list[Path]:
+    """What a folder holds, without what is hidden."""
+    return [
+        place
+        for place in sorted(folder.rglob("*"))
+        if not any(part.startswith(".") for part in place.relative_to(folder).parts)
+    ]
+
+
+def _files(paths: Iterable[Path]) -> list[Path]:
+    """The tables among paths; says how many files are none."""
+    tables = []
+    foreign = []
+    for path in paths:
+        if path.name in (LABELS, SKIN):
+            continue
+        if suffix_of(path) in SUFFIXES:
+            tables.append(path)
+        elif path.is_file():
+            foreign.append(path)
+    if tables and foreign:
+        count = counted(len(foreign), "file")
+        say(f"left out {count} of another format, such as {foreign[0]}")
+    return tables
+
+
+def _counting(places: Sequence[Path]) -> set[str]:
+    """The names of folders that only count trials: words such as trial_1, and on each
+    level below the first, names that differ in their numbers alone."""
+    counting = set()
+    levels = max((len(place.parts) for place in places), default=0)
+    for level in range(levels):
+        names = {place.parts[level] for place in places if place.parts[level + 1 :]}
+        stems = {re.sub(r"[\d\W_]+$", "", name) for name in names}
+        if level and len(stems) == 1 and stems.isdisjoint(names):
+            counting |= names
+        counting |= set(filter(NUMBERED.fullmatch, names))
+    return counting
+
+
+def _label(
+    place: Path,
+    counting: Set[str],
+    task: str,
+) -> tuple[dict[str, str], str]:
+    """The labels that the names of a file and its folders tell, and how."""
+    kind = "folder's"
+    names = [part for part in place.parts[:-1] if part not in counting]
+    if not names:
+        kind = "file's"
+        names = [re.sub(r"[\s_.-]*\d+$", "", inner(place).stem)]
+    label = names[-1]
+    if not label:
+        return {}, "none, as the files' names only count"
+    return {task: label}, f'the {kind} name, such as "{label}"'
+
+
+def _of_file(
+    file: Path,
+    folder: Path,
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
+    """The trials in a file."""
+    suffix = suffix_of(file)
+    if suffix in arrays.SUFFIXES:
+        stored = arrays.read_arrays(file)
+        if options.trials:
+            yield from _of_arrays(file, stored, options)
+            return
+        with about(str(file)):
+            table = arrays.table_of(str(file), stored, options)
+    else:
+        table = read_parquet(file) if suffix == ".parquet" else read_text(file)
+    if "trial" in table.names:
+        with parsing(str(file), "a table of trials"):
+            yield from _trials_in(table, options)
+    else:
+        yield Source(_name(file, folder), table)
+
+
+def _name(file: Path, folder: Path) -> str:
+    """The name of the trial in a file."""
+    return "_".join(inner(file.relative_to(folder)).with_suffix("").parts)
+
+
+def _of_arrays(
+    file: Path,
+    stored: arrays.Arrays,
+    options: TableOptions,
+) -> Iterator[Source | Refused]:
+    """The trials in a file of arrays."""
+    with about(str(file)):
+        trials = list(arrays.trials_of(stored, options.task))
+
+    def source(numbered: tuple[int, arrays.Labelled]) -> Source:
+        number, (labels, of_trial) = numbered
+        name = f"{file.stem}_{number:03}"
+        where = f"{file}: trial {name}"
+        with about(where):
+            table = arrays.table_of(where, of_trial, options)
+        return Source(name, table, labels, "the arrays" if labels else "")
+
+    return tried(enumerate(trials), source, options.strict)
+
+
+def _of_frames(
+    inside: Path,
+    folder: Path,
+    options: TableOptions,
+) -> Iterator[Source]:
+    """The trial of a folder with a file for each frame, if it has files."""
+    files = sorted(p for p in inside.glob("[!.]*") if suffix_of(p) in SUFFIXES)
+    if not files:
+        return
+    frames = [_frame(file) for file in files]
+    shape = frames[0].shape
+    for file, frame in zip(files, frames, strict=True):
+        if frame.shape != shape:
+            sizes = [" x ".join(map(str, size)) for size in (frame.shape, shape)]
+            raise InputError(f"{file}: is {sizes[0]} taxels, and {files[0]} {sizes[1]}")
+    values = np.reshape(frames, (len(files), -1))
+    data = pd.DataFrame(values, columns=numbered("", values.shape[1]))
+    if options.rate is None:
+        data.insert(0, "time_s", _times_in_names(inside, files))
+        data = data.sort_values("time_s", kind="stable", ignore_index=True)
+    table = Table(str(inside), data, named=False, shape=shape)
+    yield Source("_".join(inside.relative_to(folder).parts), table)
+
+
+def _times_in_names(inside: Path, files: Sequence[Path]) -> list[float]:
+    """The times that the names of a folder's files are."""
+    kind = "a folder of files that are named by their times"
+    with parsing(str(inside), kind, "; give --rate"):
+        t = [float(inner(file).stem) for file in files]
+        if not np.isfinite(t).all():
+            raise ValueError("a time is not finite")
+    return t
+
+
+def _frame(file: Path) -> NDArray[np.float64]:
+    """(rows, columns) of the numbers in a file."""
+    if suffix_of(file) == ".npy":
+        frame = np.atleast_2d(arrays.read_arrays(file)[""])
+        with parsing(str(file), "a frame"):
+            return frame.astype(np.float64)
+    return read_frame(file)
+
+
+def _trials_in(table: Table, options: TableOptions) -> Iterator[Source | Refused]:
+    """The trials of a long table."""
+    for name in {"trial", "taxel"} & set(table.names):
+        require_filled(table.where, table.data, name)
+    tasks = _tasks_in(table, options.task)
+    label = f"column {', column '.join(tasks)}" if tasks else "none"
+
+    def source(trial: tuple[Any, pd.DataFrame]) -> Source:
+        name, rows = trial
+        where = f"{table.where}: trial {name}"
+        labels = _labels_in(where, rows[tasks])
+        data = rows.drop(columns=["trial", *tasks])
+        names = tuple(table.names)
+        part = replace(table, where=where, data=data, file_names=names)
+        if "taxel" in data:
+            part = _pivoted(part, options.time)
+        return Source(str(name), part, labels, label)
+
+    trials = table.data.groupby("trial", sort=False)
+    return tried(trials, source, options.strict)
+
+
+def _tasks_in(table: Table, task: str) -> list[str]:
+    """The columns of labels of a long table: that of the task, and those of texts, apart
+    from times that run within a trial. A number among texts is a label if it stays the
+    same within its trial."""
+    tasks = []
+    for name in table.names:
+        column = table.data[name]
+        if name in ("trial", "taxel") or pd.api.types.is_numeric_dtype(column):
+            is_task = name == task
+        else:
+            texts = column.astype(str).groupby(table.data["trial"])
+            words = pd.to_numeric(column, errors="coerce").isna().all()
+            runs = texts.nunique().max() > 1
+            is_task = not runs or (words and not is_date(table, name))
+        if is_task:
+            tasks.append(name)
+    return tasks
+
+
+def _labels_in(where: str, rows: pd.DataFrame) -> dict[str, str]:
+    """The labels in the rows of a trial."""
+    labels = {}
+    for task, column in rows.items():
+        first, *further = [
+            _plain(cell) for cell in column.astype(object).fillna("").unique()
+        ]
+        if further:
+            raise InputError(
+                f"{where}: {task} changes, from {short_text(first)} to {short_text(further[0])}"
+            )
+        if first:
+            labels[str(task)] = first
+    return labels
+
+
+def _pivoted(table: Table, time_terms: str | None) -> Table:
+    """A row for each time and a column for each taxel, of a table with a row for each
+    value."""
+    further = [name for name in table.names if name not in ("taxel", "value")]
+    time = _time_of_long(table, further, time_terms)
+    _check_long(table, time)
+    wide = table.data.pivot(index=time, columns="taxel", values="value")
+    wide = wide[sorted(wide.columns, key=_natural)].rename(columns=_plain)
+    if not wide.columns.is_unique or time in wide:
+        raise InputError(
+            f"{table.where} has two taxels of one name; rename one of them"
+        )
+    form = [f'left out: "{name}"' for name in further if name != time]
+    return replace(
+        table,
+        data=wide.reset_index(),
+        named=False,
+        form=(*table.form, *form),
+        file_names=tuple(wide.columns),
+    )
+
+
+def _time_of_long(
+    table: Table,
+    further: Sequence[str],
+    terms: str | None,
+) -> str:
+    times = named_times(table) or further
+    if terms:
+        times = columns(table, terms)
+    if "value" not in table.data or len(times) != 1:
+        raise InputError(
+            f"{table.where}: needs the columns value and a time beside taxel, which "
+            "--time names"
+        )
+    return times[0]
+
+
+def _check_long(table: Table, time: str) -> None:
+    """Refuse two values of a taxel at one time, and taxels without times in common."""
+    data = table.data
+    repeated = data[data.duplicated([time, "taxel"])]
+    if len(repeated):
+        row = repeated.iloc[0]
+        raise InputError(
+            f"{table.where} has two values of taxel {_plain(row['taxel'])} at time "
+            f"{row[time]}"
+        )
+    cells = data[time].nunique() * data["taxel"].nunique()
+    if cells > SPARSEST * len(data):
+        raise InputError(
+            f"{table.where}: its {len(data)} values would fill {len(data) / cells:.1%} "
+            "of a table; the taxels need times in common"
+        )
+
+
+def _plain(name: Any) -> str:
+    return f"{name:g}" if isinstance(name, float) else str(name)
+
+
+def _natural(name: Any) -> list[Any]:
+    """A key that sorts s2 before s10."""
+    words = re.split(r"(\d+)", _plain(name))
+    return [int(word) if word.isdigit() else word for word in words]
