@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from edge.errors import OutOfRange
+from edge.answers import answers_about
 from edge.events import Aside, Decided, Event, Onset, Release
-from edge.model.info import NOVELTY_RATE, UNKNOWN, check_rate
-from edge.model.model import Decision, Model
-from edge.touch.contact import Contact, FeatureSeries
-from edge.touch.doubts import flags_of, frame_doubts
+from edge.model.model import Model
+from edge.touch.contact import Contact
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -26,15 +24,6 @@ if TYPE_CHECKING:
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
 
-AS_TRAINED = "as_trained"
-"""Flag of a decision at distance 0 from a training trial: the two have the same
-coordinates, which are all that the model compares. Nearly always the touch is that
-trial, replayed. Features that were constant in training, or have no weight in the
-projection, may differ."""
-OUT_OF_RANGE = "out_of_range"
-"""Flag of a decision on features that lie far outside those of the training trials. The
-model cuts them off before it compares them; features that it cannot scale at all get no
-label."""
 ASKED_A_SECOND = 200.0
 """Questions to the model about several contacts. Each takes one to two milliseconds on
 a workstation; 16 contacts with a decision point every tenth of a second need 160."""
@@ -93,17 +82,7 @@ class Classifier:
     the label of the task with the most labels, such as the object, is then "unknown".
     `unsure` flags that the window ended before the confidence was reached.
 
-    Flags of a decision: `unknown` (the contact is unlike everything in training; only a
-    model with decision points can tell), `tie` (another label had as many votes),
-    `short` (the stream ended inside the window; the last values were held), `late` (the
-    contact began before the first frame), `gap` (frames are missing in much of the
-    window, or its times are not in seconds), `frozen` (frames repeat bit for bit),
-    `several` (a second region beside the contact, as training seldom had),
-    `still_joints` and `joint_limits` (joint angles never change, or lie beyond their
-    limits; see `edge.touch.doubts`), `missing_taxels` (taxels could not be read),
-    `missing_pose` (joint angles were absent in part of the window), `skin_motion`
-    (motion was measured on the skin, though the model's is in the world), `as_trained`
-    (see `AS_TRAINED`) and `out_of_range` (see `OUT_OF_RANGE`).
+    A decision has flags, the reasons to doubt it: see `edge.flags`.
 
     A task that was trained with recordings of no contact is decided by `finish` where
     there was none, flagged `no_contact` and at the time of the last frame;
@@ -118,7 +97,6 @@ class Classifier:
         layout: SkinLayout | None = None,
         *,
         error: float | None = None,
-        novelty_rate: float = NOVELTY_RATE,
         max_contacts: int = 1,
         motion_on_skin: bool = False,
     ) -> None:
@@ -129,8 +107,6 @@ class Classifier:
             layout: the skin that gives the frames; None for the model's own.
             error: the accepted share of wrong decisions, in (0, 1), for decisions as
                 early as that allows; None decides at the full window.
-            novelty_rate: the accepted share of contacts with trained objects that are
-                called unknown. The certified errors hold for the default.
             max_contacts: how many regions to follow at once. 1 follows the largest;
                 with more, each event names its contact, and each decision its position.
             motion_on_skin: if the first frame of a contact has no joint angles, measure
@@ -138,16 +114,14 @@ class Classifier:
                 left out, flagged `missing_pose`.
 
         Raises:
-            InputError: the skin is not the one that the model was made for, a rate is
-                outside (0, 1), or the model certifies the error rate for no task.
+            InputError: the skin is not the one that the model was made for, the error rate
+                is outside (0, 1), or the model certifies it for no task.
         """
-        check_rate(novelty_rate, "the novelty rate")
         self.model = model
         self._points_s = model.decision_points_s
         self._last = len(self._points_s) - 1
         """Index of the last decision point."""
         self.error = error
-        self.novelty_rate = novelty_rate
         self._max_contacts = max_contacts
         self._motion_on_skin = motion_on_skin
         self._policies: Mapping[str, Policy] = {}
@@ -157,10 +131,11 @@ class Classifier:
 
             self._policies = policies(model, error)
         self.tracker = model.info.tracker(
-            layout or model.info.layout, max_contacts=max_contacts
+            layout or model.info.layout,
+            max_contacts=max_contacts,
+            motion_on_skin=motion_on_skin,
         )
-        self.tracker.motion_on_skin = motion_on_skin
-        self.layout = self.tracker.layout
+        self.layout = self.tracker.tracker.layout
         self._pending: list[Pending] = []
         self._numbers: dict[Contact, int | None] = {}
         """The numbers of the contacts under way; None if one is followed."""
@@ -319,7 +294,6 @@ class Classifier:
             self.model,
             layout,
             error=self.error,
-            novelty_rate=self.novelty_rate,
             max_contacts=self._max_contacts,
             motion_on_skin=self._motion_on_skin,
         )
@@ -335,121 +309,22 @@ class Classifier:
         short: bool = False,
     ) -> list[Decided]:
         """Ask the model about a contact; the answers of the tasks now decided."""
-        info = self.model.info
         point = pending.decision_point
-        window_s = self._points_s[point]
-        series = pending.contact.series()
-        blank = self._blank(pending, series, window_s, short)
-        try:
-            vector = info.vector(series, window_s)
-            decisions = self.model.decide(vector, point)
-        except OutOfRange:
-            blank = replace(blank, flags=(*blank.flags, OUT_OF_RANGE))
-            answers = [replace(blank, task=task) for task in pending.tasks]
-        else:
-            unknown = False
-            if info.novelty is not None:
-                score = decisions[info.novelty.task].novelty
-                unknown = info.novelty.rate(point, score) <= self.novelty_rate
-            if unknown and point == self._last:
-                from edge.model.unusual import unusual  # few contacts are unknown
-
-                phrase = unusual(vector, info.widths, info.usual)
-                blank = replace(blank, unusual=phrase)
-            answers = self._answers(pending, blank, decisions, unknown)
-        pending.decision_point += 1
-        for answer in answers:
-            pending.tasks.remove(answer.task)
-        latency_ms = round((time.perf_counter() - began) * 1e3, 3)
-        return [replace(answer, latency_ms=latency_ms) for answer in answers]
-
-    def _blank(
-        self,
-        pending: Pending,
-        series: FeatureSeries,
-        window_s: float,
-        short: bool,
-    ) -> Decided:
-        """An answer about a contact, with the doubts of its frames, without task and
-        label."""
-        contact = pending.contact
-        info = self.model.info
-        limits = () if info.chain is None else info.chain.limits
-        doubts = {
-            "short": short,
-            **frame_doubts(series, window_s, info.several, limits),
-            "missing_taxels": contact.missing_taxels,
-            "missing_pose": contact.missing_pose,
-            "late": contact.late,
-            "skin_motion": contact.chain is None and info.chain is not None,
-        }
-        position = None
-        if self._max_contacts > 1:
-            del doubts["several"]
-            position = contact.position()
-        if position is not None:
-            x, y, z = (round(metres, 6) for metres in position)
-            position = x, y, z
-        return Decided(
-            task="",
-            label=None,
-            confidence=0.0,
-            window_s=window_s,
-            onset_s=contact.onset_s,
-            latency_ms=0.0,
-            flags=flags_of(doubts),
-            contact=pending.number,
-            position=position,
-            model=self.model.named,
-        )
-
-    def _answers(
-        self,
-        pending: Pending,
-        blank: Decided,
-        decisions: Mapping[str, Decision],
-        unknown: bool,
-    ) -> list[Decided]:
-        """The answers of the tasks that need not wait any longer."""
-        answers = []
-        for task in pending.tasks:
-            candidate = self._answer(blank, task, decisions[task], unknown)
+        answers = answers_about(self.model, pending.contact, pending.number, point)
+        decided = []
+        for task in list(pending.tasks):
+            candidate = answers[task].flagged(short=short)
             answer: Decided | None = candidate
-            if self._policies:
-                answer = self._policies[task].answer(
-                    candidate,
-                    pending.decision_point,
-                    pending.decided,
-                )
+            if self._policies and candidate.decision is not None:
+                policy = self._policies[task]
+                answer = policy.answer(candidate, point, pending.decided)
             if answer is not None:
                 pending.decided[task] = answer
-                answers.append(answer)
-        return answers
-
-    def _answer(
-        self,
-        blank: Decided,
-        task: str,
-        decision: Decision,
-        unknown: bool,
-    ) -> Decided:
-        """The model's answer, with its confidence rounded to millionths."""
-        confidence = decision.confidence
-        doubts = {
-            AS_TRAINED: decision.distances[0] == 0.0,
-            OUT_OF_RANGE: decision.out_of_range,
-            UNKNOWN: unknown,
-            "tie": decision.tie and self.error is None,
-        }
-        return replace(
-            blank,
-            task=task,
-            label=decision.label,
-            confidence=None if confidence is None else round(confidence, 6),
-            flags=(*blank.flags, *flags_of(doubts)),
-            nearest=tuple(map(self.model.info.trial, decision.neighbours.tolist())),
-            decision=decision,
-        )
+                pending.tasks.remove(task)
+                decided.append(answer)
+        pending.decision_point += 1
+        latency_ms = round((time.perf_counter() - began) * 1e3, 3)
+        return [replace(answer, latency_ms=latency_ms) for answer in decided]
 
 
 def suited(model: Model, recording: Recording, name: str) -> Recording:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.agreement import product_label
-from edge.model.info import UNKNOWN, ModelInfo, StoppingRule, check_rate
+from edge.model.info import (
+    UNKNOWN,
+    ModelInfo,
+    Stopping,
+    StoppingRule,
+    check_rate,
+    logistic,
+    margin,
+)
 from edge.model.model import Decision, Model
 from edge.model.refusal import refusal
 
@@ -32,6 +40,18 @@ def policies(model: Model, error: float) -> Mapping[str, Policy]:
     return policy_of
 
 
+def is_sure(
+    stopping: Stopping,
+    rule: StoppingRule,
+    distances: Sequence[float],
+    label: int,
+    excess: float,
+) -> bool:
+    """Whether a label is sure enough for a rule; see `Stopping.confidence`."""
+    log_odds = stopping.slope * margin(distances, label) + stopping.intercept
+    return logistic(log_odds - stopping.doubt * excess) >= rule.confidence
+
+
 class Uncertified:
     """Decide at the end of the window, as without an error rate, and say so."""
 
@@ -47,8 +67,7 @@ class Uncertified:
         """The model's answer at the last decision point."""
         if point < self._full:
             return None
-        tie = ("tie",) if _decision(candidate).tie else ()
-        return replace(candidate, flags=(*candidate.flags, *tie, "uncertified"))
+        return candidate.flagged(uncertified=True)
 
 
 class Early:
@@ -108,7 +127,7 @@ class Early:
         label = self._task.labels.index(decision.label)
         excess = novelty.excess(point, decision.novelty)
         distances = decision.label_distances.tolist()
-        return self._stopping.sure(self._rule, distances, label, excess)
+        return is_sure(self._stopping, self._rule, distances, label, excess)
 
     def _answered(self, candidate: Decided, point: int, sure: bool) -> Decided:
         """The answer of the rule."""
@@ -121,9 +140,10 @@ class Early:
                 confidence=round(1.0 - rate, 6),
             )
         elif not sure and not self._rule.fixed:
-            candidate = replace(candidate, flags=(*candidate.flags, "unsure"))
+            candidate = candidate.flagged(unsure=True)
         stopped_by = "confidence" if sure else "window"
-        return replace(candidate, error=self._error, stopped_by=stopped_by)
+        answer = replace(candidate, error=self._error, stopped_by=stopped_by)
+        return answer.flagged(tie=False)  # the rule does not go by votes
 
 
 class Product(Early):

@@ -3,9 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
+from edge.flags import in_order
 from edge.model.model import Decision
 
 MOST_PLACES = 6
@@ -51,7 +52,7 @@ class Decided:
         window_s: seconds from onset on which the decision is based.
         onset_s: when the contact began; without a contact, when the stream ended.
         latency_ms: from the frame that completed the window to the answer.
-        flags: reasons for doubt, see `Classifier`.
+        flags: reasons for doubt, see `edge.flags`.
         error: the certified error rate, if one was asked for.
         stopped_by: with an error rate, `confidence`, or `window` if the stopping rule's
             last decision point came first.
@@ -84,6 +85,16 @@ class Decided:
     unusual: str | None = None
     nearest: tuple[str, ...] = field(default=(), compare=False, repr=False)
     decision: Decision | None = field(default=None, compare=False, repr=False)
+
+    def flagged(self, **doubts: bool) -> Self:
+        """The decision with the flags that hold, and without those that do not.
+
+        Args:
+            doubts: {flag: whether it holds}, of those in `edge.flags`.
+        """
+        held = dict.fromkeys(self.flags, True) | doubts
+        flags = in_order({flag for flag, holds in held.items() if holds})
+        return replace(self, flags=flags)
 
     def to_dict(self) -> dict[str, Any]:
         """The event as a JSON object."""

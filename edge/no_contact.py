@@ -6,7 +6,6 @@ import numpy as np
 
 from edge.events import Decided
 from edge.model.model import Model
-from edge.touch.doubts import flags_of
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -34,11 +33,6 @@ class Untouched:
             end_s: when the stream ended.
             began: when the question was asked, by `time.perf_counter`.
         """
-        doubts = {
-            "no_contact": True,
-            "missing_taxels": self._missing_taxels,
-            "near_contact": self._strongest > self._layout.threshold_counts,
-        }
         answers = []
         for name, task in self._model.info.tasks.items():
             if task.no_contact is not None:
@@ -49,9 +43,12 @@ class Untouched:
                     window_s=0.0,
                     onset_s=end_s,
                     latency_ms=round((time.perf_counter() - began) * 1e3, 3),
-                    flags=flags_of(doubts),
                     strongest=round(self._strongest / max(self._layout.onset, 1), 3),
                     model=self._model.named,
+                ).flagged(
+                    no_contact=True,
+                    missing_taxels=self._missing_taxels,
+                    near_contact=self._strongest > self._layout.threshold_counts,
                 )
                 answers.append(answer)
         return answers

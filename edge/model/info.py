@@ -13,7 +13,8 @@ from edge.arrays import Floats
 from edge.errors import InputError
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import WatchfulTracker
+from edge.touch.still import WatchfulTracker
+from edge.touch.track import ContactTracker
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain
@@ -122,7 +123,8 @@ def margin(distances: Sequence[float], label: int) -> float:
     return nearest_rival - distance if distance < math.inf else -math.inf
 
 
-def _logistic(x: float) -> float:
+def logistic(x: float) -> float:
+    """1 / (1 + exp(-x)), which never overflows."""
     return 0.5 + 0.5 * math.tanh(0.5 * x)
 
 
@@ -204,18 +206,7 @@ class Stopping:
         """
         log_odds = self.slopes[decision_point] * margin(distances, label)
         log_odds += self.intercepts[decision_point]
-        return _logistic(log_odds - self.doubts[decision_point] * excess)
-
-    def sure(
-        self,
-        rule: StoppingRule,
-        distances: Sequence[float],
-        label: int,
-        excess: float,
-    ) -> bool:
-        """Whether a label is sure enough for a rule; see `confidence`."""
-        log_odds = self.slope * margin(distances, label) + self.intercept
-        return _logistic(log_odds - self.doubt * excess) >= rule.confidence
+        return logistic(log_odds - self.doubts[decision_point] * excess)
 
     def rule(self, error: float) -> StoppingRule | None:
         """The fastest rule that is certified for an error rate; or None."""
@@ -312,13 +303,21 @@ class ModelInfo:
         none."""
         return (self.joints or None) if self.chain is None else self.chain.dof
 
-    def tracker(self, layout: SkinLayout, *, max_contacts: int = 1) -> WatchfulTracker:
+    def tracker(
+        self,
+        layout: SkinLayout,
+        *,
+        max_contacts: int = 1,
+        motion_on_skin: bool = False,
+    ) -> WatchfulTracker:
         """A new tracker for a skin, with the model's rules and features.
+
+        The options are those of `ContactTracker`.
 
         Raises:
             InputError: the skin is not the one that the model was made for.
         """
-        return WatchfulTracker(
+        tracker = ContactTracker(
             for_device(self.layout, layout),
             self.debounce,
             chain=self.chain,
@@ -327,3 +326,5 @@ class ModelInfo:
             joints=self.joints,
             max_contacts=max_contacts,
         )
+        tracker.motion_on_skin = motion_on_skin
+        return WatchfulTracker(tracker)

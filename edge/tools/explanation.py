@@ -54,34 +54,36 @@ class Space(NamedTuple):
         with parsing(model.path, "a model that can be explained", "; export it again"):
             graph = Graph(model.contents)
             nodes = graph.path(f"{task}_neighbours")
-            # Of two operators of a kind, the one nearer to the features counts.
+            # The projection's constants have no names of their own. Of two operators of
+            # a kind, the one nearer to the features counts.
             first = {node.operator: node.inputs for node in reversed(nodes)}
             limits = [node.inputs[2] for node in nodes if node.operator == "Clip"]
-            voters = next(
-                node.inputs[0]
-                for node in model.contents.nodes
-                if f"{task}_neighbours" in node.inputs
-            )
             last = len(model.decision_points_s) - 1
 
             def value(name: str) -> Array:
                 return graph.run([name], {"decision_point": np.array([last])})[0]
+
+            def constant(name: str) -> Array:
+                """A row for each decision point, of which the last counts."""
+                array = graph.constants[f"{name} of {task}"]
+                return array[-1] if last else array
 
             unit = value(graph.makers[f"{task}_distances"].inputs[1])
             components = model.info.tasks[task].components
             columns = np.arange(model.info.width)
             if "Gather" in first:
                 columns = value(first["Gather"][1])
-            rows = value(first["Gemm"][1]).T[:, :components] * (-0.5 * unit)
+            columns_of_rows = constant("columns").astype(np.float64)
+            rows = columns_of_rows.T[:, :components] * (-0.5 * unit)
             # Trials without a label are infinitely far away.
-            rows[np.isinf(value(first["Gemm"][2]))] = np.inf
+            rows[np.isinf(constant("lengths"))] = np.inf
             return cls(
                 columns=columns,
                 mean=value(first["Sub"][1]),
                 gain=value(first["Mul"][1]),
                 weights=value(first["MatMul"][1])[:, :components] * unit,
                 rows=rows,
-                labels=value(voters),
+                labels=graph.constants[f"labels of {task}"],
                 reach=float(value(limits[0])),
                 limit=float(value(limits[1])) * float(unit),
             )

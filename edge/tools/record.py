@@ -45,7 +45,8 @@ from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
 from edge.touch.contact import Contact
 from edge.touch.frame import Frame
-from edge.touch.track import DEBOUNCE, WatchfulTracker
+from edge.touch.still import WatchfulTracker
+from edge.touch.track import DEBOUNCE, ContactTracker
 from edge.writing import NameTaken, check_writable
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ class Trials:
     """
 
     def __init__(self, skin: Skin, length_s: float) -> None:
-        self._tracker = WatchfulTracker(skin.layout, horizon_s=0.0)
+        self._tracker = WatchfulTracker(ContactTracker(skin.layout, horizon_s=0.0))
         self._length = length_s
         self._before: deque[Frame] = deque(
             maxlen=round(LEAD_S / skin.period_s) + DEBOUNCE

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from edge.classifier import AS_TRAINED, Classifier, suited
+from edge.classifier import Classifier, suited
 from edge.commands.options import add_engine, add_error, check_error
 from edge.commands.output import LOG, Output, counted
 from edge.errors import InputError, about, printable
@@ -195,7 +195,7 @@ class Summary:
             if event["event"] == "decision":
                 flags |= set(event["flags"])
                 first.setdefault(event["task"], printable(event["label"] or UNDECIDED))
-        self.as_trained += AS_TRAINED in flags
+        self.as_trained += "as_trained" in flags
         for task in self._pairs.keys() & labels:
             truth = printable(labels[task])
             decided = first.get(task, UNDECIDED)

@@ -61,16 +61,16 @@ class Grid:
             beside |= (bits & self._columns[-1]) >> self.cols - 1
         return beside
 
-    def flood(self, seed: int, within: int) -> int:
-        """All taxels of `within` that are connected to `seed`; 0 where that takes more
-        than `MOST_STEPS`."""
+    def flood(self, seed: int, within: int) -> int | None:
+        """All taxels of `within` that are connected to `seed`; None where that takes
+        more than `MOST_STEPS`."""
         region = seed
         for _ in range(MOST_STEPS):
             grown = (region | self.neighbours(region)) & within
             if grown == region:
                 return region
             region = grown
-        return 0
+        return None
 
     def sums(self, bits: int) -> tuple[int, int]:
         """(sum of rows, sum of columns) over the taxels of `bits`.
@@ -206,24 +206,13 @@ class ActiveTaxels:
         # together.
         index = int(self.counts.argmax())
         bits = self._grid.flood(self._grid.bit(index) & self.bits, self.bits)
-        if 2 * bits.bit_count() > self.bits.bit_count():
+        if bits is not None and 2 * bits.bit_count() > self.bits.bit_count():
             return Region(self._grid, bits, self.counts.item(index))
-        return self._largest_of_many(0 if previous is None else previous.bits)
+        from edge.touch.components import largest_bits  # one flood does for a touch
 
-    def _largest_of_many(self, previous: int) -> Region:
-        if not self.bits & self._grid.neighbours(self.bits):
-            # A flickering skin may have nothing but lone taxels, a hundred and more; this
-            # takes a tenth of the components' time.
-            among = self.bits & previous or self.bits
-            lone = np.flatnonzero(self._grid.unpack(among))
-            index = int(lone[self.counts.reshape(-1)[lone].argmax()])
-            return Region(self._grid, self._grid.bit(index), self.counts.item(index))
-        from edge.touch.components import largest_of  # one flood does for a touch
-
-        before = self._grid.unpack(previous)
-        taxels = largest_of(self._padded, self.counts, self._grid.wraps, before)
-        peak = int(self.counts[taxels[:, :-1]].max())
-        return Region(self._grid, self._grid.pack(taxels), peak)
+        before = 0 if previous is None else previous.bits
+        bits, peak = largest_bits(self._grid, self._padded, self.counts, before)
+        return Region(self._grid, bits, peak)
 
     def has_other(self, region: Region, onset: int) -> bool:
         """Whether a taxel beside a region is above the onset."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Integers
+from edge.touch.active import Grid
 
 Indices = NDArray[np.intp]
 
@@ -157,3 +158,28 @@ def largest_of(
     taxels = np.zeros_like(active)
     taxels[active] = components.of_taxel == largest[0]
     return taxels
+
+
+def largest_bits(
+    on: Grid,
+    active: Booleans,
+    counts: Array,
+    previous: int,
+) -> tuple[int, int]:
+    """Taxels and peak of the largest component.
+
+    Args:
+        on: the skin's grid, whose bits give taxels.
+        active: as for `components_of`.
+        counts: (rows, cols) of the frame.
+        previous: the region followed so far.
+    """
+    bits = on.pack(active)
+    if not bits & on.neighbours(bits):
+        # A flickering skin may have nothing but lone taxels, a hundred and more; this
+        # takes a tenth of the components' time.
+        lone = np.flatnonzero(on.unpack(bits & previous or bits))
+        index = int(lone[counts.reshape(-1)[lone].argmax()])
+        return on.bit(index), counts.item(index)
+    taxels = largest_of(active, counts, on.wraps, on.unpack(previous))
+    return on.pack(taxels), int(counts[taxels[:, :-1]].max())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,8 +96,3 @@ def _beyond(angles: Floats, limits: Limits) -> bool:
         if (column < low - slack).any() or (column > high + slack).any():
             return True
     return False
-
-
-def flags_of(doubts: Mapping[str, bool]) -> tuple[str, ...]:
-    """The names of the doubts that hold."""
-    return tuple(flag for flag, holds in doubts.items() if holds)

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.frame import Frame
-from edge.touch.track import ContactTracker
+from edge.touch.still import Tracker
 
 
 def first_contact(
-    frames: Iterable[Frame], tracker: ContactTracker
+    frames: Iterable[Frame], tracker: Tracker
 ) -> tuple[float, FeatureSeries] | None:
     """Onset in seconds and series of the first contact, or None without contact.
 

@@ -1,15 +1,12 @@
-"""Contacts over time: when each begins, which region it is, and when it ends; and taxels
-that stay above the threshold without a touch, as they are stuck or leant on."""
+"""Contacts over time: when each begins, which region it is, and when it ends."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from edge.arrays import Booleans, Integers
+from edge.arrays import Booleans
 from edge.errors import InputError
 from edge.touch.active import ActiveTaxels, Region
 from edge.touch.contact import (
@@ -32,21 +29,6 @@ skin from stalling the loop."""
 DEBOUNCE = 2
 """Frames in a row whose peak is above the skin's onset count before a contact is
 confirmed. The first of them is its onset."""
-STILL_S = 2.0
-"""A taxel whose count stays the same for so long is not touched. It takes a second more
-than contacts are followed, where that is longer."""
-EARLY_S = 0.3
-"""Seconds within which a touch that was under way in the first frame changes."""
-LONGEST_EARLY_S = 10.0
-"""Seconds of first frames that are kept while what is set aside may be a touch."""
-CHECK_S = 0.25
-"""Time between two looks at the counts."""
-STILL_SHARE = 0.05
-"""Part of its count by which a still taxel may change; noise may change it by half of
-the threshold."""
-MOVED_SHARE = 0.25
-"""Part of its count by which a taxel that was set aside changes where it is touched; at
-least the threshold."""
 
 
 class ContactTracker:
@@ -72,6 +54,7 @@ class ContactTracker:
             no joint angles, where this is set; else its motion is unknown in frames
             without them.
         region: the last frame's largest region.
+        contacts: under way, the oldest first; the last may not be confirmed yet.
     """
 
     def __init__(
@@ -113,7 +96,7 @@ class ContactTracker:
         self._chain = chain
         self._measurer = Measurer(layout, features, joints)
         self._max_contacts = max_contacts
-        self._contacts: list[Contact] = []
+        self.contacts: list[Contact] = []
         self._t = -math.inf
 
     def push(self, frame: Frame) -> list[Contact]:
@@ -127,28 +110,20 @@ class ContactTracker:
             InputError: the frame's shape is not the skin's, its time goes back, or a
                 time or joint angle is not finite.
         """
-        self._check(frame)
-        return self._advance(frame, self._active(frame, frame.valid))
+        self.check(frame)
+        return self.follow(frame, active_taxels(frame, self.layout))
 
     def finish(self) -> list[Contact]:
         """The contacts that only the end of the stream confirms."""
         return []
 
-    def _active(self, frame: Frame, valid: Booleans | None) -> ActiveTaxels:
-        return ActiveTaxels(
-            frame.counts,
-            self.layout.threshold_counts,
-            valid=valid,
-            wraps=self.layout.wraps,
-        )
-
-    def _advance(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
-        """Take in a frame by its active taxels; the contacts that it belongs to."""
+    def follow(self, frame: Frame, active: ActiveTaxels) -> list[Contact]:
+        """As `push`, of a frame that has been checked, by some of its active taxels."""
         regions, shares = self._regions(active)
         self.region = regions[0] if regions else None
-        for contact in self._contacts:
+        for contact in self.contacts:
             self._follow(contact, frame, active, shares.get(contact))
-        contacts = list(self._contacts)
+        contacts = list(self.contacts)
         for region in regions:
             room = len(contacts) < self._max_contacts
             is_new = region not in shares.values()
@@ -156,10 +131,10 @@ class ContactTracker:
                 contact = self._begin(frame, region)
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)
-        self._contacts = [contact for contact in contacts if not contact.ended]
-        return self._lasting(contacts)
+        self.contacts = [contact for contact in contacts if not contact.ended]
+        return self._confirmed(contacts)
 
-    def _lasting(self, contacts: Sequence[Contact]) -> list[Contact]:
+    def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
         """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
@@ -171,13 +146,13 @@ class ContactTracker:
         if self._max_contacts > 1:
             from edge.touch.several import shared  # few follow more than one
 
-            return active.regions, shared(self._contacts, active.regions)
-        former = self._contacts[0].region if self._contacts else None
+            return active.regions, shared(self.contacts, active.regions)
+        former = self.contacts[0].region if self.contacts else None
         largest = active.largest(former)
         if largest is None:
             return [], {}
         # The one contact is the largest region, wherever it lies.
-        return [largest], dict.fromkeys(self._contacts, largest)
+        return [largest], dict.fromkeys(self.contacts, largest)
 
     def _begin(self, frame: Frame, region: Region) -> Contact:
         on_skin = self.motion_on_skin and frame.joints is None
@@ -205,7 +180,8 @@ class ContactTracker:
         elif released(contact.touched_s, age_s, self.layout.release_s):
             contact.ended = True
 
-    def _check(self, frame: Frame) -> None:
+    def check(self, frame: Frame) -> None:
+        """Refuse a frame that does not follow the last one; see `push`."""
         if frame.counts.shape != self.layout.shape:
             raise InputError(
                 f"a frame of {frame.counts.shape} taxels on a skin of "
@@ -224,156 +200,16 @@ class ContactTracker:
         self._t = frame.t
 
 
-class StillTaxels:
-    """The taxels that are set aside, so that what happens beside them is followed.
-
-    What is above the threshold in the first frame is set aside at once: it may be a
-    stuck taxel, or a touch under way, which changes. Later a taxel is set aside once it
-    has been still. It is taken back when it falls to the threshold, or changes as in a
-    touch; where it then returns to its former count, it is set aside at once.
-
-    Attributes:
-        aside: (rows, cols), True on the taxels that are set aside.
-        touched: the last frame showed that they are touched, as they changed.
-    """
-
-    def __init__(self, layout: SkinLayout, horizon_s: float) -> None:
-        """Watch a skin on which contacts are followed for `horizon_s`."""
-        self.aside = np.zeros(layout.shape, dtype=np.bool_)
-        self.touched = False
-        self._threshold = layout.threshold_counts
-        longest_s = horizon_s if math.isfinite(horizon_s) else 0.0
-        self._still_s = max(STILL_S, longest_s + 1.0)
-        self._reference = np.zeros(layout.shape, dtype=np.int64)
-        self._looks = np.zeros(layout.shape, dtype=np.int64)
-        """For how many looks each count has been the same."""
-        self._levels = np.zeros(layout.shape, dtype=np.int64)
-        """The counts of taxels that have been set aside; 0 of all others."""
-        self._next_s = -math.inf
-
-    def push(self, frame: Frame, active: ActiveTaxels) -> None:
-        """Take in a frame of the skin, with its taxels above the threshold."""
-        self.touched = False
-        if self._next_s == -math.inf:
-            self._set_aside(frame, active.mask)
-        elif self.aside.any():
-            self._take_back(frame, active.mask)
-        if frame.t >= self._next_s:
-            self._next_s = frame.t + CHECK_S
-            self._look(frame, active)
-
-    def _take_back(self, frame: Frame, active: Booleans) -> None:
-        change = np.abs(frame.counts - self._levels)
-        most = np.maximum(self._threshold, MOVED_SHARE * self._levels)
-        self.touched = bool((self.aside & (change > most)).any())
-        self.aside = self.aside & active & (not self.touched)
-
-    def _look(self, frame: Frame, active: ActiveTaxels) -> None:
-        if not active.bits:
-            self._looks[:] = 0
-            return
-        same = active.mask & self._near(frame, self._reference)
-        self._looks = np.where(same, self._looks + 1, 0)
-        np.copyto(self._reference, frame.counts, where=~same)
-        unchanged = active.mask & (self._levels > 0) & self._near(frame, self._levels)
-        still = unchanged | (self._looks * CHECK_S >= self._still_s)
-        if still.any() and not self.touched:
-            self._set_aside(frame, still)
-
-    def _near(self, frame: Frame, counts: Integers) -> Booleans:
-        most = np.maximum(0.5 * self._threshold, STILL_SHARE * counts)
-        return np.asarray(np.abs(frame.counts - counts) <= most)
-
-    def _set_aside(self, frame: Frame, taxels: Booleans) -> None:
-        np.copyto(self._levels, frame.counts, where=taxels & ~self.aside)
-        self.aside = self.aside | taxels
-
-
-class WatchfulTracker(ContactTracker):
-    """A tracker that sets aside what is above the threshold without a touch.
-
-    A touch that was under way in the first frame is followed from there on, and is
-    `late`. So is what was there from first to last without a change, where the stream
-    has no other contact.
-
-    Attributes:
-        still: the taxels that are set aside.
-    """
-
-    def __init__(self, layout: SkinLayout, *arguments: Any, **options: Any) -> None:
-        """Take the arguments of `ContactTracker`."""
-        super().__init__(layout, *arguments, **options)
-        self.still = StillTaxels(layout, self.horizon_s)
-        self._longest_s = min(self.horizon_s, LONGEST_EARLY_S)
-        self._began_s: float | None = None
-        self._early: list[Frame] = []
-        """The first frames, while what is set aside may turn out to be a touch."""
-
-    def push(self, frame: Frame) -> list[Contact]:
-        """As `ContactTracker.push`, without the taxels that are set aside."""
-        self._check(frame)
-        active = self._active(frame, frame.valid)
-        self.still.push(frame, active)
-        if self._began_s is None:
-            self._began_s = frame.t
-        age_s = frame.t - self._began_s
-        if self.still.touched:
-            return self._touched(frame, active, age_s)
-        if not self.still.aside.any():
-            self._early = []
-            return self._advance(frame, active)
-        valid = ~self.still.aside
-        if frame.valid is not None:
-            valid &= frame.valid
-        return self._beside(frame, active, self._active(frame, valid), age_s)
-
-    def _beside(
-        self,
-        frame: Frame,
-        active: ActiveTaxels,
-        beside: ActiveTaxels,
-        age_s: float,
-    ) -> list[Contact]:
-        """Follow the active taxels `beside` those that are set aside."""
-        if self._early and age_s <= EARLY_S and _grown(active, beside):
-            return self._touched(frame, active, age_s)
-        if age_s == 0.0 or (self._early and age_s <= self._longest_s):
-            self._early.append(frame)
-        contacts = self._advance(frame, beside)
-        if contacts:
-            self._early = []
-        return contacts
-
-    def finish(self) -> list[Contact]:
-        """The contacts of the first frame that never changed, where the stream has had
-        no other contact."""
-        self._follow_early()
-        return [contact for contact in self._lasting(self._contacts) if contact.late]
-
-    def _touched(
-        self,
-        frame: Frame,
-        active: ActiveTaxels,
-        age_s: float,
-    ) -> list[Contact]:
-        """Follow what was set aside and is touched, from the first frame if it soon
-        changed."""
-        if age_s <= EARLY_S:
-            self._follow_early()
-        self._early = []
-        return self._advance(frame, active)
-
-    def _follow_early(self) -> None:
-        for frame in self._early:
-            self._advance(frame, self._active(frame, frame.valid))
-            for contact in self._contacts:
-                contact.late = True
-        self._early = []
-
-
-def _grown(active: ActiveTaxels, beside: ActiveTaxels) -> bool:
-    """Whether a region has both taxels that are set aside and others."""
-    aside = active.bits ^ beside.bits
-    return any(
-        region.bits & aside and region.bits & beside.bits for region in active.regions
+def active_taxels(
+    frame: Frame, layout: SkinLayout, aside: Booleans | None = None
+) -> ActiveTaxels:
+    """The taxels of a frame above the threshold, without those that are set aside."""
+    valid = frame.valid
+    if aside is not None:
+        valid = ~aside if valid is None else valid & ~aside
+    return ActiveTaxels(
+        frame.counts,
+        layout.threshold_counts,
+        valid=valid,
+        wraps=layout.wraps,
     )

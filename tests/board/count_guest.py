@@ -25,7 +25,7 @@ for _ in range(10):  # caches fill in the first ones
             print("frame that decides")
         elif events:
             print("frame with another event")
-        elif classifier.tracker.region is not None:
+        elif classifier.tracker.tracker.region is not None:
             print("frame in contact")
         else:
             print("frame without contact")

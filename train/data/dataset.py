@@ -28,7 +28,8 @@ from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, wid
 from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable, kernel_channels
 from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, WatchfulTracker
+from edge.touch.still import Tracker, WatchfulTracker
+from edge.touch.track import ContactTracker
 from train.data.arms import arm_of, joint_angles
 from train.data.feature_sets import axes, moves, unit
 from train.data.kernels import MOST_TOUCHES, kernel_table
@@ -562,15 +563,15 @@ def _followed(
 ) -> Followed:
     """The contacts of a recording, and the labels of those that are trials."""
     try:
-        tracker = WatchfulTracker(for_device(layout, recording.layout), **tracked)
-        touches = contacts(recording, tracker)
+        tracker = ContactTracker(for_device(layout, recording.layout), **tracked)
+        touches = contacts(recording, WatchfulTracker(tracker))
         return touches, labels_of(recording, len(touches))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
 def contacts(
-    frames: Iterable[Frame], tracker: ContactTracker
+    frames: Iterable[Frame], tracker: Tracker
 ) -> list[tuple[float, FeatureSeries]]:
     """Onset in seconds and series of every contact of a recording, in their order."""
     followed: dict[int, Contact] = {}

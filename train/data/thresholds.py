@@ -9,8 +9,9 @@ import numpy as np
 
 from edge.recording import Recording
 from edge.touch.layout import for_device
+from edge.touch.still import WatchfulTracker
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
-from edge.touch.track import DEBOUNCE, WatchfulTracker
+from edge.touch.track import DEBOUNCE, ContactTracker
 from train.data.dataset import DataSet, contacts, with_thresholds
 from train.data.labels import NO_CONTACT
 
@@ -135,8 +136,8 @@ def count_contacts(
     layout = with_thresholds(recordings[0].layout, threshold, onset)
     counts = []
     for recording in recordings:
-        tracker = WatchfulTracker(for_device(layout, recording.layout), horizon_s=0.1)
-        counts.append(len(contacts(recording, tracker)))
+        tracker = ContactTracker(for_device(layout, recording.layout), horizon_s=0.1)
+        counts.append(len(contacts(recording, WatchfulTracker(tracker))))
     return len(np.flatnonzero(counts)), sum(counts)
 
 

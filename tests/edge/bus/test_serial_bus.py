@@ -5,7 +5,6 @@ import os
 import pty
 import sys
 import threading
-import time
 import tty
 from select import select
 
@@ -256,20 +255,6 @@ def skin(board, tmp_path):
     with Skin.open(path, calibrated=False) as skin:
         assert skin.read().valid.all()
         yield skin
-
-
-def test_a_skin_over_a_serial_port_survives_being_unplugged(board, skin, tmp_path):
-    """Frames without valid taxels while it is away; intact ones when it is back."""
-    link = tmp_path / "port"
-    board.unplug()
-    assert not skin.read().valid.any()
-    board.plug()
-    link.unlink()
-    link.symlink_to(board.port)
-    ends = time.monotonic() + 30.0
-    while not skin.read().valid.all():
-        assert time.monotonic() < ends
-        time.sleep(0.01)
 
 
 def test_noise_costs_a_skin_no_frame(board, skin):

@@ -13,9 +13,6 @@ from edge.chips.chip import Chip, Defaults, Option, Traits
 from edge.chips.kinds import KINDS, Kind
 from edge.errors import InputError
 from edge.fake.chip import FakeChip
-from edge.fake.player import fake_skin
-from edge.recording import Recording
-from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.file import Signal, parse
 from tests.edge.skin.small import mpr121
@@ -114,30 +111,6 @@ def toy(monkeypatch):
     kind = Kind("a toy", f"{__name__}.Toy", f"{__name__}.FakeToy")
     monkeypatch.setitem(KINDS, "toy", kind)
     monkeypatch.setitem(sys.modules, __name__, sys.modules[Toy.__module__])
-
-
-def test_a_further_chip_is_one_entry_of_the_list(toy, tmp_path, edge):
-    """The file, the skin, the fake, `scan` and `calibrate` know it from its
-    descriptor."""
-    file = parse(TOY_SKIN)
-    assert file.layout.threshold_counts == 20
-    assert file.layout.onset == 30
-    picture = np.arange(8, dtype=np.uint16).reshape(2, 4) * 10
-    with fake_skin(file, lambda t: picture) as skin:
-        np.testing.assert_array_equal(skin.read().counts, picture)
-        assert (skin.raw()[0] == picture + 20).all()
-    path = tmp_path / "toy.toml"
-    recording = tmp_path / "rest.npz"
-    path.write_text(TOY_SKIN)
-    save(recording, Recording(np.arange(50) / 100.0, np.zeros((50, 2, 4), np.uint16)))
-    fake = ("--skin", path, "--fake", recording)
-    status, events, _ = edge("scan", *fake)
-    assert status == 0
-    assert [(event["kind"], event["state"]) for event in events] == [
-        ("toy", "running")
-    ] * 2
-    assert edge("calibrate", *fake, "--frames", 40)[0] == 0
-    assert (skinfile.load(path).calibration.baseline == 20).all()
 
 
 def test_an_option_belongs_to_its_kind(toy):

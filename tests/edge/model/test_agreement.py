@@ -32,19 +32,6 @@ def test_the_answer_has_the_smallest_sum_of_all_that_agree():
         ]
 
 
-def test_a_single_touch_is_answered_as_in_a_batch():
-    distances = {
-        "category": [4.0, 0.0, 1.0, 1.0],
-        "mobility": [0.0, 2.0],
-        "softness": [3.0, 0.0],
-    }
-    arrays = {task: np.array(values) for task, values in distances.items()}
-    labels, nearest = agreed("category", FACTORS, arrays)
-    assert labels == {"category": 2, "mobility": 0, "softness": 1}
-    assert nearest["category"].tolist() == [7.0, 5.0, 1.0, 3.0]
-    assert nearest["mobility"].tolist() == [1.0, 3.0]
-
-
 def test_two_labels_decided_apart_name_the_label_of_their_product():
     assert product_label(FACTORS, {"mobility": 1, "softness": 0}) == 1
     assert product_label(FACTORS, {"softness": 1, "mobility": 0}) == 2

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from edge.config import ConfigTable
+from edge.early import is_sure
 from edge.errors import InputError
 from edge.model.info import (
     TEST_SHARE,
@@ -65,15 +66,19 @@ def test_the_fastest_rule_that_is_certified_is_taken():
 def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
     _, at_nine_tenths, _ = stopping().rules
     evidence = 2.0 * math.log(9.0)
-    assert stopping().sure(at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.0)
-    assert not stopping().sure(at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.0)
+    assert is_sure(stopping(), at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.0)
+    assert not is_sure(
+        stopping(), at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.0
+    )
 
 
 def test_a_novel_contact_needs_a_larger_margin():
     _, at_nine_tenths, _ = stopping().rules
     evidence = 2.0 * (math.log(9.0) + 0.7)
-    assert stopping().sure(at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.7)
-    assert not stopping().sure(at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.7)
+    assert is_sure(stopping(), at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.7)
+    assert not is_sure(
+        stopping(), at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.7
+    )
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from edge.chips import block, mpr121
 from edge.fake.clock import VirtualClock
-from edge.fake.player import calibrated, fake_buses, fake_skin, frame_bits, still
+from edge.fake.player import calibrated, fake_buses, fake_skin, still
 from edge.skin.decoder import NEVER_STUCK, repeat_chance, stuck_limits
 from edge.skin.file import Reading, TaxelCalibration
 from edge.skin.loop import Loop
@@ -28,14 +28,6 @@ def served(taxels, **options):
         options=options,
         taxels=tuple(taxels),
     )
-
-
-@pytest.mark.parametrize("bits", [8, 12, 16])
-def test_block_chips_of_each_width_serve_a_whole_skin(bits):
-    file = replace(CODY, buses=(BusSpec("mcu", (served(range(384), bits=bits),)),))
-    with fake_skin(file, lambda t: PICTURE % 100) as skin:
-        np.testing.assert_array_equal(skin.read().counts, PICTURE % 100)
-    assert frame_bits(file)[0] == 18 + 9 * (4 + 384 * bits // 8 + 1) + 3
 
 
 def test_chips_of_different_kinds_make_one_skin():

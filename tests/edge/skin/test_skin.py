@@ -113,16 +113,6 @@ def test_the_baseline_follows_drift_until_something_touches():
     assert held[-1] - held[0] in range(28, 32)
 
 
-@pytest.mark.parametrize("above", [0, 1])
-def test_counts_above_the_threshold_are_a_touch_and_are_not_followed(above):
-    level = np.full((16, 24), CODY.layout.threshold_counts + above, dtype=np.uint16)
-    with fake_skin(CHIP, lambda t: level) as skin:
-        assert skin.touch_counts == CODY.layout.threshold_counts
-        frames = list(Loop(skin, lasts_s=3.0).frames())
-    lost = int(frames[0].counts.max()) - int(frames[-1].counts.max())
-    assert (lost == 0) == (above == 1)
-
-
 def test_a_skin_without_a_single_chip_says_so():
     clock = VirtualClock()
     file = calibrated(PAD)

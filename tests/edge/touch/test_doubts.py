@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from edge.touch.doubts import SELDOM, flags_of, frame_doubts, is_several
+from edge.touch.doubts import SELDOM, frame_doubts, is_several
 from edge.touch.layout import SkinLayout
 from tests.edge.touch.pressed import followed, pressed
 
@@ -29,7 +29,8 @@ def growing(i):
 
 
 def doubts(felt, several_share=1.0, limits=()):
-    return set(flags_of(frame_doubts(felt, WINDOW_S, several_share, limits)))
+    doubts = frame_doubts(felt, WINDOW_S, several_share, limits)
+    return {flag for flag, holds in doubts.items() if holds}
 
 
 TIMES = np.arange(140) * 0.01

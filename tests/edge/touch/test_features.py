@@ -139,13 +139,6 @@ def between(values, t):
     return float(values[a] + (t - a) / (b - a) * (values[b] - values[a]))
 
 
-def test_a_pose_that_is_known_again_after_the_window_tells_nothing_of_it():
-    motion = [0.0, 0.1, np.nan, np.nan, 0.9]
-    contact = series([0.0, 0.4, 0.8, 1.2, 1.6], [1] * 5, motion=motion)
-    held = feature_vector(contact, 1.2, samples=4)[8:]
-    assert held == pytest.approx([0.0, 0.1, 0.1, 0.1])
-
-
 def test_motion_is_interpolated_over_frames_without_a_pose():
     motion = [0.0, np.nan, 0.2, np.nan]
     vector = feature_vector(

@@ -3,8 +3,8 @@
 import json
 import math
 import os
+import select
 import socket
-import time
 from contextlib import closing
 
 import numpy as np
@@ -176,7 +176,7 @@ def test_udp_is_bound_to_loopback_unless_told_otherwise():
         assert source() == b""
         sender.sendto(b'{"t": 1.0, "q": [2.0]}', (host, port))
         joints = Joints(source, dof=1, now=lambda: 1.0)
-        time.sleep(0.05)
+        arrived(source)
         assert joints.at(1.0).tolist() == [2.0]
 
 
@@ -235,21 +235,6 @@ def test_a_line_out_of_order_begins_anew(wire):
     assert stream(wire, range(10, 12))[-1] == pytest.approx([0.11, -0.11])
 
 
-@pytest.mark.parametrize(("place", "hz"), [(0, 25), (8, 100)])
-def test_one_of_the_first_lines_ahead_of_time_costs_the_pose_for_less_than_a_second(
-    wire,
-    place,
-    hz,
-):
-    poses = stream(
-        wire,
-        range(2 * hz),
-        hz=hz,
-        ahead=lambda i: 1000.0 + 0.3 * (i == place),
-    )
-    assert None not in poses[place + hz :]
-
-
 @pytest.mark.parametrize("step_s", [0.5, -0.5])
 def test_a_clock_that_was_set_costs_the_pose_for_less_than_a_second(wire, step_s):
     stream(wire, range(50))
@@ -277,13 +262,18 @@ def test_of_two_senders_one_is_heard_and_the_other_counted(caplog):
     with closing(source), udp() as first, udp() as second:
         for sender, text in ((first, b"a"), (second, b"b"), (first, b"c")):
             sender.sendto(text, source.listener.getsockname())
-        time.sleep(0.05)
+        arrived(source)
         assert [source().strip() for _ in range(4)] == [b"a", b"", b"c", b""]
         now[0] = 2.0  # the first has fallen silent
         second.sendto(b"d", source.listener.getsockname())
-        time.sleep(0.05)
+        arrived(source)
         assert source().strip() == b"d"
     assert caplog.messages == ["--joints: ignored datagrams from another sender: 1"]
+
+
+def arrived(source):
+    """Wait for a datagram, at most for half a minute."""
+    assert select.select([source.listener], [], [], 30.0)[0]
 
 
 def udp():

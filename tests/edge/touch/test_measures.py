@@ -163,22 +163,6 @@ def test_moments_are_those_of_exact_arithmetic(seed, density):
     )
 
 
-def test_a_perfect_line_has_no_width():
-    for line in (np.eye(5, 7), np.eye(5, 7)[::-1], np.ones((1, 7)), np.ones((5, 1))):
-        counts = np.zeros((5, 7))
-        counts[: line.shape[0], : line.shape[1]] = 77 * line
-        assert value(FLAT, counts, "skin_width") == 0.0
-    assert value(FLAT, 99 * np.eye(5, 7), "skin_length") == pytest.approx(2.0)
-
-
-def test_places_on_a_seam_are_measured_on_the_circle():
-    counts = np.zeros((5, 7), dtype=int)
-    counts[2, [6, 0]] = 50
-    assert value(ROUND, counts, "contact_around") == pytest.approx(6.5)
-    assert value(ROUND, counts, "contact_spread_around") == pytest.approx(0.5)
-    assert value(FLAT, counts, "skin_spread_around") == pytest.approx(3.0)
-
-
 def test_a_contact_is_followed_across_the_seam_and_does_not_jump():
     frames = [pressed(ROUND, i / 4, {(2, (5 + i) % 7): 50}) for i in range(5)]
     vector = vector_of(ROUND, frames, ["contact_around"], 5)
@@ -238,12 +222,6 @@ def test_of_two_readings_of_one_instant_the_later_counts_for_every_feature():
 def test_zones_that_no_feature_calls_for_are_not_measured():
     assert list(series_of(FLAT, TWO_FRAMES, ["skin_force"]).zones) == ["skin"]
     assert series_of(FLAT, TWO_FRAMES, ["max_force", "contact_area"]).zones == {}
-
-
-def test_the_papers_three_are_the_default_and_come_first():
-    assert PAPER == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
-    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
-    assert [feature(name).name for name in ALL] == ALL
 
 
 @pytest.mark.parametrize(
@@ -318,3 +296,9 @@ def test_a_cell_is_the_sum_of_its_readable_taxels_and_dead_cells_are_left_out(
     expected = [int(readable[s].sum()) for s in squares if layout.alive[s].any()]
     assert cells.read(Frame(0.0, counts, valid=valid)).tolist() == expected
     assert len(expected) == cells.count
+
+
+def test_the_papers_three_are_the_default_and_come_first():
+    assert PAPER == ("max_force", "contact_area", "contact_motion") == tuple(ALL[:3])
+    assert len(ALL) == len(set(ALL)) == len(ZONES) * len(QUANTITIES) + 8
+    assert [feature(name).name for name in ALL] == ALL

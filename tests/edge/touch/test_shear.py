@@ -81,23 +81,6 @@ def test_the_normal_numbers_are_the_same_with_and_without_shear():
     assert sheared["contact"][:ZONE_WIDTH] == plain["contact"]
 
 
-def test_a_skin_turned_by_half_gives_turned_sums():
-    frame = sheared_frame(8, LAYOUT.shape)
-    turned = Frame(
-        0.0,
-        frame.counts[::-1, ::-1],
-        frame.valid[::-1, ::-1],
-        shear=-np.maximum(frame.shear, -32767)[::-1, ::-1],
-    )
-    straight = replace(frame, shear=np.maximum(frame.shear, -32767))
-    before = skin_quantities(LAYOUT, straight)
-    after = skin_quantities(LAYOUT, turned)
-    assert after["shear_along"] == -before["shear_along"]
-    assert after["shear_around"] == -before["shear_around"]
-    assert after["shear_size"] == before["shear_size"]
-    assert after["twist"] == pytest.approx(before["twist"], rel=1e-14)
-
-
 def test_a_contact_moved_across_the_seam_keeps_its_twist():
     layout = replace(LAYOUT, wraps=True)
     frame = sheared_frame(8, LAYOUT.shape)
@@ -147,19 +130,6 @@ def test_quantities_are_those_of_fractions(seed):
     twist = first * Fraction(0.01) / 100 - second * Fraction(0.02) / 100
     scale = float(abs(first) * Fraction(0.01) + abs(second) * Fraction(0.02)) / 100
     assert abs(quantities["twist"] - float(twist)) <= 1e-15 * scale
-
-
-def test_opposite_pulls_are_a_twist_without_a_sum():
-    # A newton up on column 2, a newton down on column 4: a couple of two columns, 0.04
-    # m.
-    row = [100, 2, 200, 2 * 200, 3 * 200, 0, 0, 0, 0, 0, 0, (2 - 4) * 100]
-    assert quantities_of(row) == {
-        "shear_along": 0.0,
-        "shear_around": 0.0,
-        "shear_size": 0.0,
-        "shear_ratio": 0.0,
-        "twist": pytest.approx(0.04, rel=1e-15),
-    }
 
 
 def test_an_empty_zone_has_no_shear():

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from edge.touch.layout import SkinLayout
-from edge.touch.track import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
-from tests.edge.touch.pressed import active_of, pressed
+from edge.touch.still import CHECK_S, EARLY_S, STILL_S, StillTaxels, WatchfulTracker
+from edge.touch.track import ContactTracker
+from tests.edge.touch.pressed import pressed
 
 LAYOUT = SkinLayout(8, 8, threshold_counts=40, onset_counts=60, wraps=False)
 PERIOD_S = 0.01
@@ -28,9 +29,13 @@ def frames(seconds, touches=(), stuck=None):
         yield frame
 
 
+def watchful(horizon_s):
+    return WatchfulTracker(ContactTracker(LAYOUT, horizon_s=horizon_s))
+
+
 def onsets(stream, horizon_s=1.0):
     """(onset, late) of the contacts of a stream."""
-    tracker = WatchfulTracker(LAYOUT, horizon_s=horizon_s)
+    tracker = watchful(horizon_s)
     contacts = {}
     for frame in stream:
         for contact in tracker.push(frame):
@@ -79,7 +84,7 @@ def test_what_never_changes_is_a_late_contact_where_there_is_no_other():
 
 
 def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
-    tracker = WatchfulTracker(LAYOUT, horizon_s=1.0)
+    tracker = watchful(1.0)
     for frame in frames(3.0, stuck={(2, 2): (0.0, 100)}):
         assert tracker.push(frame) == []
     (contact,) = tracker.finish()
@@ -88,7 +93,7 @@ def test_a_late_contact_at_the_end_has_the_series_of_the_first_frames():
 
 
 def test_a_touch_held_for_the_whole_window_is_not_set_aside_before_its_end():
-    tracker = WatchfulTracker(LAYOUT, horizon_s=4.0)
+    tracker = watchful(4.0)
     ended = None
     for frame in frames(6.0, stuck={(3, 3): (0.2, 100)}):
         for contact in tracker.push(frame):
@@ -98,7 +103,7 @@ def test_a_touch_held_for_the_whole_window_is_not_set_aside_before_its_end():
 
 
 def test_gaps_are_no_stillness():
-    tracker = WatchfulTracker(LAYOUT, horizon_s=1.0)
+    tracker = watchful(1.0)
     contacts = []
     for t, count in ((0.0, 0), (1.0, 100), (11.0, 100), (21.0, 100)):
         contacts = tracker.push(pressed(LAYOUT, t, {...: count}))
@@ -111,8 +116,7 @@ def still():
 
 
 def push(still, t, taxels):
-    frame = pressed(LAYOUT, t, taxels)
-    still.push(frame, active_of(LAYOUT, frame))
+    still.filter(pressed(LAYOUT, t, taxels))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,110 @@
+"""The model's answers about a contact, with the reasons to doubt them."""
+
+from dataclasses import replace
+
+from edge.errors import OutOfRange
+from edge.events import Decided
+from edge.model.info import NOVELTY_RATE, ModelInfo
+from edge.model.model import Decision, Model
+from edge.touch.contact import Contact, FeatureSeries
+from edge.touch.doubts import frame_doubts
+
+Answers = dict[str, Decided]
+"""{task: its answer}."""
+
+
+def answers_about(
+    model: Model,
+    contact: Contact,
+    number: int | None,
+    point: int,
+) -> Answers:
+    """Ask the model about a contact.
+
+    Args:
+        model: that answers.
+        contact: with its frames so far.
+        number: of the contact, if several are followed at once; else None.
+        point: index of the decision point.
+
+    Returns:
+        The answers of all tasks, with their confidence rounded to millionths and
+        without latency. Features that cannot be scaled give no label.
+    """
+    info = model.info
+    window_s = model.decision_points_s[point]
+    series = contact.series()
+    answer = Decided(
+        task="",
+        label=None,
+        confidence=0.0,
+        window_s=window_s,
+        onset_s=contact.onset_s,
+        latency_ms=0.0,
+        contact=number,
+        model=model.named,
+    ).flagged(**contact_doubts(info, contact, series, window_s))
+    if number is not None:
+        # Each region is a contact of its own.
+        answer = replace(answer, position=_position(contact)).flagged(several=False)
+    try:
+        vector = info.vector(series, window_s)
+        decisions = model.decide(vector, point)
+    except OutOfRange:
+        answer = answer.flagged(out_of_range=True)
+        return {task: replace(answer, task=task) for task in info.tasks}
+    if info.novelty is not None:
+        score = decisions[info.novelty.task].novelty
+        unknown = info.novelty.rate(point, score) <= NOVELTY_RATE
+        answer = answer.flagged(unknown=unknown)
+        if unknown and window_s == info.window_s:
+            from edge.model.unusual import unusual  # few contacts are unknown
+
+            phrase = unusual(vector, info.widths, info.usual)
+            answer = replace(answer, unusual=phrase)
+    return {
+        task: _answer(replace(answer, task=task), decision, info)
+        for task, decision in decisions.items()
+    }
+
+
+def contact_doubts(
+    info: ModelInfo,
+    contact: Contact,
+    series: FeatureSeries,
+    window_s: float,
+) -> dict[str, bool]:
+    """{flag: whether it holds} for what was measured of a contact, see `edge.flags`."""
+    limits = () if info.chain is None else info.chain.limits
+    return {
+        **frame_doubts(series, window_s, info.several, limits),
+        "missing_taxels": contact.missing_taxels,
+        "missing_pose": contact.missing_pose,
+        "late": contact.late,
+        "skin_motion": contact.chain is None and info.chain is not None,
+    }
+
+
+def _position(contact: Contact) -> tuple[float, float, float] | None:
+    """Where the contact was last seen, rounded to micrometres."""
+    position = contact.position()
+    if position is None:
+        return None
+    x, y, z = (round(metres, 6) for metres in position)
+    return x, y, z
+
+
+def _answer(blank: Decided, decision: Decision, info: ModelInfo) -> Decided:
+    """A task's answer, with the doubts of the decision."""
+    confidence = decision.confidence
+    return replace(
+        blank,
+        label=decision.label,
+        confidence=None if confidence is None else round(confidence, 6),
+        nearest=tuple(map(info.trial, decision.neighbours.tolist())),
+        decision=decision,
+    ).flagged(
+        as_trained=bool(decision.distances[0] == 0.0),
+        out_of_range=decision.out_of_range,
+        tie=decision.tie,
+    )

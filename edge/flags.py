@@ -1,0 +1,54 @@
+"""The flags of a decision: the reasons to doubt it, in the order in which they stand."""
+
+FLAGS = {
+    "no_contact": (
+        "nothing was touched in the recording, and the training had a label `none` for "
+        "this; `onset_s` is the end of the recording, and `strongest` the largest count "
+        "of any taxel, divided by the onset count"
+    ),
+    "short": "the stream ended inside the window; the last values were held",
+    "gap": (
+        "more than a twelfth of the window (0.1 s of 1.2 s), and more than two usual "
+        "steps, lies between two frames; also if times are not in seconds"
+    ),
+    "frozen": "frames repeat bit for bit for as long",
+    "several": (
+        "a second region beside the contact in a fifth of the window, as fewer than a "
+        "fifth of the training trials had"
+    ),
+    "still_joints": "joint angles never change in the window",
+    "joint_limits": "joint angles lie beyond their limits",
+    "missing_taxels": "taxels could not be read in part of the window",
+    "missing_pose": "joint angles were absent in part of the window",
+    "late": "the contact was there in the first frame, so its onset is not known",
+    "near_contact": (
+        "as `no_contact`, but a taxel rose above the contact threshold: a weak touch may "
+        "have been missed"
+    ),
+    "skin_motion": (
+        "motion was measured on the skin, but the model was trained with motion in the "
+        "world"
+    ),
+    "as_trained": (
+        "the coordinates that the model compares are those of a training trial: nearly "
+        "always the touch is that trial, replayed"
+    ),
+    "out_of_range": (
+        "the features lie far outside those of training and were cut off; `label` is "
+        "null where they could not be scaled at all"
+    ),
+    "unknown": (
+        "the touch is unlike all training trials. With `--error` it waits for the full "
+        "window, and the task with the most labels, such as the object, answers "
+        '"unknown"'
+    ),
+    "tie": "another label had the same number of votes",
+    "unsure": "with `--error`: the window ended before the confidence was reached",
+    "uncertified": "with `--error`: no rule is certified for this task",
+}
+"""{flag: its meaning}; docs/formats.md has the same table."""
+
+
+def in_order(flags: set[str]) -> tuple[str, ...]:
+    """Flags in the order of the table, which has them all."""
+    return tuple(sorted(flags, key=list(FLAGS).index))
