@@ -10,8 +10,8 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer matched shear shear-transfer docs faults risk shifts \
-  stopping soak soak-day constraints clean
+  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear shear-transfer docs faults risk shifts \
+  stopping soak measured constraints clean
 
 help:
 	@echo "Everyday"
@@ -40,7 +40,6 @@ help:
 	@echo "  make accuracy      the accuracies that export prints, of simulated and (GRASPS=folder) real sets"
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
-	@echo "  make matched       four touches in MuJoCo and in our simulator"
 	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
 	@echo "  make shear-transfer   models with shear and without on trials from another engine (MuJoCo)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
@@ -48,7 +47,7 @@ help:
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
 	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
 	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
-	@echo "  make soak-day      24 hours of the same at 15 Hz"
+	@echo "  make measured      all tables of docs/measured anew, one after another; ONLY=\"risk kills\""
 	@echo "Thorough tests"
 	@echo "  make hard-cases    the cost of each hard numerical case to us and to the usual tools"
 	@echo "  make hard-cases-versions   the same answers from other ONNX Runtimes"
@@ -192,20 +191,24 @@ bench: $(BENCHVENV)
 	$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' -o python_functions='bench_*' \
 	  -o filterwarnings=default $(BENCH)
 
+HELD := $(OUT)/transfer
+
 transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)
-	$(BIN)/python -m train simulate $(SCENE) --out $(OUT)/transfer/simulated
-	$(BIN)/python -m export --data $(OUT)/transfer/simulated --out $(OUT)/transfer $(EXPORT)
-	$(BIN)/python -m tests.bench.transfer --model $(OUT)/transfer/model.onnx --out $(OUT)/transfer
-
-matched: $(BENCHVENV)
-	$(BIN)/python -m tests.bench.matched
+	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
+	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
+	$(BIN)/python -m tests.bench.transfer --models $(HELD)/household/model.onnx $(TRANSFER)
 
 shear: $(DEV)
 	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
 
 shear-transfer: $(BENCHVENV)
-	$(BIN)/python -m tests.bench.shear_transfer --out $(OUT)/shear_transfer $(SHEAR)
+	$(BIN)/python -m train simulate train/scenes/household_shear.toml --out $(HELD)/sheared
+	$(BIN)/python -m export --data $(HELD)/sheared --out $(HELD)/without-shear --features contact joints
+	$(BIN)/python -m export --data $(HELD)/sheared --out $(HELD)/with-shear \
+	  --features contact joints shear
+	$(BIN)/python -m tests.bench.transfer --table shear_transfer --seeds 3 --trials 96 \
+	  --models $(HELD)/without-shear/model.onnx $(HELD)/with-shear/model.onnx
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -242,7 +245,6 @@ docs: $(VENV)/.docs
 
 risk: $(DEV)
 	$(BIN)/python -m tests.bench.risk $(RISK)
-	$(BIN)/python -m tests.bench.exports $(EXPORTS)
 
 shifts: $(DEV) $(SIMULATED)/.made
 	$(BIN)/python -m export --data $(SIMULATED) --out $(OUT)/shifts $(EXPORT)
@@ -274,19 +276,28 @@ $(PEERS)/.ready: pyproject.toml constraints.txt
 peers-test: $(PEERS)/.ready
 	$(PEERS)/bin/python -m pytest tests/edge/touch/test_kernels.py -k aeon -rs
 
-stopping: $(PEERS)/.ready
-	$(PEERS)/bin/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
+stopping: $(DEV)
+	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
 # FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
 faults: $(DEV)
 	$(BIN)/python -m tests.faults $(FAULTS)
 
 soak: $(DEV)
-	$(BIN)/python -m tests.bench.soak
-	$(BIN)/python -m tests.bench.page_load
+	$(BIN)/python -m tests.bench.soak $(SOAK)
 
-soak-day: $(DEV)
-	$(BIN)/python -m tests.bench.soak --minutes 1440 --every 60 --rate 15
+# Every table of docs/measured, one target after another, with a line for each as it ends. The
+# tables that this writes are no local change.
+ONLY ?= accuracy bench hard-cases kills risk shear shear-transfer shifts soak stopping transfer \
+  docs/tradeoff.png
+measured: $(DEV)
+	@test -z "`git status --porcelain -uno -- . ':!docs/measured' ':!docs/*.png'`" || \
+	  { echo "commit the local changes first: a table names its commit" >&2; exit 1; }
+	@mkdir -p $(OUT)/measured; failed=0; for name in $(ONLY); do \
+	  began=`date +%s`; state=ok; log=$(OUT)/measured/`basename $$name`.log; \
+	  $(MAKE) $$name > $$log 2>&1 || { state=failed; failed=1; }; \
+	  echo "$$name `expr \`date +%s\` - $$began` s $$state"; \
+	done; exit $$failed
 
 $(VENV)/.upkeep: $(READY)
 	$(PIP) --group upkeep

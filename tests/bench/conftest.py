@@ -18,6 +18,13 @@ ROWS = pytest.StashKey()
 """The rows of the table of all benchmarks of a run."""
 
 
+def pytest_collection_modifyitems(items):
+    """A benchmark may take its time."""
+    for item in items:
+        if item.path.name.startswith("bench_"):
+            item.add_marker(pytest.mark.slow)
+
+
 def pytest_sessionfinish(session):
     """Write the table of a whole run; part of the benchmarks would replace it."""
     rows = session.config.stash.get(ROWS, [])

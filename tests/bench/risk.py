@@ -18,7 +18,8 @@ prints. The accuracy on other trials may lie outside it in one data set of twent
 
 The last table judges the confidence at the full window on new trials of known objects:
 its calibration error, and how many of them are flagged `unknown` where 2 % are asked
-for; in brackets, what four fifths of the sets give.
+for; in brackets, what four fifths of the sets give. Further rows are of data sets that
+are exported in full, on whose touches the board's own classifier decides.
 """
 
 import tempfile
@@ -31,10 +32,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from edge.model.info import UNKNOWN
+from edge.model.model import Model
 from edge.touch.features import SAMPLES, WINDOW_S
+from export.api import save
 from tests.bench import tables
 from tests.bench.program import start
-from tests.bench.shifts import SCENE
+from tests.bench.shifts import FRESH_SEED, SCENE, decisions, fresh_touches
 from train.choose.candidates import candidates
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
@@ -56,8 +60,9 @@ OUTSIDE = 0.05
 BINS = 10
 SEEDS = 5
 COUNT = 20
+FRESH = 10
 """Batches, each of a seed of its own; trials of each object and condition in a
-batch."""
+batch, and of the touches that judge full exports."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +80,7 @@ class DrawnSet(DataSet):
     pool: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.int64]]
 
-    def vectors(self, windows_s, rows, names):
+    def pooled(self, windows_s, rows, names):
         """(windows, m, features * samples) vectors of some rows of the pool."""
         columns = np.concatenate([self.columns[name] for name in names])
         return np.stack(
@@ -84,7 +89,7 @@ class DrawnSet(DataSet):
 
     def features(self, window_s=WINDOW_S, samples=SAMPLES, names=None):
         """(n, features * samples) vectors at one of `POINTS_S`."""
-        return self.vectors([window_s], self.rows, names or self.names)[0]
+        return self.pooled([window_s], self.rows, names or self.names)[0]
 
 
 def simulated(seed):
@@ -127,13 +132,13 @@ def judged(drawn, labels):
             quick=True,
             jobs=1,
         )
-        vectors = drawn.vectors([window], rest, fitted.dataset.names)
+        vectors = drawn.pooled([window], rest, fitted.dataset.names)
         answered = answers([fitted.classifier], vectors)
         points[window] = fitted.chosen
         for task in y:
             right[task, window] = (answered[task][0][0] == y[task]).mean()
     model = fitted.sequential
-    new = drawn.vectors(POINTS_S, rest, fitted.dataset.names)
+    new = drawn.pooled(POINTS_S, rest, fitted.dataset.names)
     hits, confidences, courses = model.judged(new, y)
     unknown = unlike(model.novelty_, model.space_.scores(new))[-1]
     certified = []
@@ -191,7 +196,25 @@ def trust(right, confidence, unknown):
     }
 
 
-def measure(sets, trials, seed, jobs):
+def exported(seed):
+    """A row of `trust` for each task of a full export of a seed's data set, on fresh
+    touches of its objects."""
+    with tempfile.TemporaryDirectory() as folder:
+        write(scenes.load(SCENE, seed=seed), f"{folder}/data")
+        save(f"{folder}/model.onnx", fit(f"{folder}/data", jobs=1))
+        model = Model(f"{folder}/model.onnx")
+    fresh = scenes.load(SCENE, seed=FRESH_SEED, count=FRESH)
+    rows = decisions(model, fresh_touches(fresh)).drop_duplicates(["task", "touch"])
+    rows["unknown"] = [UNKNOWN in flags for flags in rows["flags"]]
+    rows["right"] = [answer.label for answer in rows["decision"]] == rows["truth"]
+    judged_rows = []
+    for task, of_task in rows.groupby("task", sort=False):
+        columns = (of_task[name] for name in ("right", "confidence", "unknown"))
+        judged_rows.append({"task": f"{task}, full export", **trust(*columns)})
+    return judged_rows
+
+
+def measure(sets, exports, trials, seed, jobs):
     """Simulate, fit, count; 1 where a promise is broken more often than chance
     explains."""
     workers = Workers(jobs)
@@ -212,6 +235,9 @@ def measure(sets, trials, seed, jobs):
         cases.append((DrawnSet(**fields, rows=rows, **shared), y))
     results = workers.map("data sets", judged, cases)
     certified, fronts, trusted = map(chain.from_iterable, zip(*results, strict=True))
+    seeds = [(seed + number,) for number in range(1, exports + 1)]
+    full = workers.map("full exports", exported, seeds)
+    trusted = [*trusted, *chain.from_iterable(full)]
     certified = summed_up(certified, ["task", "asked"], certificate)
     fronts = summed_up(fronts, ["task", "front"], interval)
     trusted = summed_up(trusted, ["task"], confidence)
@@ -254,7 +280,8 @@ def interval(rows):
 def confidence(rows):
     """Means of what the confidence was worth."""
     means = rows.drop(columns="task").mean()
-    row = {name: f"{mean:.3f}" for name, mean in means.items()}
+    row = {"sets": len(rows)}
+    row |= {name: f"{mean:.3f}" for name, mean in means.items()}
     flagged = rows["flagged unknown"]
     low, high = flagged.quantile((0.1, 0.9))
     row[flagged.name] = f"{flagged.mean():.1%} ({low:.1%} to {high:.1%})"
@@ -266,6 +293,7 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--sets", 140, "data sets drawn"),
+        ("--exports", 4, "further data sets, exported in full"),
         ("--trials", 140, "trials of each"),
         ("--seed", 0, "of the trials and the sets"),
         ("--jobs", 2, "processes"),

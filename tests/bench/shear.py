@@ -1,4 +1,4 @@
-"""`make shear`: how much sooner a task is decided with shear than without.
+"""`make shear`: how much more is decided rightly with shear than without.
 
 The paper guesses that shear may allow faster decisions (section IV-C). Each seed
 simulates the paper's objects with a skin of three axes; all choices are made with the
@@ -6,8 +6,6 @@ features of shear among the candidates, and without them, on the same trials. Ga
 means over the seeds, with the 95 % interval of the mean (Student's t).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +14,6 @@ from scipy.stats import sem, t
 from tests.bench import tables
 from tests.bench.program import start
 from train.data.dataset import read
-from train.report.figures import legend, picture
 from train.report.work import Workers
 from train.simulate import run, scene
 from train.tradeoff import shear
@@ -25,8 +22,6 @@ from train.tradeoff.choices import WINDOWS_S, followed
 SCENE = tables.SCENES / "cody18_shear.toml"
 SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 """Windows of the table of gains."""
-PICTURE = tables.ROOT / "docs" / "shear.png"
-PICTURED = "mobility"
 
 
 def compared(seed, folder, jobs):
@@ -37,37 +32,6 @@ def compared(seed, folder, jobs):
     workers = Workers(jobs)
     sheared = shear.answers(dataset, WINDOWS_S, workers)
     return shear.compared(dataset, sheared, workers)
-
-
-@dataclass(frozen=True)
-class Mean:
-    """The mean over the seeds of answers, which `train.tradeoff.shear` shows as those
-    of one seed.
-
-    Attributes:
-        seeds: the answers of each.
-    """
-
-    seeds: Sequence[shear.Answers]
-
-    @property
-    def tasks(self):
-        return self.seeds[0].tasks
-
-    def shares(self, task, kind):
-        """{window: mean accuracy}; None where no seed has one."""
-        of_seeds = [answers.shares(task, kind) for answers in self.seeds]
-        means = {}
-        for window in WINDOWS_S:
-            shares = [s[window] for s in of_seeds if s[window] is not None]
-            means[window] = float(np.mean(shares)) if shares else None
-        return means
-
-    def early_s(self, task, kind, level):
-        """The mean time of early decisions; None where a seed never reaches the
-        level."""
-        times = [answers.early_s(task, kind, level) for answers in self.seeds]
-        return None if None in times else float(np.mean(times))
 
 
 def gain(runs, task, window, kind):
@@ -96,32 +60,14 @@ def gains(runs):
     return rows
 
 
-def draw(means):
-    """The picture of README: mobility against time."""
-
-    def paint(canvas, phone):
-        axes = canvas.subplots()
-        shear.draw_task(axes, means, PICTURED, 4.0)
-        axes.set(title="", ylim=(40, 103), ylabel=f"right about {PICTURED}, %")
-        legend(canvas, axes, 2)
-
-    return picture("shear", "Mobility with shear and without", paint, (3.4, 3.4)).png
-
-
 def measure(seeds, jobs, out):
-    """Measure, and write the tables and the picture."""
+    """Measure, and write the table."""
     first = scene.load(SCENE).seed
     runs = []
     for seed in range(first, first + seeds):
         print(f"seed {seed}", flush=True)
         runs.append(compared(seed, out, jobs))
-    means = shear.Compared(
-        Mean([pair.sheared for pair in runs]), Mean([pair.plain for pair in runs])
-    )
-    rows = shear.times(means)
-    reached = [row for row in rows if {row["with s"], row["without s"]} != {"-"}]
-    tables.write("shear", [reached, gains(runs)], "make shear")
-    PICTURE.write_bytes(draw(means))
+    tables.write("shear", [gains(runs)], "make shear")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
 A model is exported from a simulated set. Fresh touches of the same objects are changed
 as a robot's life changes them: taxels die or stick, counts double, a sleeve is put on,
-the skin turns on the arm, frames are lost or repeated, joint angles freeze. The board's
-own classifier decides on them. A wrong answer is one in doubt if it has a flag, or a
+the skin turns on the arm, frames are lost or repeated, joint angles freeze. Others are
+simulated with another arm or with another effect of the sensors, from the same draws.
+The board's own classifier decides on them. A wrong answer is one in doubt if it has a flag, or a
 confidence below one half; it is sure if it has neither and a confidence of 95 % or more.
 
 "held" says whether a shift is told at least as the user was promised: most of its
@@ -12,6 +13,8 @@ on touches that are not shifted.
 """
 
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +28,9 @@ from tests.bench.program import start
 from train.data.parts import part
 from train.progress import bar
 from train.simulate import scene as scenes
-from train.simulate.run import simulate
+from train.simulate.engine import run_physics
+from train.simulate.run import batches_of, file_name, recordings, simulate
+from train.simulate.schema import EFFECTS
 
 SCENE = tables.SCENES / "cody18.toml"
 FRESH_SEED = 77
@@ -83,19 +88,6 @@ def frozen(recording):
     return replace(recording, frames=frames)
 
 
-def slower(recording):
-    """All at half of the speed, at the same rate."""
-    t = recording.t
-    times = np.linspace(t[0], t[-1], 2 * len(t) - 1)
-    places = np.searchsorted(t, times + 1e-9, side="right") - 1
-    return replace(
-        recording,
-        t=2.0 * times,
-        frames=recording.frames[places],
-        joints=np.column_stack([np.interp(times, t, q) for q in recording.joints.T]),
-    )
-
-
 SHIFTS = {
     "none": lambda recording: recording,
     "two of three frames lost": lambda r: part(r, slice(None, None, 3)),
@@ -105,7 +97,6 @@ SHIFTS = {
     "a tenth of the counts": counts(lambda frames: 0.1 * frames),
     "60 counts on all taxels": counts(lambda frames: frames + 60.0),
     "a sleeve: 100 counts less": counts(lambda frames: frames - 100.0),
-    "half of the speed": slower,
     "skin one column round": counts(lambda frames: np.roll(frames, 1, axis=2)),
     "skin a quarter round": counts(lambda frames: np.roll(frames, 6, axis=2)),
     "skin upside down": counts(lambda frames: frames[:, ::-1]),
@@ -118,10 +109,44 @@ SHIFTS = {
 }
 
 
-def decisions(model, recordings, error=None):
+def scene_changes(scene):
+    """{what is changed: the changed scene}: another arm, or one effect of the sensors
+    more or less."""
+    changes = {}
+    for factor in (0.5, 2.0):
+        # The distance stays.
+        rate = tuple(factor * speed for speed in scene.rate)
+        slower = {"rate": rate, "travel_s": scene.travel_s / factor}
+        changes[f"arm speed x {factor:g}"] = slower
+        stiffness = tuple(factor * spring for spring in scene.stiffness)
+        changes[f"arm stiffness x {factor:g}"] = {"stiffness": stiffness}
+    for name, effect in EFFECTS.items():
+        if effect.stage in ("sensor", "clock"):
+            add = tuple(other for other in scene.add if other != name)
+            if add == scene.add:
+                changes[f"with {name}"] = {"add": (*add, name)}
+            else:
+                changes[f"without {name}"] = {"add": add}
+    return {name: replace(scene, **fields) for name, fields in changes.items()}
+
+
+def redone(scene, usual):
+    """Recordings of a changed scene from the draws of the `usual` recordings.
+
+    Its labels are theirs, also where another arm no longer moves an object.
+    """
+    attempts = {r.meta["trial"]: r.meta["simulation"]["redrawn"] for r in usual}
+    specs = []
+    for spec in chain.from_iterable(batches_of(scene)):
+        trial = file_name(scene, spec).removesuffix(".npz")
+        specs.append(replace(spec, attempt=attempts[trial]))
+    return [r for _, r in recordings(run_physics(scene, tuple(specs)))]
+
+
+def decisions(model, recordings):
     """A row for each decision on recordings, with the number of the touch and its true
     label; a touch that is not felt has none."""
-    classifier = Classifier(model, error=error)
+    classifier = Classifier(model)
     rows = []
     for touch, recording in enumerate(recordings):
         for event in classifier.classify(recording):
@@ -132,11 +157,11 @@ def decisions(model, recordings, error=None):
     return pd.DataFrame(rows, columns=[*Decided.__annotations__, "touch", "truth"])
 
 
-def answers(model, recordings, shift):
-    """{task: a row for each answer to shifted touches}: whether it is right; whether it
+def answers(model, recordings):
+    """{task: a row for each answer to touches}: whether it is right; whether it
     is in doubt, by a flag or as it is less likely right than wrong; whether it is
     sure, without a flag and with a high confidence."""
-    rows = decisions(model, map(shift, recordings))
+    rows = decisions(model, recordings)
     likely = rows["confidence"].astype(float)
     flagged = rows["flags"].map(len) > 0
     rows["right"] = rows["label"] == rows["truth"]
@@ -145,9 +170,9 @@ def answers(model, recordings, shift):
     return {task: rows[rows["task"] == task] for task in model.info.tasks}
 
 
-def fresh_touches(seed, count):
-    """Recordings of so many touches of each object in each condition."""
-    return [r for _, r in simulate(scenes.load(SCENE, seed=seed, count=count))]
+def fresh_touches(scene):
+    """Recordings of a scene's trials."""
+    return [recording for _, recording in simulate(scene)]
 
 
 def share(facts):
@@ -184,11 +209,15 @@ def row(name, task, judged, usual):
 def measure(model, trials):
     """Measure, and write the table."""
     loaded = Model(model)
-    fresh = fresh_touches(FRESH_SEED, trials)
+    scene = scenes.load(SCENE, seed=FRESH_SEED, count=trials)
+    fresh = fresh_touches(scene)
+    cases = {name: partial(map, shift, fresh) for name, shift in SHIFTS.items()}
+    for name, changed in scene_changes(scene).items():
+        cases[name] = partial(redone, changed, fresh)
     rows = []
     usual = {}
-    for name, shift in bar(SHIFTS.items(), desc="shifts", total=len(SHIFTS)):
-        for task, judged in answers(loaded, fresh, shift).items():
+    for name, shifted in bar(cases.items(), desc="shifts", total=len(cases)):
+        for task, judged in answers(loaded, shifted()).items():
             accuracy = usual.setdefault(task, trusted(judged))
             rows.append(row(name, task, judged, accuracy))
     tables.write("shifts", [rows], "make shifts")

@@ -1,57 +1,70 @@
-"""The loop in virtual time, for hours: memory and descriptors must stay flat.
+"""`make soak`: the loop in virtual time, and load on its page. Memory and descriptors
+must stay flat, and no line may be lost and no tick left out.
 
-`python -m tests.bench.soak` reads Cody's skin over the fake, timed by the bits on the wire,
-with 0.1 % of all transactions failing, decides on each contact with the model that
-comes with the program, writes events, map and datagrams as `edge-classify run` does,
-and prints memory, descriptors, schedule and lost lines. The exit status is 1 where
-memory has grown after the first tenth of the time, a descriptor or a line was lost, or
-a tick left out. A virtual minute at 100 Hz takes about nine seconds of one core; a day
-at 15 Hz takes about an hour.
+Cody's skin is read over the fake, timed by the bits on the wire, with 0.1 % of all
+transactions failing. Each contact is decided with the model that comes with the
+program, and events are written as `edge-classify run` writes them. A virtual minute
+takes about nine seconds of one core.
+
+The second table is of `edge-classify run --web` in real time, alone and beside clients
+that ask without the page's token. They have the lowest priority, as on another machine.
+The exit status is 1 where memory has grown after the first tenth of the time, a
+descriptor or a line was lost, or more ticks were left out than chance explains.
 """
 
 import errno
 import gc
+import json
+import math
 import os
+import re
 import socket
-import tempfile
-from dataclasses import replace
-from pathlib import Path
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from multiprocessing import get_context
+from urllib.parse import urlsplit
 
 import numpy as np
 import psutil
 
 from edge import demo
 from edge.classifier import Classifier
-from edge.errors import InputError
 from edge.model.model import Model
 from edge.output.event_writer import Lines
-from edge.output.touch_map import map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.frame import Frame
 from edge.touch.track import MAX_CONTACTS
 from tests.bench import tables
 from tests.bench.program import start
+from tests.conftest import started
 from tests.faulty import Fault, faulty_skin
 from train.progress import bar
-from train.touch_map import TouchMap
 
 GROWTH_KB = 2048
 """Allowed after the first tenth: pages that the allocator keeps, no more with more
 hours."""
+ROWS = 10
+RATE_HZ = 100
+CLIENTS = 8
+QUERY = b"GET /?" + b"a=b&" * 1000 + b" HTTP/1.1\r\n\r\n"
 
 
 def is_flat(rows):
-    """Whether memory and descriptors stay."""
-    early = rows[max(len(rows) // 10 - 1, 0)]
+    """Whether memory and descriptors stay, and nothing was lost."""
+    early, *_, last = rows
     grown_kb = max(row["kB"] for row in rows) - early["kB"]
-    return grown_kb <= GROWTH_KB and rows[-1]["descriptors"] == early["descriptors"]
+    lost = last["ticks left out"] + last["lines lost"]
+    return (
+        grown_kb <= GROWTH_KB
+        and last["descriptors"] == early["descriptors"]
+        and not lost
+    )
 
 
-def soak(minutes, every, rate_hz):
-    """Run the loop for so many virtual minutes; a row of the table for each
-    `every` of them, the lines that were not written and ticks left out, and the
-    contacts on the map."""
+def soak(minutes):
+    """Run the loop for so many virtual minutes; a row for each tenth of them."""
     model = Model(demo.MODEL)
     process = psutil.Process()
     rng = np.random.default_rng(0)
@@ -59,37 +72,27 @@ def soak(minutes, every, rate_hz):
     touches[::2] = 0  # a second of contact, a second without
     faults = [Fault(code=code, rate=0.0005) for code in (errno.EREMOTEIO, errno.EIO)]
     file = skinfile.load(skinfile.shipped("cody"))
-    file = replace(file, reading=replace(file.reading, rate_hz=rate_hz))
-    frames_a_row = max(round(60.0 * rate_hz * every), 1)
+    total = round(60 * RATE_HZ * minutes)
     rows = []
     written = 0
     with (
-        tempfile.TemporaryDirectory() as folder,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener,
         open(os.devnull, "w") as out,
         faulty_skin(file, lambda t: touches[int(t) % 50], faults, timed=True) as skin,
     ):
-        listener.bind(("127.0.0.1", 0))  # nobody reads what arrives there
-        host, port = listener.getsockname()
-        place = Path(folder) / "map.jsonl"
-        patient = {"patient": lambda: True}
-        placing = map_writer(place, model.info, **patient)
-        lines = Lines(out, f"{host}:{port}", more=[placing], **patient)
+        lines = Lines(out, patient=lambda: True)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * minutes)
         pose = np.zeros(model.info.chain.dof)
-        total = round(60.0 * rate_hz * minutes)
         for number, frame in enumerate(bar(loop.frames(), total=total, desc="soak"), 1):
             posed = Frame(frame.t, frame.counts, frame.valid, frame.times, pose)
             events = [event.to_dict() for event in classifier.push(posed)]
             written += len(events)
             lines.write(events)
-            if number % frames_a_row == 0:
+            if number % (total // ROWS) == 0:
                 gc.collect()
                 rows.append(
                     {
-                        "minute": round(number / (60.0 * rate_hz), 2),
-                        "frames": number,
+                        "minute": round(number / (60.0 * RATE_HZ), 2),
                         "events": written,
                         "ticks left out": loop.schedule.missed_ticks,
                         "lines lost": sum(lines.lost.values()),
@@ -98,19 +101,59 @@ def soak(minutes, every, rate_hz):
                     }
                 )
         lines.close()
-        placed = sum(1 for _ in TouchMap(place))
-    lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
-    return rows, lost, placed
+    return rows
 
 
-def measure(minutes, every, rate):
+def ask(link):
+    """Ask without a token, again as soon as it is answered or refused."""
+    place = urlsplit(link)
+    while True:
+        with (
+            suppress(OSError),
+            socket.create_connection((place.hostname, place.port), 2.0) as client,
+        ):
+            client.sendall(QUERY)
+            client.recv(4096)
+
+
+def clients(link):
+    """The clients, in a process of their own."""
+    os.nice(19)
+    with ThreadPoolExecutor(CLIENTS) as threads:
+        list(threads.map(ask, [link] * CLIENTS))
+
+
+def page(load, seconds):
+    """The row of a run with the page."""
+    run = ["run", "--model", demo.MODEL, "--fake", demo.recordings()[0]]
+    run += "--real-time --loop --json --web 127.0.0.1:0 --seconds".split()
+    with started(*run, seconds, stdout=subprocess.PIPE) as running:
+        links = (re.search(r"http://\S+", line) for line in running.stderr)
+        link = next(filter(None, links))[0]
+        asking = get_context("spawn").Process(target=load, args=(link,))
+        asking.start()
+        written, _ = running.communicate()
+        asking.kill()
+        asking.join()
+    end = json.loads(written.splitlines()[-1])
+    return {
+        "frames": end["frames"],
+        "ticks left out": end["missed_ticks"],
+        "period, ms: p99.9": end["period_ms"]["p99.9"],
+    }
+
+
+def measure(minutes, seconds):
     """Run and print; 1 where something was not flat."""
-    if every > minutes:
-        raise InputError(f"--every {every:g} is longer than --minutes {minutes:g}")
-    rows, lost, placed = soak(minutes, every, rate)
-    tables.write("soak", [rows])
-    print(f"{placed} contacts on the map")
-    return 0 if is_flat(rows) and lost == 0 and placed > 0 else 1
+    rows = soak(minutes)
+    quiet = page(len, seconds)
+    loaded = page(clients, seconds)
+    asked = f"{CLIENTS} clients, queries of 4 KB"
+    loads = [{"load": "none"} | quiet, {"load": asked} | loaded]
+    tables.write("soak", [rows, loads])
+    ticks = quiet["ticks left out"]
+    most = ticks + 3.0 * math.sqrt(ticks + 1.0)
+    return 0 if is_flat(rows) and loaded["ticks left out"] <= most else 1
 
 
 if __name__ == "__main__":
@@ -118,6 +161,5 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--minutes", 10.0, "of virtual time"),
-        ("--every", 1.0, "minutes between two rows"),
-        ("--rate", 100.0, "frames a second"),
+        ("--seconds", 20.0, "of each run with the page"),
     )

@@ -2,36 +2,22 @@
 decisions.
 
 All decide on the same five folds; ours has the settings of an export. Extra trees
-decide at the first point at which their highest class probability passes a threshold,
-or (`SPRT`) at which the sum of their log probabilities of a class until then leads that
-of any other class by a margin (Wald's sequential probability ratio test, as if the
-points were independent). CALIMERA (Bilski and Jastrzebska, CALIMERA: a new early time
-series classification method, 2023) decides with calibrated ridge classifiers, at
-several prices of waiting. Each of these has four sets of features, joint angles among
-them, and the set that errs least at the time is shown, which favours it. "set chosen"
-shows extra trees as a user could have them: their set is chosen for the trials of each
-fold by those of the other folds, as ours is. Columns are compared at the same mean time,
-between two thresholds or prices by interpolation, as means over the data sets. The gain
-is by how much deciding when sure errs less than the fixed window. The other differences
-are by how much it errs less than the peer with the lowest mean, and than the trees whose
-set is chosen. Standard errors are those of the paired differences over the data sets; with one
-data set they treat the two shares as independent, which overstates them.
-
-The other tables are of the first data set. The second has rules that choose their mean
-time themselves: aeon's TEASER (Schäfer and Leser, TEASER: early and accurate time series
-classification, 2020) and its threshold of the probability, 0.85. Both ask extra trees
-about the paper's three features at each frame until then, every 0.2 s. aeon teaches
-TEASER which answers to trust by answers to whole series.
+decide at the first point at which their highest class probability passes a threshold.
+CALIMERA (Bilski and Jastrzebska, CALIMERA: a new early time series classification
+method, 2023) decides with calibrated ridge classifiers, at several prices of waiting.
+Each of these has four sets of features, joint angles among them, and the set that errs
+least at the time is shown, which favours it. "set chosen" shows extra trees as a user
+could have them: their set is chosen for the trials of each fold by those of the other
+folds, as ours is. Columns are compared at the same mean time, between two thresholds or
+prices by interpolation, as means over the data sets. The gain is by how much deciding
+when sure errs less than the fixed window. The other differences are by how much it errs
+less than the peer with the lowest mean, and than the trees whose set is chosen. Standard
+errors are those of the paired differences over the data sets.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from aeon.classification.early_classification import (
-    TEASER,
-    ProbabilityThresholdEarlyClassifier,
-)
-from aeon.classification.sklearn import SklearnClassifierWrapper
 from scipy.stats import sem
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import ExtraTreesClassifier
@@ -42,7 +28,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from edge.model.info import StoppingRule
-from edge.touch.features import FEATURES, SAMPLES
+from edge.touch.features import SAMPLES
 from tests.bench import tables
 from tests.bench.program import start
 from train.data.dataset import read
@@ -55,11 +41,8 @@ from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, compare_stopping
 
 SECONDS = np.array(DECISION_POINTS_S)
-RATE_HZ = 100
-"""Frames of the series that aeon's rules look at."""
 WAITING = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Prices of waiting for the full window, in wrong decisions."""
-AEON = {"TEASER": TEASER, "threshold 0.85": ProbabilityThresholdEarlyClassifier}
 SETS = (
     "paper contact",
     "contact joints",
@@ -71,10 +54,8 @@ NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
 FIXED = "fixed window, % wrong"
 SURE = "when sure"
 TREES_FIXED = "extra trees, fixed window"
-PEERS = ("extra trees", "their SPRT", "CALIMERA")
+PEERS = ("extra trees", "CALIMERA")
 CHOSEN = "extra trees, set chosen"
-MARGINS = np.linspace(0.0, 8.0, 33)
-"""Leads of the log probabilities, for the ratio test."""
 
 
 # A curve is [(mean seconds, share wrong)] at each threshold or price.
@@ -85,12 +66,6 @@ def decided(stops, right):
     (n,)."""
     hits = right[stops, np.arange(len(stops))]
     return SECONDS[stops].mean(), 1.0 - hits.mean()
-
-
-def once_certain(certainty, right, limits):
-    """The curve of deciding at the first point (points, n) that passes a limit, or at
-    the last point."""
-    return [decided(stops, right) for stops in first_certain(certainty, limits)]
 
 
 def first_certain(certainty, limits):
@@ -104,16 +79,18 @@ class Trees(NamedTuple):
     """What extra trees of one set of features cost.
 
     Attributes:
-        fixed, sure, ratio: their curves at fixed windows, when sure, and by the ratio
-            test, which waits until the evidence for a class leads by a margin.
+        fixed: their curve at fixed windows.
         seconds, wrong: (thresholds, n) for each trial, when sure.
     """
 
     fixed: Any
-    sure: Any
-    ratio: Any
     seconds: Any
     wrong: Any
+
+    def curve(self, trials=slice(None)):
+        """Their curve when sure, of some trials."""
+        seconds = self.seconds[:, trials].mean(axis=1)
+        return list(zip(seconds, self.wrong[:, trials].mean(axis=1), strict=True))
 
 
 def extra_trees(X, labels, folds):
@@ -124,16 +101,9 @@ def extra_trees(X, labels, folds):
     classes = np.unique(labels)
     right = classes[shares.argmax(axis=2)] == labels
     fixed = list(zip(SECONDS, 1.0 - right.mean(axis=1), strict=True))
-    certainty = shares.max(axis=2)
-    sure = once_certain(certainty, right, THRESHOLDS)
-    stops = first_certain(certainty, THRESHOLDS)
+    stops = first_certain(shares.max(axis=2), THRESHOLDS)
     wrong = ~right[stops, np.arange(len(labels))]
-    evidence = np.log(np.maximum(shares, 1e-3)).cumsum(axis=0)
-    right = classes[evidence.argmax(axis=2)] == labels
-    ordered = np.sort(evidence, axis=2)
-    lead = ordered[..., -1] - ordered[..., -2]
-    ratio = once_certain(lead, right, MARGINS)
-    return Trees(fixed, sure, ratio, SECONDS[stops], wrong)
+    return Trees(fixed, SECONDS[stops], wrong)
 
 
 def of_chosen_set(by_set, folds):
@@ -145,16 +115,12 @@ def of_chosen_set(by_set, folds):
         wrong = np.empty(taken_s.shape)
         for fold in range(FOLDS):
             test = folds == fold
-            percentages = []
-            for trees in by_set:
-                means = trees.seconds[:, ~test].mean(1), trees.wrong[:, ~test].mean(1)
-                percentages.append(at([list(zip(*means, strict=True))], seconds))
+            percentages = [at([trees.curve(~test)], seconds) for trees in by_set]
             best = by_set[np.nan_to_num(percentages, nan=np.inf).argmin()]
             taken_s[:, test] = best.seconds[:, test]
             wrong[:, test] = best.wrong[:, test]
-        means = taken_s.mean(axis=1), wrong.mean(axis=1)
-        share = at([list(zip(*means, strict=True))], seconds) / 100
-        curve.append((seconds, share))
+        chosen = Trees(None, taken_s, wrong)
+        curve.append((seconds, at([chosen.curve()], seconds) / 100))
     return curve
 
 
@@ -207,39 +173,14 @@ def calimera(X, labels, folds):
     return [decided(at, right) for at in stops]
 
 
-def of_aeon(make, series, labels, folds):
-    """(mean seconds, share wrong) of a rule of aeon on series (n, 1, frames *
-    features)."""
-    trees = SklearnClassifierWrapper(ExtraTreesClassifier(), random_state=0)
-    looks = SECONDS[::2]  # half as many, as TEASER is slow
-    points = [len(FEATURES) * (round(RATE_HZ * s) + 1) for s in looks]
-    seconds = np.empty(len(labels))
-    right = np.empty(len(labels), dtype=bool)
-    for fold in range(FOLDS):
-        test = folds == fold
-        model = make(trees, classification_points=points, random_state=0)
-        model.fit(series[~test], labels[~test]).predict(series[test])
-        stop, _, answer, _ = model.get_state_info().T
-        seconds[test] = looks[stop]
-        right[test] = model.classes_[answer] == labels[test]
-    return seconds.mean(), 1.0 - right.mean()
-
-
-def peers(by_set, series, labels, folds):
-    """{peer: its curves on a task, one for each set of features}, and {rule of aeon:
-    its point}."""
+def peers(by_set, labels, folds):
+    """{peer: its curves on a task, one for each set of features}."""
     trees = [extra_trees(X, labels, folds) for X in by_set]
-    curves = {
+    return {
         TREES_FIXED: [of_set.fixed for of_set in trees],
-        "extra trees": [of_set.sure for of_set in trees],
-        "their SPRT": [of_set.ratio for of_set in trees],
+        "extra trees": [of_set.curve() for of_set in trees],
         "CALIMERA": [calimera(X, labels, folds) for X in by_set],
         CHOSEN: [of_chosen_set(trees, folds)],
-    }
-    if series is None:
-        return curves, {}
-    return curves, {
-        name: of_aeon(rule, series, labels, folds) for name, rule in AEON.items()
     }
 
 
@@ -258,21 +199,6 @@ def cell(percentage):
     return "-" if np.isnan(percentage) else f"{percentage:.1f}"
 
 
-class Judged(NamedTuple):
-    """What a task's early decisions about one data set cost.
-
-    Attributes:
-        ours: our comparison (see `train.tradeoff.early`).
-        curves: {fixed window, when sure, or peer: its curves, one for each set of
-            features}.
-        aeon: {rule of aeon: (mean seconds, share wrong)}.
-    """
-
-    ours: Any
-    curves: Any
-    aeon: Any
-
-
 def our_curves(ours):
     """Our curves of fixed windows, and of stopping when sure at each threshold."""
     fixed = list(zip(SECONDS, 1.0 - ours.right.mean(axis=1), strict=True))
@@ -284,8 +210,9 @@ def our_curves(ours):
     return {FIXED: [fixed], SURE: [sure]}
 
 
-def judge(data, quick, jobs, is_first):
-    """{task: Judged} of a data set; with aeon's rules for the first."""
+def judge(data, quick, jobs):
+    """{task: {fixed window, when sure, or peer: its curves, one for each set of
+    features}} of a data set."""
     dataset = followed(read([data]), NAMES, quick=quick)
     y = {task: dataset.labels(task) for task in dataset.tasks}
     folds = stratified_folds(y[finest(y)], FOLDS)
@@ -294,78 +221,54 @@ def judge(data, quick, jobs, is_first):
         names = expand(sets.split())
         vectors = [dataset.features(s, SAMPLES, names) for s in DECISION_POINTS_S]
         by_set.append(np.stack(vectors))
-    frames = round(RATE_HZ * DECISION_POINTS_S[-1]) + 1
-    paper = dataset.features(DECISION_POINTS_S[-1], frames, FEATURES)
-    n = len(folds)
-    series = paper.reshape(n, len(FEATURES), frames).swapaxes(1, 2).reshape(n, 1, -1)
     compared = compare_stopping(dataset, DECISION_POINTS_S, quick=quick, jobs=jobs)
-    if not is_first:
-        series = None
-    cases = [(by_set, series, y[task], folds) for task in compared]
+    cases = [(by_set, y[task], folds) for task in compared]
     rivals = Workers(jobs).map("peers", peers, cases)
-    judged = {}
-    for (task, ours), (curves, points) in zip(compared.items(), rivals, strict=True):
-        judged[task] = Judged(ours, our_curves(ours) | curves, points)
-    return judged
+    curves = {}
+    for (task, ours), theirs in zip(compared.items(), rivals, strict=True):
+        curves[task] = our_curves(ours) | theirs
+    return curves
 
 
 def measure(data, quick, jobs):
-    """Measure; print and write the tables."""
-    sets = [judge(folder, quick, jobs, folder == data[0]) for folder in data]
-    at_each_time = []
-    at_own_time = []
-    certified = []
-    for task, first in sets[0].items():
-        judged = [of_set[task] for of_set in sets if task in of_set]
+    """Measure; print and write the table."""
+    sets = [judge(folder, quick, jobs) for folder in data]
+    rows = []
+    for task in sets[0]:
+        curves = [of_set[task] for of_set in sets if task in of_set]
         for seconds in DECISION_POINTS_S:
             row = {"task": task, "mean time, s": f"{seconds:.1f}"}
-            at_each_time.append(row | compare(judged, seconds))
-        for name, (seconds, wrong) in first.aeon.items():
-            row = {"task": task, "rule": name, "mean time, s": f"{seconds:.2f}"}
-            row["wrong, %"] = cell(100 * wrong)
-            row["when sure, at that time"] = cell(at(first.curves[SURE], seconds))
-            at_own_time.append(row)
-        for rule in first.ours.certified:
-            row = {"task": task, "at most wrong": f"{rule.error:g}"}
-            row["certified in folds"] = f"{rule.folds} of {FOLDS}"
-            row["wrong"] = f"{rule.wrong:.1%}"
-            row["unknown"] = f"{rule.unknown:.1%}"
-            row["mean time, s"] = f"{rule.mean_s:.2f}"
-            certified.append(row)
-    tables.write("stopping", [at_each_time, at_own_time, certified])
+            rows.append(row | compare(curves, seconds))
+    tables.write("stopping", [rows])
 
 
-def compare(judged, seconds):
+def compare(curves, seconds):
     """Percentages wrong at a mean time, as means over the data sets: fixed window, when
     sure, and the peers; and differences with their standard errors."""
     wrong = {
-        name: np.array([at(of_set.curves[name], seconds) for of_set in judged])
+        name: np.array([at(of_set[name], seconds) for of_set in curves])
         for name in (FIXED, TREES_FIXED, SURE, *PEERS, CHOSEN)
     }
     means = {name: of_sets.mean() for name, of_sets in wrong.items()}
     best = min(PEERS, key=lambda name: np.nan_to_num(means[name], nan=np.inf))
-    trials = judged[0].ours.right.shape[1]
     row = {name: cell(means[name]) for name in (FIXED, TREES_FIXED, SURE)}
-    row["gain"] = difference(wrong[FIXED], wrong[SURE], trials)
+    row["gain"] = difference(wrong[FIXED] - wrong[SURE])
     row |= {name: cell(means[name]) for name in PEERS}
-    row["best of these less when sure"] = difference(wrong[best], wrong[SURE], trials)
+    row["best of these less when sure"] = difference(wrong[best] - wrong[SURE])
     row[CHOSEN] = cell(means[CHOSEN])
-    row["these less when sure"] = difference(wrong[CHOSEN], wrong[SURE], trials)
+    row["these less when sure"] = difference(wrong[CHOSEN] - wrong[SURE])
     return row
 
 
-def difference(minuend, subtrahend, trials):
-    """The mean difference of percentages wrong and its standard error, over the data
-    sets, or for one of them over its trials."""
-    differences = minuend - subtrahend
-    if np.isnan(differences.mean()):
+def difference(percentages):
+    """The mean of differences over the data sets, with its standard error where there
+    are several."""
+    mean = percentages.mean()
+    if np.isnan(mean):
         return "-"
-    if len(differences) > 1:
-        error = sem(differences)
-    else:
-        percentages = np.stack([minuend, subtrahend])
-        error = np.sqrt((percentages * (100 - percentages)).sum() / trials)
-    return f"{differences.mean():+.1f} ± {error:.1f}"
+    return f"{mean:+.1f}" + (
+        f" ± {sem(percentages):.1f}" if len(percentages) > 1 else ""
+    )
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "measured"
+MEASURED = (":!docs/measured", ":!docs/*.png")
+"""What measuring changes, for git."""
 SCENES = ROOT / "train" / "scenes"
 
 
@@ -38,11 +40,16 @@ def processor():
 
 
 def commit():
-    """The commit that is checked out, marked where a tracked file differs from it."""
-    command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
+    """The commit that is checked out, marked "-dirty" where a tracked file differs from
+    it, other than the tables and pictures that were measured."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-    described = subprocess.run(command, cwd=ROOT, text=True, **pipes)
-    return described.stdout.strip() or "unknown"
+
+    def git(*words):
+        return subprocess.run(["git", *words], cwd=ROOT, text=True, **pipes).stdout
+
+    changed = git("status", "--porcelain", "-uno", "--", ".", *MEASURED)
+    number = git("rev-parse", "--short", "HEAD").strip() or "unknown"
+    return number + ("-dirty" if changed else "")
 
 
 def write(name, tables, command=""):

@@ -12,8 +12,8 @@ side by side. Their sum is the pull.
 Around the forearm a taxel's load acts along the normal of the object's face, which
 differs from the taxel's own by its angle theta: load times sin(theta), as far as
 friction holds it. A face that turns takes the angle with it. Friction against a motion
-around the forearm is left out, as the arm does not feel it either (`make matched` has
-its size). An object without `skin_friction` leaves no shear.
+around the forearm is left out, as the arm does not feel it either. An object without
+`skin_friction` leaves no shear.
 """
 
 import numpy as np
