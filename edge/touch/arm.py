@@ -113,9 +113,25 @@ class Chain:
         Raises:
             InputError: the number of angles is not `dof`, or one is not finite.
         """
-        from edge.touch.pose import pose  # a board takes points alone
-
-        return pose(self, q)
+        try:
+            angles = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"joint angles must be numbers, not {q!r}") from None
+        if angles.ndim == 0 or angles.shape[-1] != self.dof:
+            count = angles.shape[-1] if angles.ndim else "a single number"
+            raise InputError(
+                f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
+                f"({', '.join(self.names)}), not {count}"
+            )
+        if not np.isfinite(angles).all():
+            bad = np.argwhere(~np.isfinite(angles))[0][-1]
+            raise InputError(f"the angle of joint {self.names[bad]} is not finite")
+        transform = np.zeros((*angles.shape[:-1], 4, 4))
+        transform[..., 3, 3] = 1.0
+        of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
+        rows = self.carried(of_each_joint, np.eye(4), np.sin)
+        transform[..., :3, :] = np.stack(rows, axis=-2)
+        return transform
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
         """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
