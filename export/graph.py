@@ -18,14 +18,13 @@ from onnx import helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Array, Booleans, Floats, Integers
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
-from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
 from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
-from train.model.pipeline import ContactClassifier, Space
+from train.model.pipeline import ContactClassifier, Space, nearest_of_label
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -243,9 +242,11 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     y = build.shifted("MatMul", z, whitening, [p.shift for p in points])
     y, _ = build.clipped(y, [FARTHEST] * len(points))
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
-    columns = build.stored([-2.0 * p.rows.T for p in points], np.int16, NOVELTY_COLUMNS)
+    columns = build.stored(
+        [-2.0 * p.rows.T for p in points], np.int16, "columns of novelty"
+    )
     lengths = build.by_decision_point(
-        [(p.rows**2).sum(axis=1) for p in points], NOVELTY_LENGTHS
+        [(p.rows**2).sum(axis=1) for p in points], "lengths of novelty"
     )
     length = build.squared_length(y)
     distances = build.node("Gemm", y, columns, lengths)
@@ -254,6 +255,32 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     product = build.node("Mul", build.node("Sqrt", outside), root)
     units = build.by_decision_point([p.unit for p in points])
     build.node("Squeeze", build.node("Mul", product, units), [1], output=output)
+
+
+def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
+    """The constants from which the graph takes the distances of labels.
+
+    Args:
+        labels: (n,) of the trials; -1 where one has none.
+        classes: how many labels there are.
+
+    Returns:
+        `members` (classes, largest): the trials of each label, filled up with n;
+        `most` (1,): the largest count; `taken` (classes, most): True in the first
+        columns of each label, as many as its count; `counts` (classes,): how many
+        trials stand for each label.
+    """
+    sizes = np.bincount(labels[labels >= 0], minlength=classes)
+    counts = nearest_of_label(sizes)
+    members = np.full((classes, int(sizes.max())), len(labels))
+    for label, size in enumerate(sizes):
+        members[label, :size] = np.flatnonzero(labels == label)
+    return {
+        "members": members,
+        "most": counts.max(keepdims=True),
+        "taken": np.arange(counts.max()) < counts[:, None],
+        "counts": counts.astype(np.float64),
+    }
 
 
 def _label_distances(
@@ -286,11 +313,7 @@ def _label_distances(
 
 
 def _outputs(model: Fitted) -> dict[str, Any]:
-    """{output: its type}.
-
-    ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching`
-    enlarges.
-    """
+    """{output: its type}; ONNX Runtime derives the sizes from the constants."""
     sequential = isinstance(model, SequentialClassifier)
     of_task = {
         "label": Int64TensorType([None]),

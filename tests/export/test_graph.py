@@ -233,7 +233,6 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     shapes = [tuple(tensor.dims) for tensor in proto.graph.initializer]
     matrices = Counter(shape for shape in shapes if len(shape) == 2)
     weights = {(120, 7): 1, (120, 20): 1}
-    # A task's rows are its own, so that it can be taught alone.
     rows = {(7, 50): 1, (20, 50): 3}
     ballots = {(6, 5): 4}
     assert matrices == weights | rows | ballots

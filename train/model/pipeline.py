@@ -20,12 +20,14 @@ from scipy.special import expit
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
 from edge.model.agreement import agreed
-from edge.tools.teaching import nearest_of_label
 from edge.touch.features import FEATURES
 from train.data.vectors import Labels, Strings, Vectors, widths_of
 from train.model.agreement import factors_of
 from train.model.projection import Projection
 from train.model.scaling import finite
+
+NEAREST_OF_LABEL = 3
+LABEL_SHARE = 20
 
 
 def vote(labels: Integers) -> Integers:
@@ -44,6 +46,15 @@ def squared_distances(X: Floats, rows: Floats) -> Floats:
     if not X.shape[1]:
         return np.zeros((len(X), len(rows)))
     return np.asarray(cdist(X, rows, "sqeuclidean"))
+
+
+def nearest_of_label(sizes: Integers) -> Integers:
+    """Number of trials that stand for a label: a twentieth of its own, at least three.
+
+    A label with fewer than three trials is represented by all of them. With a share
+    rather than a number, a label's distance does not shrink as its trials become more.
+    """
+    return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
 
 def label_distances(

@@ -10,7 +10,13 @@ from sklearn.pipeline import make_pipeline
 
 from edge.errors import InputError
 from tests.hard_cases.models import features
-from train.model.pipeline import Choice, ContactClassifier, slope, vote
+from train.model.pipeline import (
+    Choice,
+    ContactClassifier,
+    nearest_of_label,
+    slope,
+    vote,
+)
 from train.model.projection import Projection
 
 
@@ -18,6 +24,11 @@ def test_votes_and_ties():
     labels = np.array([[2, 0, 0], [1, 0, 2], [1, 0, 0], [2, 2, 0]])
     assert vote(labels).tolist() == [0, 1, 0, 2]
     assert vote(np.array([[2, 0]])).tolist() == [2]
+
+
+def test_a_twentieth_of_a_labels_trials_stand_for_it_but_three_if_there_are():
+    sizes = np.array([0, 2, 3, 59, 61, 100])
+    assert nearest_of_label(sizes).tolist() == [0, 2, 3, 3, 4, 5]
 
 
 def test_equal_distances_go_to_the_earlier_row():
