@@ -2,7 +2,7 @@
 
 `python -m tests.bench.soak` reads Cody's skin over the fake, timed by the bits on the wire,
 with 0.1 % of all transactions failing, decides on each contact with the model that
-comes with the program, writes events, map and datagrams as `edge-classify run` does,
+comes with the program, writes events as `edge-classify run --contacts` does,
 and prints memory, descriptors, schedule and lost lines. The exit status is 1 where
 memory has grown after the first tenth of the time, a descriptor or a line was lost, or
 a tick left out. A virtual minute at 100 Hz takes about nine seconds of one core; a day
@@ -12,10 +12,7 @@ at 15 Hz takes about an hour.
 import errno
 import gc
 import os
-import socket
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import psutil
@@ -25,7 +22,6 @@ from edge.classifier import Classifier
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.output.event_writer import Lines
-from edge.output.touch_map import map_writer
 from edge.skin import file as skinfile
 from edge.skin.loop import Loop
 from edge.touch.frame import Frame
@@ -34,7 +30,6 @@ from tests.bench import tables
 from tests.bench.program import start
 from tests.faulty import Fault, faulty_skin
 from train.progress import bar
-from train.touch_map import TouchMap
 
 GROWTH_KB = 2048
 """Allowed after the first tenth: pages that the allocator keeps, no more with more
@@ -51,7 +46,7 @@ def is_flat(rows):
 def soak(minutes, every, rate_hz):
     """Run the loop for so many virtual minutes; a row of the table for each
     `every` of them, the lines that were not written and ticks left out, and the
-    contacts on the map."""
+    decisions with a position."""
     model = Model(demo.MODEL)
     process = psutil.Process()
     rng = np.random.default_rng(0)
@@ -63,18 +58,12 @@ def soak(minutes, every, rate_hz):
     frames_a_row = max(round(60.0 * rate_hz * every), 1)
     rows = []
     written = 0
+    placed = 0
     with (
-        tempfile.TemporaryDirectory() as folder,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener,
         open(os.devnull, "w") as out,
         faulty_skin(file, lambda t: touches[int(t) % 50], faults, timed=True) as skin,
     ):
-        listener.bind(("127.0.0.1", 0))  # nobody reads what arrives there
-        host, port = listener.getsockname()
-        place = Path(folder) / "map.jsonl"
-        patient = {"patient": lambda: True}
-        placing = map_writer(place, model.info, **patient)
-        lines = Lines(out, f"{host}:{port}", more=[placing], **patient)
+        lines = Lines(out, patient=lambda: True)
         classifier = Classifier(model, skin.layout, max_contacts=MAX_CONTACTS)
         loop = Loop(skin, lasts_s=60.0 * minutes)
         pose = np.zeros(model.info.chain.dof)
@@ -83,6 +72,7 @@ def soak(minutes, every, rate_hz):
             posed = Frame(frame.t, frame.counts, frame.valid, frame.times, pose)
             events = [event.to_dict() for event in classifier.push(posed)]
             written += len(events)
+            placed += sum(event.get("place") is not None for event in events)
             lines.write(events)
             if number % frames_a_row == 0:
                 gc.collect()
@@ -92,14 +82,13 @@ def soak(minutes, every, rate_hz):
                         "frames": number,
                         "events": written,
                         "ticks left out": loop.schedule.missed_ticks,
-                        "lines lost": sum(lines.lost.values()),
+                        "lines lost": lines.lost,
                         "descriptors": process.num_fds(),
                         "kB": process.memory_info().rss // 1024,
                     }
                 )
         lines.close()
-        placed = sum(1 for _ in TouchMap(place))
-    lost = sum(lines.lost.values()) + loop.schedule.missed_ticks
+    lost = lines.lost + loop.schedule.missed_ticks
     return rows, lost, placed
 
 
@@ -109,7 +98,7 @@ def measure(minutes, every, rate):
         raise InputError(f"--every {every:g} is longer than --minutes {minutes:g}")
     rows, lost, placed = soak(minutes, every, rate)
     tables.write("soak", [rows])
-    print(f"{placed} contacts on the map")
+    print(f"{placed} decisions with a position")
     return 0 if is_flat(rows) and lost == 0 and placed > 0 else 1
 
 
