@@ -13,7 +13,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -27,13 +26,13 @@ from edge.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
 from edge.cli import main
 from edge.fake.clock import VirtualClock
 from edge.fake.player import Playback, calibrated
-from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.recording import Recording, load
 from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+from tests.board.usb_adapter import UsbAdapter, plugged
 from tests.faulty import Fault, faulty_buses
 
 SKINS = Path(os.environ["SKINS"])
@@ -271,18 +270,6 @@ def test_a_user_without_permission_is_told_which_group_to_join(device):
             LinuxBus(device)
     finally:
         os.seteuid(0)
-
-
-def test_plug_puts_a_skin_on_the_bus_until_ctrl_c(pad):
-    plug = [sys.executable, "-m", "edge", "fake", "--skin", pad.path, "--plug"]
-    with subprocess.Popen(plug, stdout=subprocess.PIPE) as program:
-        event = json.loads(program.stdout.readline())
-        with closing(LinuxBus(event["device"])) as bus:
-            assert fetch(bus, OTHER_CHIP, CONFIGURATION, 1) == EXPECTED
-        program.send_signal(signal.SIGINT)
-    assert event["event"] == "plugged"
-    assert program.returncode == 0
-    assert not Path(event["device"]).exists()
 
 
 def test_a_skin_whose_adapter_comes_back_with_another_number_is_read_again(pad):
