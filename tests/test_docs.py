@@ -35,6 +35,7 @@ def objects(text):
     return [event["label"] for event in events if event.get("task") == "object"]
 
 
+@pytest.mark.slow
 def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     ran = []
@@ -54,6 +55,7 @@ def test_the_tutorial_runs_as_it_is_written(tmp_path, monkeypatch, capsys):
     assert {*objects(capsys.readouterr().out)} >= {"pillow", "foam block"}
 
 
+@pytest.mark.slow
 def test_the_two_evenings_mend_a_mistake(tmp_path):
     text = (DOCS / "evenings.md").read_text()
     script = "".join(re.findall(r"```sh\n(.*?)```", text, re.S))

@@ -57,6 +57,7 @@ def test_positions_are_drawn_from_the_lines_of_a_run(edge, tmp_path):
     assert out.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_model_is_fitted_and_exported(run, make_touch, tmp_path):
     trials = save_touches(tmp_path / "trials", 5)
     run("fit_and_export.py", trials, tmp_path / "model.onnx")

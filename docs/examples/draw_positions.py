@@ -17,13 +17,15 @@ def main(task: str, out: str) -> None:
         if event["event"] == "decision" and event["task"] == task and event["place"]:
             places[str(event["label"])].append(event["place"])
     figure = Figure(figsize=(11, 5), layout="constrained")
-    for axis, (across, up) in zip(figure.subplots(1, 2), ("xy", "xz"), strict=True):
+    axes = figure.subplots(1, 2)
+    for axis, (across, up) in zip(axes, ("xy", "xz"), strict=True):
         for label, positions in sorted(places.items()):
             columns = dict(zip("xyz", zip(*positions, strict=True), strict=True))
             axis.scatter(columns[across], columns[up], label=label, edgecolors="black")
-        axis.set(xlabel=f"{across} (m)", ylabel=f"{up} (m)", aspect="equal")
+        axis.set(xlabel=f"{across} (m)", ylabel=f"{up} (m)")
+        axis.set_aspect("equal", adjustable="datalim")
         axis.grid(alpha=0.3)
-    figure.legend(title=task, loc="outside right upper")
+    axes[0].legend(title=task)
     figure.savefig(out)
 
 
