@@ -50,6 +50,17 @@ def test_a_recording_is_classified(run):
     ]
 
 
+def test_positions_are_drawn_from_the_lines_of_a_run(edge, tmp_path):
+    words = ("--model", demo.MODEL, "--fake", PILLOW, "--contacts", 4)
+    _, lines, _ = edge("run", *words)
+    piped = "".join(f"{json.dumps(line)}\n" for line in lines)
+    out = tmp_path / "positions.png"
+    drawn = python(EXAMPLES / "draw_positions.py", "category", out, input=piped)
+    assert drawn.returncode == 0, drawn.stderr
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
 def test_a_model_is_fitted_and_exported(run, make_touch, tmp_path):
     trials = save_touches(tmp_path / "trials", 5)
     run("fit_and_export.py", trials, tmp_path / "model.onnx")

@@ -19,7 +19,6 @@ OPTIONAL = (
     "edge/model/graph.py",
     "edge/no_contact.py",
     "edge/output/systemd.py",
-    "edge/output/touch_map.py",
     "edge/recording.py",
     "edge/touch/joint_stream.py",
     "edge/touch/kernels.py",

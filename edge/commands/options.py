@@ -50,7 +50,14 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
         help="need no hardware: play this recording onto fake chips, as fast as "
         "possible; without --skin, the chips are chosen to suit the recording",
     )
-    add_noise(parser, "the fake chips of a --skin")
+    parser.add_argument(
+        "--noise",
+        type=within(float, 0.0, 1000.0),
+        default=NOISE_COUNTS,
+        metavar="COUNTS",
+        help="noise of the fake chips of a --skin, as a standard deviation (default: "
+        "%(default)g)",
+    )
     parser.add_argument(
         "--real-time",
         action="store_true",
@@ -66,17 +73,6 @@ def add_skin(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=math.inf,
         help="stop after this time (default: never)",
-    )
-
-
-def add_noise(parser: argparse.ArgumentParser, chips: str) -> None:
-    """Add the option for the noise of fake chips; its help names them by `chips`."""
-    parser.add_argument(
-        "--noise",
-        type=within(float, 0.0, 1000.0),
-        default=NOISE_COUNTS,
-        metavar="COUNTS",
-        help=f"noise of {chips}, as a standard deviation (default: %(default)g)",
     )
 
 

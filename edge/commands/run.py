@@ -51,14 +51,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "the skin, flagged skin_motion",
     )
     parser.add_argument(
-        "--udp",
-        metavar="HOST:PORT",
-        help="also send each event to this address, as a datagram of one JSON line",
-    )
-    parser.add_argument(
-        "--map",
-        metavar="FILE",
-        help="follow several contacts at once, and append each to FILE with its position",
+        "--contacts",
+        type=within(int, 1, MAX_CONTACTS),
+        default=1,
+        metavar="N",
+        help="follow up to this many contacts at once; with more than 1, events have the "
+        "contact's number, and decisions its position (default: %(default)s)",
     )
     parser.add_argument(
         "--keep",
@@ -123,7 +121,7 @@ def warn_of_still_taxels(events: Sequence[Event]) -> None:
             )
 
 
-def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str, Any]:
+def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
     """The last event: the loop's periods and the number of lines that were lost."""
     periods = {}
     if schedule.periods.n:
@@ -136,7 +134,7 @@ def end_event(schedule: Schedule, frames: int, lost: dict[str, int]) -> dict[str
         "missed_ticks": schedule.missed_ticks,
         "period_ms": periods,
     }
-    return {**event, "lost": lost} if lost else event
+    return {**event, "lost": {"stdout": lost}} if lost else event
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -156,22 +154,15 @@ def run(arguments: argparse.Namespace) -> int:
     ) as live:
         for sentence in differences(model.info.layout, live.skin.layout):
             LOG.warning(f"{arguments.model}: {sentence}")
-        writers = []
-        max_contacts = 1
-        if arguments.map is not None:
-            from edge.output.touch_map import map_writer  # few runs keep a map
-
-            max_contacts = MAX_CONTACTS
-            writers.append(map_writer(arguments.map, model.info))
         classifier = Classifier(
             model,
             live.skin.layout,
             error=arguments.error,
-            max_contacts=max_contacts,
+            max_contacts=arguments.contacts,
             motion_on_skin=on_skin,
         )
         with (
-            closing(live.lines(arguments.udp, writers)) as lines,
+            closing(live.lines()) as lines,
             _listeners(arguments, model, live.opened) as listeners,
         ):
             unknown_touches = UnknownTouches()
@@ -187,7 +178,7 @@ def run(arguments: argparse.Namespace) -> int:
                     faults.append(notice)
                 lines.write([*faults, *(event.to_dict() for event in decided)])
                 live.show(frame, faults, decided)
-                if lines.unheard:
+                if lines.gone:
                     break
             lines.write(event.to_dict() for event in classifier.finish())
             lines.write([end_event(live.loop.schedule, frames, lines.lost)])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from edge.commands.output import LOG, Output
 from edge.errors import InputError
 from edge.events import Event
-from edge.output.event_writer import Lines, LineWriter
+from edge.output.event_writer import Lines
 from edge.skin import file as skinfile
 from edge.skin.loop import JointSource, Loop, Stop, stop_on
 from edge.skin.skin import SILENT_FRAMES, ChipStatus, Skin
@@ -193,9 +193,9 @@ class Reading:
         """Whether to wait for a slow reader: only in virtual time, until the end."""
         return self.opened.virtual and not self.stop.asked
 
-    def lines(self, udp: str | None = None, more: Sequence[LineWriter] = ()) -> Lines:
+    def lines(self) -> Lines:
         """The events' way out; in virtual time it waits for a slow reader of stdout."""
-        return Lines(udp=udp, form=self.output.line, patient=self.may_wait, more=more)
+        return Lines(form=self.output.line, patient=self.may_wait)
 
 
 @contextmanager

@@ -1,10 +1,8 @@
 """Explain a model's decisions on recordings.
 
-Prints the training trials nearest to a touch, the features for and against the answer,
-and the least change of a single feature that would have given another answer. A
-feature's number says how much nearer, as a squared distance, it brings the touch to the
-nearest trial with the answer than to the nearest one with another label. `python -m
-train show REC --model model.onnx` draws the curves.
+Prints the training trials nearest to a touch, and in which features it is more like the
+nearest trial with the answer, or more like the nearest one with another label, the
+strongest first. `python -m train show REC --model model.onnx` draws the curves.
 """
 
 import argparse
@@ -21,9 +19,7 @@ from edge.tools.explanation import Near, Space, explain
 from edge.tools.replay import contact_of
 
 MOST = 3
-"""Features and changes that a line names."""
-DIRECTED = 0.5
-"""A change goes one way if its mean is more than this share of its size."""
+"""Features that a line names."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not output.as_json:
             output.text(str(path))
         for line in explanations(model, load(path), str(path)):
-            output.event(line, text(line, model.info))
+            output.event(line, text(line))
     return 0
 
 
@@ -79,7 +75,6 @@ def explanations(
             "nearest": [_trial(near, info, labels) for near in why.voters],
             "rival": why.rival and _trial(why.rival, info, labels),
             "pulls": why.pulls,
-            "changes": [{**c._asdict(), "label": labels[c.label]} for c in why.changes],
         }
 
 
@@ -89,7 +84,7 @@ def _trial(near: Near, info: ModelInfo, labels: Sequence[str]) -> dict[str, Any]
     return {**near._asdict(), **names}
 
 
-def text(line: dict[str, Any], info: ModelInfo) -> str:
+def text(line: dict[str, Any]) -> str:
     """An explanation for a person."""
     label = line["label"]
     nearest = line["nearest"]
@@ -101,19 +96,11 @@ def text(line: dict[str, Any], info: ModelInfo) -> str:
     if rival:
         lines += ["  The nearest one with another label:", trial_text(rival)]
         strongest = list(line["pulls"].items())[:MOST]
-        pulls = ", ".join(f"{name} {pull:+.2f}" for name, pull in strongest)
-        compared = f"for (+) and against (-) {label}, compared with {rival['label']}"
-        lines += wrapped(f"Features {compared}: {pulls}.", "  ")
-    for change in line["changes"][:MOST]:
-        unit = info.units[change["feature"]]
-        # The unit of a ratio is "1".
-        plural = f"{unit}s" if unit.isalpha() else unit.removesuffix("1")
-        size = f"{change['size']:.2g} {plural}".rstrip()
-        how = f"were {'higher' if change['mean'] > 0.0 else 'lower'} by {size}"
-        if abs(change["mean"]) <= DIRECTED * change["size"]:
-            how = f"varied in another way, by {size} on average"
-        sentence = f"It would be {change['label']} if {change['feature']} {how}."
-        lines += wrapped(sentence, "  ")
+        for nearer, sign in ((label, 1.0), (rival["label"], -1.0)):
+            names = [name for name, pull in strongest if sign * pull > 0.0]
+            if names:
+                sentence = f"It is more like {nearer} in {', '.join(names)}."
+                lines += wrapped(sentence, "  ")
     return "\n".join(lines)
 
 

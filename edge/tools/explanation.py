@@ -16,10 +16,6 @@ from edge.files import parsing
 from edge.model.graph import Graph
 from edge.model.model import Model
 
-STEPS = (0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0)
-"""Multiples of the change at which two trials become equally near. A further trial on
-the way may take less, several votes more."""
-
 
 class Space(NamedTuple):
     """The coordinates in which a task compares touches, and the training trials in
@@ -98,12 +94,6 @@ class Space(NamedTuple):
         z = np.clip(differences, -self.reach, self.reach) @ self.weights
         return np.clip(z, -self.limit, self.limit)
 
-    def vote(self, z: Floats, k: int) -> int:
-        """The label of the k nearest trials; of tied ones that of the nearest."""
-        squares = ((self.rows - z) ** 2).sum(axis=1)
-        voters = self.labels[squares.argsort(kind="stable")[:k]]
-        return int(voters[np.bincount(voters)[voters].argmax()])
-
 
 class Near(NamedTuple):
     """A training trial near a touch: its row, label (index) and distance, and the
@@ -119,20 +109,6 @@ class Near(NamedTuple):
     pulls: dict[str, float]
 
 
-class Change(NamedTuple):
-    """The least change of one feature that would have given another answer (index of
-    its label).
-
-    Its size is a root mean square over the window, in the feature's unit, like its
-    mean.
-    """
-
-    feature: str
-    label: int
-    size: float
-    mean: float
-
-
 class Explanation(NamedTuple):
     """Why a touch was answered as it was.
 
@@ -142,15 +118,11 @@ class Explanation(NamedTuple):
             label if that is known; None without such a trial.
         pulls: {feature: how much more it pulls towards the nearest trial with the
             answer than towards the rival}, the strongest first.
-        changes: one for each feature that can change the answer, the smallest of them,
-            in deviations of the training trials, first. There are none where the votes
-            are for another label already, and the answer follows from other tasks.
     """
 
     voters: tuple[Near, ...]
     rival: Near | None = None
     pulls: dict[str, float] = {}  # noqa: RUF012
-    changes: tuple[Change, ...] = ()
 
 
 def explain(
@@ -184,22 +156,7 @@ def explain(
     ally = touch.nearest(answered)
     rival = touch.nearest(other_rows)
     pulls = touch.pulls(space.rows[ally] - space.rows[rival])
-    if space.vote(touch.z, len(voters)) != label:
-        return Explanation(nearest, touch.near(rival), pulls)
-    # A vote changes where a trial of another label comes as near as the last one for
-    # the answer.
-    votes = np.isin(np.arange(len(touch.squares)), voters)
-    leaves = np.where(votes & answered, touch.squares, -np.inf).argmax()
-    joins = touch.nearest(other_rows & ~votes)
-    direction = space.rows[leaves] - space.rows[joins]
-    gap = min(touch.squares[leaves] - touch.squares[joins], 0.0)
-    spreads = {}
-    for name in touch.members:
-        change, spread = touch.change(name, direction, gap, len(voters), label)
-        if change is not None:
-            spreads[change] = spread
-    changes = tuple(sorted(spreads, key=spreads.__getitem__))
-    return Explanation(nearest, touch.near(rival), pulls, changes)
+    return Explanation(nearest, touch.near(rival), pulls)
 
 
 class _Touch:
@@ -249,38 +206,3 @@ class _Touch:
     def nearest(self, among: Booleans) -> int:
         """The nearest training trial of some (n,)."""
         return int(np.where(among, self.squares, np.inf).argmin())
-
-    def change(
-        self,
-        feature: str,
-        direction: Floats,
-        gap: float,
-        k: int,
-        label: int,
-    ) -> tuple[Change | None, float]:
-        """The least change of a feature that gives k voters another label, if any, and
-        its mean square in deviations of the training trials.
-
-        Args:
-            feature: its name.
-            direction: (c,) from the trial that is to join the voters to the one that is
-                to leave them.
-            gap: of their squared distances, at most 0.
-            k: how many vote.
-            label: of the answer.
-        """
-        columns = self.members[feature]
-        slope = 2.0 * self.space.weights[columns] @ direction
-        if not slope.any():
-            return None, 0.0
-        step = slope * (gap / (slope @ slope))
-        for times in STEPS:
-            changed = self.differences.copy()
-            changed[columns] += times * step
-            answer = self.space.vote(self.space.coordinates(changed), k)
-            if answer != label:
-                x = times * step / self.space.gain[columns]
-                size = float(np.sqrt((x**2).mean()))
-                change = Change(feature, answer, size, float(x.mean()))
-                return change, times**2 * float((step**2).mean())
-        return None, 0.0

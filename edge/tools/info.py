@@ -1,9 +1,8 @@
-"""Describe a model, or compare two: tasks, labels, accuracy, features, data, skin and
-arm.
+"""Describe a model: tasks, labels, accuracy, features, data, skin and arm.
 
 Prints a model's tasks with their labels and accuracy, its features and training data,
-and the skin and arm that it needs, and its size. Of two models it prints the
-differences.
+the skin and arm that it needs, and its size. `edge-classify replay --model A --model B`
+compares two on recordings.
 """
 
 import argparse
@@ -16,37 +15,17 @@ from edge.model.info import ModelInfo
 from edge.model.metadata import to_json
 from edge.model.model import Model
 
-COARSE = ("kernels", "novelty", "stopping", "units")
-"""Tables that are compared as a whole."""
-NAMED = 6
-"""Names that a line has at most."""
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("model", metavar="model.onnx", help="the model")
-    parser.add_argument(
-        "other",
-        nargs="?",
-        metavar="other.onnx",
-        help="compare with this model",
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the description, or the differences."""
-    output = Output.of(arguments)
+    """Print the description."""
     model = Model(arguments.model)
     about = described(model)
-    if arguments.other is None:
-        output.event(about, description(model.info, about))
-        return 0
-    changes = differences(about, described(Model(arguments.other)))
-    lines = []
-    for key, pair in changes.items():
-        lines += wrapped(change_text(key, *pair))
-    text = "\n".join(lines) or "the models do not differ"
-    output.event({"event": "comparison", "changes": changes}, text)
+    Output.of(arguments).event(about, description(model.info, about))
     return 0
 
 
@@ -59,48 +38,6 @@ def described(model: Model) -> dict[str, Any]:
         "bytes": len(model.contents.data),
         **json.loads(to_json(model.info)),
     }
-
-
-def differences(a: Any, b: Any, key: str = "") -> dict[str, list[Any]]:
-    """{key, such as `tasks.object.k`: its values in a and b} where they differ; None
-    for none."""
-    if not (isinstance(a, dict) and isinstance(b, dict)) or key in COARSE:
-        return {} if a == b else {key: [a, b]}
-    changes: dict[str, list[Any]] = {}
-    for name in {**a, **b}:
-        changes |= differences(a.get(name), b.get(name), f"{key}.{name}".strip("."))
-    return changes
-
-
-def change_text(key: str, a: Any, b: Any) -> str:
-    """A difference for a person: of names, which only one of the models has."""
-    if key in COARSE:
-        return f"{key}: differs"
-    if not isinstance(a, list) and not isinstance(b, list):
-        return f"{key}: {_value_text(key, a)} -> {_value_text(key, b)}"
-    a = _names(key, a)
-    b = _names(key, b)
-    texts = []
-    for sign, names, beside in (("-", a, b), ("+", b, a)):
-        only = [name for name in names if name not in beside]
-        if only:
-            more = f" and {len(only) - NAMED} more" if len(only) > NAMED else ""
-            texts.append(f"{sign} {', '.join(only[:NAMED])}{more}")
-    return f"{key} ({len(a)} -> {len(b)}): {'; '.join(texts) or 'in another order'}"
-
-
-def _value_text(key: str, value: Any) -> str:
-    if key.endswith(".accuracy"):
-        return f"{value:.1%}"
-    return "a table" if isinstance(value, dict) else str(value)
-
-
-def _names(key: str, values: list[Any] | None) -> list[str]:
-    """The names in a list; of trials without the folders of several data sets."""
-    names = list(map(str, values or []))
-    if key == "trials":
-        return [name.rpartition("/")[2] for name in names]
-    return names
 
 
 def description(info: ModelInfo, about: dict[str, Any]) -> str:

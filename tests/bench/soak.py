@@ -95,7 +95,7 @@ def soak(minutes):
                         "minute": round(number / (60.0 * RATE_HZ), 2),
                         "events": written,
                         "ticks left out": loop.schedule.missed_ticks,
-                        "lines lost": sum(lines.lost.values()),
+                        "lines lost": lines.lost,
                         "descriptors": process.num_fds(),
                         "kB": process.memory_info().rss // 1024,
                     }

@@ -26,13 +26,13 @@ from edge.bus.protocol import BusBusy, BusDenied, BusFault, BusNack, fetch
 from edge.cli import main
 from edge.fake.clock import VirtualClock
 from edge.fake.player import Playback, calibrated
-from edge.fake.usb_adapter import UsbAdapter, plugged
 from edge.recording import Recording, load
 from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.calibration import save_calibration
 from edge.skin.loop import Loop
 from edge.skin.skin import Skin
+from tests.board.usb_adapter import UsbAdapter, plugged
 from tests.faulty import Fault, faulty_buses
 
 SKINS = Path(os.environ["SKINS"])

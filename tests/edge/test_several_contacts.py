@@ -1,16 +1,25 @@
-"""Several contacts at once are decided with a few questions a frame."""
+"""Several contacts at once, each with its own decisions and its position, decided with
+a few questions a frame."""
 
 import subprocess
 import sys
+from collections import defaultdict
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 import pytest
 
+from edge import demo
 from edge.classifier import ASKED_A_SECOND, FEWEST_ASKED, Classifier
 from edge.events import Decided, Onset
 from edge.model.model import Model
+from edge.recording import load
+from edge.saving import save
+from edge.touch.arm import Chain
 from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout
+from edge.touch.track import MAX_CONTACTS, ContactTracker
 from tests.conftest import ROOT, export, save_touches
 
 PLACES = [(row, col) for row in (0, 4, 8, 12) for col in (0, 6, 12, 18)]
@@ -132,3 +141,149 @@ def test_the_first_decision_imports_little():
         check=True,
     )
     assert done.stdout.split() == ["3"]
+
+
+MODEL = Model(demo.MODEL)
+FLAT = SkinLayout(rows=6, cols=20, threshold_counts=10, onset_counts=20, release_s=0.05)
+
+
+MERGED, PARTED = ".######", "##.###"
+FLICKER = "/".join(["#." * 10, ".#" * 10] * 3)
+
+
+@pytest.mark.parametrize(
+    ("pictures", "areas", "ended"),
+    [
+        # Two regions are two contacts, also where the later one is larger.
+        (
+            ["##", "##", *["##....####"] * 2, "#.....####"],
+            [[2, 2, 2, 2, 1], [4, 4, 4]],
+            [0, 0],
+        ),
+        # A region that moves by its width goes on.
+        (["#", "#", ".#", "..#", "..#"], [[1] * 5], [0]),
+        # Where two grow into one, the older goes on and the other ends.
+        (
+            [".##", *[".##...##"] * 2, *[MERGED] * 5],
+            [[2, 2, 2, 6, 6, 6, 6, 6], [2, 2, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
+        # Where one parts in two, the larger share goes on.
+        (["######", "######", PARTED, PARTED], [[6, 6, 3, 3], [2, 2]], [0, 0]),
+        # A region below the onset count begins nothing.
+        (["++", "++", "++"], [], []),
+        # A contact ends by itself while another goes on.
+        (
+            [*["#....##"] * 2, *[".....##"] * 5],
+            [[2] * 7, [1, 1, 0, 0, 0, 0, 0]],
+            [0, 1],
+        ),
+        # A skin that flickers has no more than so many contacts.
+        ([FLICKER] * 3, [[1] * 3] * MAX_CONTACTS, [0] * MAX_CONTACTS),
+    ],
+)
+def test_each_region_is_a_contact_of_its_own(pictures, areas, ended):
+    """Pictures are rows of taxels: '#' has 100 counts, '+' 15, '.' none."""
+    tracks = ContactTracker(FLAT, max_contacts=MAX_CONTACTS)
+    levels = {"#": 100, "+": 15, ".": 0}
+    for i, picture in enumerate(pictures):
+        counts = np.zeros(FLAT.shape, dtype=np.uint16)
+        for r, row in enumerate(picture.split("/")):
+            counts[r, : len(row)] = [levels[taxel] for taxel in row]
+        contacts = list(tracks.push(Frame(i / 100, counts)))
+    assert [contact.series().area.tolist() for contact in contacts] == areas
+    assert [contact.ended for contact in contacts] == ended
+
+
+def test_a_single_contact_is_followed_as_by_the_largest_region():
+    """One code for onset, series and decision: the same events but for number and
+    place."""
+    for path in demo.recordings():
+        recording = load(path)
+        expected, events = (
+            [event.to_dict() for event in classifier.classify(recording)]
+            for classifier in (Classifier(MODEL), Classifier(MODEL, max_contacts=8))
+        )
+        number = next(e["contact"] for e in events if e["event"] == "decision")
+        mine = [e for e in events if e["contact"] == number]
+        assert [strip(e) for e in mine] == [strip(e) for e in expected]
+
+
+def strip(event):
+    unequal = ("contact", "place", "latency_ms")
+    return {key: value for key, value in event.items() if key not in unequal}
+
+
+@pytest.fixture(scope="module")
+def two_touches():
+    """Two of the demo's touches on one skin, half a turn and 0.32 s apart."""
+    a, b = (
+        load(demo.FOLDER / f"cardboard-box-{how}.npz") for how in ("fixed", "movable")
+    )
+    late = 8  # at 25 Hz
+    n = min(len(a.t), len(b.t)) + late
+    frames = np.zeros((n, *a.frames.shape[1:]), dtype=np.uint16)
+    frames[: len(a.t)] = np.where(a.frames > 60, a.frames, 0)[:n]
+    frames[late : late + len(b.t)] += np.roll(
+        np.where(b.frames > 60, b.frames, 0),
+        12,
+        2,
+    )[: n - late]
+    t = np.arange(n) / 25.0
+    joints = np.concatenate([a.joints, np.repeat(a.joints[-1:], n, axis=0)])[:n]
+    return replace(a, t=t, frames=frames, joints=joints, meta={**a.meta, "labels": {}})
+
+
+def test_each_contact_is_decided_and_placed_on_its_own(two_touches, tmp_path, edge):
+    save(tmp_path / "both.npz", two_touches)
+    place = tmp_path / "touches.jsonl"
+    options = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz")
+    status, lines, _ = edge("run", *options, "--contacts", 2)
+    assert status == 0
+    first, second = by_contact(lines)
+    assert {d["task"]: d["label"] for d in first} == {
+        "category": "rigid-fixed",
+        "mobility": "fixed",
+        "object": "cardboard box",
+    }
+    late_s = second[0]["onset_s"] - first[0]["onset_s"]
+    assert late_s == pytest.approx(0.36, abs=0.02)  # 0.04 their own
+    places = [first[0]["place"], second[0]["place"]]
+    for place in places:
+        assert on_the_skin(place, two_touches)
+    # Opposite sides of the forearm.
+    assert np.linalg.norm(np.subtract(*places)) > two_touches.layout.radius_m
+
+
+def by_contact(lines):
+    """The decisions of each contact, in the order of their numbers."""
+    contacts = defaultdict(list)
+    for line in lines:
+        if line["event"] == "decision":
+            contacts[line["contact"]].append(line)
+    return [contacts[number] for number in sorted(contacts)]
+
+
+def on_the_skin(place, recording):
+    """Whether a place is on the cylinder in some frame, by the chain alone."""
+    layout = recording.layout
+    chain = Chain.cody()
+    for q in recording.joints:
+        pose = chain.pose(q)
+        x, y, z = pose[:3, :3].T @ (np.array(place) - pose[:3, 3])
+        if abs(np.hypot(x, y) - layout.radius_m) < 1e-5 and 0 < z < 0.2:
+            return True
+    return False
+
+
+def test_a_place_is_the_centroid_turned_and_moved_by_the_arm():
+    layout = replace(FLAT, pitch_m=0.01)
+    chain = Chain.cody()
+    joints = np.array([0.1, -0.2, 0.3, 0.4, -0.5])
+    tracks = ContactTracker(layout, chain=chain, max_contacts=2)
+    counts = np.zeros(FLAT.shape, dtype=np.uint16)
+    counts[2, 3:5] = 100
+    for i in range(2):
+        (*_, contact) = [None, *tracks.push(Frame(i / 100, counts, joints=joints))]
+    expected = (chain.pose(joints) @ [0.035, 0.02, 0.0, 1.0])[:3]
+    assert contact.position() == pytest.approx(expected, abs=1e-15)

@@ -1,10 +1,9 @@
-"""Draw a recording or a map of touch.
+"""Draw recordings.
 
 Draws a recording: frames over time with the contact region, and the three features;
 with --scene, the arm and the object from the side; with --model, its curves over those
 of the nearest training trials. Draws several recordings side by side, with the
-decisions of --model. Draws a map that `edge-classify run --map` wrote: the places of
-the contacts, and their labels.
+decisions of --model.
 """
 
 import argparse
@@ -19,13 +18,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         "recording",
         nargs="+",
-        help="an .npz recording, several to compare, or a map",
+        help="an .npz recording, or several to compare",
     )
     option(
         "--model",
         metavar="model.onnx",
-        help="draw the reasons for its decision on a recording, its decisions on several, or its "
-        "skin or arm behind a map",
+        help="draw the reasons for its decision on a recording, its decisions on several",
     )
     text = "with --model, the folder of the training trials (default: that of the recording)"
     option("--data", type=Path, metavar="DIR", help=text)
@@ -50,9 +48,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="COUNTS",
         help="threshold, instead of the skin's",
     )
-    option(
-        "--task", help="on a map, the task whose labels are shown (default: category)"
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -63,20 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
     first = arguments.recording[0]
     out = Path(arguments.out or Path(first).with_suffix(".png"))
     several = len(arguments.recording) > 1
-    recorded = Path(first).suffix == ".npz"
-    _check(arguments, several, recorded)
+    _check(arguments, several)
     model = None if arguments.model is None else Model(arguments.model)
     if several:
         from train.draw import comparison
 
         touches = [(path, load(path)) for path in arguments.recording]
         comparison.draw(touches, out, model=model, dark=arguments.dark)
-    elif not recorded:
-        from train.draw import touch_map as picture
-        from train.touch_map import TouchMap
-
-        info = None if model is None else model.info
-        picture.draw(TouchMap(first), out, arguments.task, info)
     elif model is not None:
         from train.draw import explanation
 
@@ -101,14 +89,14 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _check(arguments: argparse.Namespace, several: bool, recorded: bool) -> None:
+def _check(arguments: argparse.Namespace, several: bool) -> None:
     """Refuse options that do not go together."""
     details = arguments.scene or arguments.threshold is not None
     if arguments.dark and not several:
         raise InputError("--dark is for several recordings")
     if several and details:
         raise InputError("--scene and --threshold are for a single recording")
-    if arguments.model is not None and recorded and details:
+    if arguments.model is not None and details:
         raise InputError(
             "--model draws other curves than --scene and --threshold; give one of them"
         )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from edge.model.model import Model
-from edge.tools.explanation import Change, Explanation, Near, Space, explain
+from edge.tools.explanation import Explanation, Near, Space, explain
 from tests.sequential import fitted_model
 from train.model.pipeline import Choice
 
@@ -31,41 +31,18 @@ def by_hand(space=BY_HAND, voters=(0,)):
     return explain(space, touch, voters, 0, ["force", "area"], [2, 1])
 
 
-def test_distance_pulls_and_least_change_are_those_worked_out_by_hand():
+def test_distance_and_pulls_are_those_worked_out_by_hand():
     why = by_hand()
     # z = (0.5 + 1, 0.5); to (2, 0): 0.25 + 0.25 = |z|^2 + |b|^2 - 6 = 2.5 + 4 - 6.
     assert why.voters == (Near(0, 0, np.sqrt(0.5), {"force": 6.0, "area": 0.0}),)
     assert why.rival == Near(1, 1, np.sqrt(12.5), {"force": -6.0, "area": 0.0})
     assert why.pulls == {"force": 12.0, "area": 0.0}
-    # The trials are equally near at z = 0 in force, so that each sample falls by 1.5
-    # units; a fifth more makes the other one nearer, as of equal ones the earlier
-    # counts.
-    assert why.changes == (Change("force", 1, pytest.approx(1.8), pytest.approx(-1.8)),)
 
 
 def unscaled(features, **more):
     """A space of features with a sample each, which stand as they are."""
     columns = np.arange(features)
     return Space(columns, np.zeros(features), np.ones(features), **more)
-
-
-def test_changes_are_sorted_by_size_and_a_feature_without_any_is_passed_over():
-    space = unscaled(
-        4,
-        weights=np.array([[0.0, 0.0], [1.0, 2.0], [0.5, 0.0], [0.25, 0.0]]),
-        rows=np.array([[0.0, 0.0], [2.0, 0.0], [1.5, 3.0], [5.5, 11.0]]),
-        labels=np.array([0, 1, 0, 1]),
-    )
-    names = ["still", "across", "quick", "slow"]
-    why = explain(space, np.zeros(4), [0], 0, names, [1] * 4)
-    # The nearest other trial is as near where the first coordinate is 1; a fifth more
-    # makes it nearer. Across, a trial of the answer lies in between for up to four
-    # times as much.
-    sizes = {"quick": 2.4, "across": 4.0, "slow": 4.8}
-    assert [change.feature for change in why.changes] == list(sizes)
-    for change, size in zip(why.changes, sizes.values(), strict=True):
-        assert change.label == 1
-        assert change.size == change.mean == pytest.approx(size)
 
 
 VOTES = unscaled(
@@ -80,32 +57,6 @@ no label."""
 
 def votes(space, voters=(0, 1, 2), label=0):
     return explain(space, np.zeros(1), voters, label, ["force"], [1])
-
-
-@pytest.mark.parametrize("outvoted", [-1.0, -2.5], ids=["the nearest", "the farthest"])
-def test_a_change_is_found_where_a_trial_was_outvoted(outvoted):
-    why = votes(VOTES._replace(rows=np.vstack([[outvoted], VOTES.rows[1:]])))
-    assert why.rival.row == 0
-    assert why.rival.distance == -outvoted
-    # At -0.5 the trial at -3 is as near as that at 2; a fifth more makes it nearer.
-    assert why.changes == (Change("force", 1, pytest.approx(0.6), pytest.approx(-0.6)),)
-
-
-def test_a_trial_on_the_way_makes_the_least_change_smaller():
-    space = VOTES._replace(
-        weights=np.array([[1.0, 3.0]]),
-        rows=np.array([[0.0, 0.0], [2.0, 0.0], [0.6, 2.5]]),
-        labels=np.array([0, 1, 1]),
-    )
-    why = votes(space, voters=[0])
-    assert why.rival.row == 1
-    assert why.changes == (Change("force", 1, 0.5, 0.5),)
-
-
-def test_an_answer_that_its_votes_do_not_give_has_no_change():
-    """Tasks that are decided together may give it; a label of its votes would be no
-    change."""
-    assert votes(VOTES, label=1).changes == ()
 
 
 def test_a_trial_without_a_label_is_no_rival():
@@ -174,6 +125,5 @@ def test_the_parts_add_up_to_the_graphs_distances(name, exported):
                 row = space.rows[near.row]
                 square = z @ z + row @ row - sum(near.pulls.values())
                 assert square == pytest.approx(distance**2, abs=1e-5 * reach**2)
-            assert space.vote(z, info.tasks[task].k) == label
             assert why.rival.label != label
             assert why.rival.distance >= why.voters[0].distance

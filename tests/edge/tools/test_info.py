@@ -24,32 +24,3 @@ def test_a_person_gets_sentences(edge, monkeypatch):
     assert "Skin: 16 x 24 taxels, closed around" in out
     assert f"Fitted on {INFO.rows} trials" in out
     assert max(map(len, out.splitlines())) <= 80
-
-
-def test_a_program_gets_what_differs_between_two_models(edge, model):
-    status, (comparison,), _ = edge("info", model.path, demo.MODEL)
-    changes = comparison["changes"]
-    info = model.info
-    labels = [list(i.tasks["category"].labels) for i in (info, INFO)]
-    assert status == 0
-    assert changes["rows"] == [info.rows, INFO.rows]
-    assert changes["data_digest"] == [info.data_digest, INFO.data_digest]
-    assert changes["tasks.category.labels"] == labels
-    assert "window_s" not in changes
-
-
-def test_a_person_gets_what_differs_between_two_models(edge, model, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    _, text, _ = edge("info", model.path, demo.MODEL, text=True)
-    out = " ".join(text.split())
-    before = model.info.tasks["object"].accuracy
-    after = INFO.tasks["object"].accuracy
-    assert "tasks.category.labels (2 -> 4): + rigid-movable, soft-movable" in out
-    assert f"rows: 16 -> {INFO.rows}" in out
-    assert f"tasks.object.accuracy: {before:.1%} -> {after:.1%}" in out
-
-
-def test_a_model_differs_from_itself_in_nothing(edge):
-    status, events, _ = edge("info", demo.MODEL, demo.MODEL)
-    assert status == 0
-    assert events == [{"event": "comparison", "changes": {}}]
