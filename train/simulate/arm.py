@@ -3,7 +3,7 @@ trial."""
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from edge.touch.arm import ZERO, Chain, Joint
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
+Axes = list[Array]
 
 
 class Link(NamedTuple):
@@ -37,13 +38,13 @@ class Pose(NamedTuple):
 
     Attributes:
         origin: (3, n) metres, the tip.
-        rotation: (3, 3, n), of which `rotation[k]` is the tip's k-th axis.
+        rotation: the tip's three axes, (3, n) each.
         axes: (3, dof, n), each joint's axis in the base's frame.
         origins: (3, dof, n) metres, a point of each axis.
     """
 
     origin: Array
-    rotation: Array
+    rotation: Axes
     axes: Array
     origins: Array
 
@@ -83,9 +84,8 @@ class Kinematics:
         dof, n = q.shape
         sines = np.sin(q)
         cosines = np.cos(q)
-        origin = np.zeros((3, n))
-        rotation = np.zeros((3, 3, n))
-        rotation[0, 0] = rotation[1, 1] = rotation[2, 2] = 1.0
+        origin = np.zeros((3, 1))
+        rotation = list(np.eye(3)[:, :, None])
         axes, origins = np.empty((2, 3, dof, n))
         for j, link in enumerate(self.links):
             origin, rotation = _moved(link, origin, rotation)
@@ -109,28 +109,24 @@ def _link(fixed: list[Joint], axis: Array) -> Link:
     )
 
 
-def _combined(weights: Array, rotation: Array) -> Array:
-    """(3, n) the sum of axes (3, 3, n) times weights (3,); axes of weight 0 are left
-    out."""
-    out = np.zeros(rotation.shape[1:])
-    for weight, axis in zip(weights.tolist(), rotation, strict=True):
-        if weight != 0.0:
-            out += axis * weight
-    return out
+def _combined(weights: Array, rotation: Axes) -> Any:
+    """(3, n) the sum of axes times weights (3,); axes of weight 0 are left out."""
+    weighted = zip(rotation, weights.tolist(), strict=True)
+    terms = [axis * weight for axis, weight in weighted if weight != 0.0]
+    return sum(terms[1:], terms[0]) if terms else 0.0
 
 
-def _moved(link: Link, origin: Array, rotation: Array) -> tuple[Array, Array]:
+def _moved(link: Link, origin: Array, rotation: Axes) -> tuple[Array, Axes]:
     """Origin and axes after a link's constant step."""
     origin = origin + _combined(link.shift, rotation)
     if link.turn is not None:
-        rotation = np.stack([_combined(column, rotation) for column in link.turn.T])
+        rotation = [_combined(column, rotation) for column in link.turn.T]
     return origin, rotation
 
 
-def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
+def _turned(link: Link, sine: Array, cosine: Array, rotation: Axes) -> Axes:
     """The axes after a turn about the link's axis (Rodrigues): I + sin K + (1 - cos)
     K^2."""
-    out = np.empty_like(rotation)
     if link.main is not None:
         # A turn about an axis of the frame turns the other two in their plane.
         if link.axis[link.main] < 0.0:
@@ -139,7 +135,7 @@ def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
         second = (link.main + 2) % 3
         a = rotation[first]
         b = rotation[second]
-        out[link.main] = rotation[link.main]
+        out = list(rotation)
         out[first] = a * cosine + b * sine
         out[second] = b * cosine - a * sine
         return out
@@ -150,10 +146,11 @@ def _turned(link: Link, sine: Array, cosine: Array, rotation: Array) -> Array:
     u = b * z - c * y
     v = c * x - a * z
     w = a * y - b * x
-    out[0] = a + (sine * u + versine * (v * z - w * y))
-    out[1] = b + (sine * v + versine * (w * x - u * z))
-    out[2] = c + (sine * w + versine * (u * y - v * x))
-    return out
+    return [
+        a + (sine * u + versine * (v * z - w * y)),
+        b + (sine * v + versine * (w * x - u * z)),
+        c + (sine * w + versine * (u * y - v * x)),
+    ]
 
 
 def dot(a: Array, b: Array) -> Array:

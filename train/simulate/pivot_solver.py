@@ -7,7 +7,6 @@ Hessian of the springs touched (Qi and Sun, Math. Programming 58, 1993). In the 
 trials where it cycles, a line search on the slope takes over.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -55,9 +54,8 @@ class Pivots:
     """Contacts of n pivoting forearms, whose loads must satisfy y = free - C (F, M).
 
     Attributes:
-        reached_springs: of a depth, (S, 1, n) metres at which each spring is touched,
-            and (S, 1, n) newtons a metre, or (S, rows, n) where it differs by row, of
-            at least those springs that are touched there.
+        gaps, springs: (S, n) metres at which each row's springs are touched, and their
+            (1, S, n) newtons a metre, or (rows, S, n) where these differ by row.
         weight, line_gap, lever: (rows, n) the part of each row that the face covers,
             metres by which the face draws back there, metres from the contact's middle.
         gain, load: (n,), (rows, n): a row whose springs bear F bears gain F + load.
@@ -65,7 +63,8 @@ class Pivots:
             them.
     """
 
-    reached_springs: Callable[[float], tuple[Array, Array]]
+    gaps: Array
+    springs: Array
     weight: Array
     line_gap: Array
     lever: Array
@@ -84,16 +83,12 @@ class Pivots:
     def loads(self, y: Array) -> Loads:
         """The loads of the springs at coordinates y (2, n)."""
         depth = y[0] + self.lever * y[1] - self.line_gap
-        gaps, springs = self.reached_springs(depth.max(initial=0.0))
-        inside = depth - gaps
-        np.maximum(inside, 0.0, out=inside)
-        touched = (inside > 0.0) * springs
-        np.multiply(inside, touched, out=inside)
-        elastic = total(inside) * self.weight
+        pressed, touched = self._bed(depth)
+        elastic = pressed * self.weight
         borne = self.gain * elastic + self.load
         bears = (elastic > 0.0) & (borne > 0.0)
         force = np.where(bears, borne, 0.0)
-        held = np.where(bears, self.gain * (total(touched) * self.weight), 0.0)
+        held = np.where(bears, self.gain * (touched * self.weight), 0.0)
         stiffness = total(held)
         mean = total(held * self.lever) / np.where(stiffness > 0.0, stiffness, 1.0)
         off = self.lever - mean
@@ -105,6 +100,28 @@ class Pivots:
             mean,
             spread,
             force,
+        )
+
+    def _bed(self, depth: Array) -> tuple[Array, Array]:
+        """The force and the stiffness (rows, n) of the springs touched at depths
+        (rows, n) of the rows.
+
+        A deep touch reaches fifty springs and most touches three, so this goes through
+        the pairs of a trial and a spring that one of its rows touches. `bincount` adds
+        them one after the other, as `total` does.
+        """
+        rows, n = depth.shape
+        pairs = np.flatnonzero(self.gaps < depth.max(axis=0))
+        trials = pairs % n
+        inside = depth.take(trials, 1) - self.gaps.take(pairs)
+        springs = self.springs.reshape(len(self.springs), -1).take(pairs, 1)
+        touched = (inside > 0.0) * springs
+        to = (np.arange(0, rows * n, n)[:, None] + trials).ravel()
+        pressed = np.bincount(to, (inside * touched).ravel(), rows * n)
+        stiffness = np.bincount(to, touched.ravel(), rows * n)
+        return (
+            np.asarray(pressed, dtype=float).reshape(rows, n),
+            np.asarray(stiffness, dtype=float).reshape(rows, n),
         )
 
     def step(self, y: Array, loads: Loads) -> Array:

@@ -31,6 +31,7 @@ SETUP = (
 PACE = ("pace",)  # before a frame: its number of steps
 TUNE = ("tune",)  # terms that depend on the length of a step, whenever that changes
 FRAME = (
+    "stretch_out",  # the arm's pose
     "locate",  # the contact's coordinates and Jacobian
     "reach_along",  # further Jacobians
 )

@@ -41,29 +41,35 @@ class Column:
     def __get__(self, group: "Group", owner: type) -> Any:
         """The values of the group's trials: of all of them the array itself."""
         values = group.arrays[self.name]
-        return values if group.places is None else values.take(group.places, -1)
+        places = group.places
+        if places is None:
+            return values
+        if type(places) is slice:
+            return values[..., places]
+        return values.take(places, -1)
 
     def __set__(self, group: "Group", values: Any) -> None:
         """Set the values of the group's trials."""
+        places = group.places
+        if places is None:
+            places = slice(None)
         array = group.arrays[self.name]
-        if group.places is None:
-            array[...] = values
-        elif array.ndim == 1:
-            array[group.places] = values
+        if array.ndim == 1:
+            array[places] = values
         else:
-            array[..., group.places] = values
+            array[..., places] = values
 
 
 class Group:
     """Arrays (..., n), of which the trials at some places are read and assigned; None
-    for all."""
+    for all, and a slice for neighbours, which are read without a copy."""
 
     def __init_subclass__(cls) -> None:
         """Make an array of each attribute that the class names."""
         for name in cls.__annotations__:
             setattr(cls, name, Column(name))
 
-    def __init__(self, arrays: dict[str, Any], places: Places | None = None) -> None:
+    def __init__(self, arrays: dict[str, Any], places: Any = None) -> None:
         """Of {name: array of all trials}."""
         self.arrays = arrays
         self.places = places
@@ -114,6 +120,7 @@ class Arm(Group):
             the frame.
         step_stiffness, step_compliance: (dof, n) stiffness of a joint's damping and
             inertia within a step, and the compliance of the joint with it.
+        tip, along: (3, n) metres of the forearm's tip at the frame, and its direction.
         axes, origins: (3, dof, n) of the joints at the frame, as of `arm.Pose`.
         point: (3, n) the point of the forearm's axis beside the contact.
     """
@@ -125,6 +132,8 @@ class Arm(Group):
     q_frame: PerJoint
     step_stiffness: PerJoint
     step_compliance: PerJoint
+    tip: Vector
+    along: Vector
     axes: Annotated[Array, "xyz", "joint"]
     origins: Annotated[Array, "xyz", "joint"]
     point: Vector
@@ -223,14 +232,12 @@ class RowSprings:
     """Each row's springs in the order of their depth, for a forearm that pivots.
 
     Attributes:
-        gaps: (S, 1, n) metres at which each spring is touched, ascending.
-        stiffness: (S, 1, n) newtons a metre, or (S, rows, n) where springs may break.
-        nearest: (S,) the smallest gap of any trial's s-th spring.
+        gaps: (S, n) metres at which each spring is touched, ascending.
+        stiffness: (1, S, n) newtons a metre, or (rows, S, n) where springs may break.
     """
 
     gaps: Array
     stiffness: Array
-    nearest: Array
 
 
 class Touch(Group):
@@ -354,7 +361,11 @@ class Trials:
         self.within = within
         self.scene = batch.scene
         self.joints = batch.joints
-        at = None if len(places) == batch.n else places
+        at: Any = places
+        if len(places) == batch.n:
+            at = None
+        elif len(places) and places[-1] - places[0] + 1 == len(places):
+            at = slice(places[0], places[-1] + 1)
         self.clock = Clock(batch.clock.arrays, at)
         self.arm = Arm(batch.arm.arrays, at)
         self.contact = Contact(batch.contact.arrays, at)
@@ -364,7 +375,8 @@ class Trials:
         self.states = Gathered(batch.states, at)
         self._parts: dict[int, Trials | None] = {}
         self._callers: dict[tuple[str, ...], list[tuple[Call, Trials | None]]] = {}
-        self._gathered: RowSprings | None = None
+        self._law: RowSprings | None = None
+        self._last_choice: tuple[bytes, Trials] | None = None
 
     def __len__(self) -> int:
         """The number of trials."""
@@ -375,7 +387,12 @@ class Trials:
         within = which.nonzero()[0]
         if len(within) == len(self):
             return self
-        return Trials(self.batch, self.places[within], within)
+        choice = which.tobytes()
+        if self._last_choice is None or self._last_choice[0] != choice:
+            # Most steps choose those trials which the step before has chosen.
+            chosen = Trials(self.batch, self.places[within], within)
+            self._last_choice = choice, chosen
+        return self._last_choice[1]
 
     def calls(self, *stages: str) -> Iterator[tuple[Call, "Trials"]]:
         """The hooks of stages, each with those of these trials that call for it."""
@@ -469,32 +486,30 @@ class Trials:
     def set_row_law(self, gaps: Array, stiffness: Array) -> None:
         """Set the springs (S, m) of each row, of stiffness (S, 1, m) or (S, rows, m),
         for a forearm that pivots."""
-        order = gaps.argsort(axis=0, kind="stable")[:, None]
+        order = gaps.argsort(axis=0, kind="stable")
         deep = int(np.isfinite(gaps).sum(axis=0).max())
-        stiffness = np.take_along_axis(stiffness, order, 0)[:deep]
-        gaps = np.take_along_axis(gaps[:, None], order, 0)[:deep]
+        stiffness = np.take_along_axis(stiffness, order[:, None], 0)[:deep]
         law = self.batch.row_springs
         if law is None:
             n = self.batch.n
-            nothing = np.zeros((deep, stiffness.shape[1], n))
-            far = np.full((deep, 1, n), np.inf)
-            law = RowSprings(far, nothing, nearest=gaps.min(axis=(1, 2)))
-        law.gaps[:deep, :, self.places] = gaps
-        law.stiffness[:deep, :, self.places] = stiffness
+            nothing = np.zeros((stiffness.shape[1], deep, n))
+            law = RowSprings(np.full((deep, n), np.inf), nothing)
+        law.gaps[:deep, self.places] = np.take_along_axis(gaps, order, 0)[:deep]
+        law.stiffness[:, :deep, self.places] = stiffness.swapaxes(0, 1)
         # A new record tells the trials that have gathered the law to do so again.
         self.batch.row_springs = replace(law)
 
-    def reached_springs(self, depth: float) -> tuple[Array, Array]:
-        """Gaps (S, 1, m) and stiffness (S, 1 or rows, m) of each row's springs that a
-        row at a depth may touch."""
+    def row_law(self) -> RowSprings:
+        """The springs of these trials' rows."""
         law = self.batch.row_springs
         assert law is not None
-        if self._gathered is not law:
-            self._gathered = law
-            self._row_gaps = law.gaps.take(self.places, -1)
-            self._row_stiffness = law.stiffness.take(self.places, -1)
-        deep = max(1, int(np.searchsorted(law.nearest, depth)))
-        return self._row_gaps[:deep], self._row_stiffness[:deep]
+        if self._law is not law:
+            self._law = law
+            self._row_springs = RowSprings(
+                law.gaps.take(self.places, -1),
+                law.stiffness.take(self.places, -1),
+            )
+        return self._row_springs
 
     def solve_loads(self, y: Array, c: Array, where: Mask | None = None) -> Array:
         """(2, m) the loads of the contacts.

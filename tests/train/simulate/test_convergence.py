@@ -27,6 +27,7 @@ def test_halving_the_step_halves_the_error(thing):
     assert convergence.errors[-1] < 0.005
 
 
+@pytest.mark.slow
 def test_a_light_object_that_swings_within_a_step_is_not_within_the_tolerance():
     # From three halvings alone, 2.5 ms would err by 5e-5; the thing swings ten times in
     # that.

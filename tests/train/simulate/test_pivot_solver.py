@@ -73,12 +73,12 @@ class Beds:
     def search(self, guarded_rounds=GUARDED_ROUNDS):
         """The simulator's answers (2, n), searched for from no load, and whether it
         lost them."""
-        springs = self.gaps[:, None], self.stiffness[:, None]
+        springs = self.gaps, self.stiffness[None]
         rows = self.weight, self.line_gap, self.lever
         n = self.free.shape[1]
         gain = np.ones(n)
         load = np.zeros((16, n))
-        pivots = Pivots(lambda depth: springs, *rows, gain, load, self.free, self.c)
+        pivots = Pivots(*springs, *rows, gain, load, self.free, self.c)
         loads, _, lost = search(pivots, np.zeros((2, n)), guarded_rounds)
         return loads, lost
 

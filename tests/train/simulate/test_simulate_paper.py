@@ -46,6 +46,7 @@ def test_eighteen_objects_ten_in_both_conditions(cody18):
     assert total_trials(cody18) == 140
 
 
+@pytest.mark.slow
 def test_each_trial_is_felt_and_belongs_to_the_papers_tasks(dataset):
     assert dataset.untouched == ()
     assert len(dataset.trials) == 140
@@ -53,6 +54,7 @@ def test_each_trial_is_felt_and_belongs_to_the_papers_tasks(dataset):
     assert dataset.chain is not None
 
 
+@pytest.mark.slow
 def test_each_trial_is_long_enough(dataset):
     """A light thing on smooth ground may be felt so late that its window is short."""
     assert min(trial.onset_s for trial in dataset.trials) > 0.1
@@ -61,6 +63,7 @@ def test_each_trial_is_long_enough(dataset):
     assert {t.labels["object"] for t in short} <= {"bed pillow"}
 
 
+@pytest.mark.slow
 def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_samples(
     cody18,
     dataset,
@@ -79,6 +82,7 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
         assert abs(paper / 100.0 - ours) <= norm.ppf(0.5 + SURE / 2.0) * deviation, task
 
 
+@pytest.mark.slow
 def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
     force = dataset.features()[:, 39]
     motion = dataset.features()[:, 119]
@@ -93,6 +97,7 @@ def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
     assert mean["soft-movable"][1] > mean["soft-fixed"][1]
 
 
+@pytest.mark.slow
 def test_the_scenes_steps_cost_little_where_nothing_bounces(cody18):
     # Three kinds stand for all here; --explain measures every one. The arm's inertia is
     # left out: how things bounce is another at each step.

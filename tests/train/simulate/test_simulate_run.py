@@ -234,9 +234,10 @@ class TestCommand:
             "in 2 of them no taxel rises above skin.onset_counts (60), so no touch is "
             "felt",
         ),
-        (
+        pytest.param(
             "labels.slides_m = 0.0\ntrials.lead_s = 0.02\ntrials.after_s = 0.1",
             "feather-movable and its kind: no step is within trials.tolerance",
+            marks=pytest.mark.slow,
         ),
     ],
 )

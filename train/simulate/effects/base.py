@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edge.errors import InputError
-from train.simulate.arm import Pose, cross, dot
+from train.simulate.arm import cross, dot
 from train.simulate.contact import (
     closed_form,
     covered,
@@ -156,30 +156,30 @@ def tune(t: Trials) -> None:
     t.arm.step_compliance = 1.0 / (step_stiffness + t.joints.stiffness)
 
 
-def locate(t: Trials) -> None:
-    """Find the depth, its Jacobian and the compliance of a step at the frame's joint
-    angles."""
-    contact = t.contact
+def stretch_out(t: Trials) -> None:
+    """Find the arm's pose at the frame's joint angles."""
     q = t.arm.q
-    normal = contact.normal
     pose = t.scene.kinematics.pose(q)
-    point = pose.origin + pose.rotation[2] * contact.z
-    lever = dot(point[:, None] - pose.origins, cross(normal[:, None], pose.axes))
+    t.arm.q_frame = q
+    t.arm.tip = pose.origin
+    t.arm.along = pose.rotation[2]
+    t.arm.axes = pose.axes
+    t.arm.origins = pose.origins
+
+
+def locate(t: Trials) -> None:
+    """Find the depth, its Jacobian and the compliance of a step in the frame's pose."""
+    contact = t.contact
+    normal = contact.normal
+    point = t.arm.tip + t.arm.along * contact.z
+    lever = dot(point[:, None] - t.arm.origins, cross(normal[:, None], t.arm.axes))
     depth = dot(point - contact.face, normal) + t.scene.skin.radius_m
     compliance = total(lever * lever * t.arm.step_compliance)
     none = np.zeros_like(depth)
     contact.y_frame = np.array([depth, none])
     contact.compliance = np.array([compliance, none, none])
     contact.jacobian = np.stack([lever, np.zeros_like(lever)], axis=1)
-    keep_pose(t, q, point, pose)
-
-
-def keep_pose(t: Trials, q: Array, point: Array, pose: Pose) -> None:
-    """Keep the arm's pose at the frame, for the effects."""
-    t.arm.q_frame = q
     t.arm.point = point
-    t.arm.axes = pose.axes
-    t.arm.origins = pose.origins
 
 
 def predict(t: Trials) -> None:

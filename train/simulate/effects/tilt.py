@@ -39,29 +39,27 @@ def stand(t: Trials) -> None:
 
 
 def locate(t: Trials) -> None:
-    """Find depth and tilt against the object's face at the frame's joint angles, their
+    """Find depth and tilt against the object's face in the frame's pose, their
     Jacobians, and the part of each row that the face covers, with its lever about the
     middle."""
     skin = t.scene.skin
     contact = t.contact
-    q = t.arm.q
     normal = contact.normal
     face = contact.face
     along_face = contact.along_face
-    pose = t.scene.kinematics.pose(q)
-    along = pose.rotation[2]
-    away = pose.origin - face
+    along = t.arm.along
+    away = t.arm.tip - face
     tilt = dot(normal, along)
     z = np.clip(-dot(away, along), skin.row_z[-1], skin.row_z[0])
     on_face = dot(away, along_face) + skin.row_z * dot(along, along_face)
     t.bed.weight = covered(on_face, t.values["width_m"], skin.pitch[0])
     t.bed.line_gap = curve_gap(on_face, t.values["radius_m"])
     t.states["tilt"].lever = skin.row_z - z
-    point = pose.origin + along * z
+    point = t.arm.tip + along * z
     upright = np.sqrt(1.0 - tilt * tilt)
-    crossed = cross(normal[:, None], pose.axes)
+    crossed = cross(normal[:, None], t.arm.axes)
     turn = dot(along[:, None], crossed)
-    push = dot(point[:, None] - pose.origins, crossed)
+    push = dot(point[:, None] - t.arm.origins, crossed)
     push = push - skin.radius_m * tilt / upright * turn
     jacobian = np.stack([push, turn], axis=1)
     compliance = jacobian * t.arm.step_compliance[:, None]
@@ -70,15 +68,17 @@ def locate(t: Trials) -> None:
     contact.compliance = np.array([c00, c01, total(turn * compliance[:, 1])])
     depth = dot(point - face, normal) + skin.radius_m * upright
     contact.y_frame = np.array([depth, tilt])
-    base.keep_pose(t, q, point, pose)
+    t.arm.point = point
 
 
 def answer(t: Trials, y: Array, c: Array) -> Array:
     """The loads (F, M) at which arm and bed agree."""
     tilt = t.states["tilt"]
     bed = t.bed
+    law = t.row_law()
     pivots = Pivots(
-        t.reached_springs,
+        law.gaps,
+        law.stiffness,
         bed.weight,
         bed.line_gap,
         tilt.lever,
