@@ -239,10 +239,3 @@ class Graph:
             nodes.append(node)
             output = node.inputs[-1 if node.operator == "Where" else 0]
         return nodes[::-1]
-
-
-def coordinates_of(graph: Graph, task: str) -> str:
-    """The name of the coordinates (n, components) in which a task compares touches."""
-    nearest = graph.makers[f"{task}_neighbours"]
-    product = graph.makers[nearest.inputs[0]]
-    return product.inputs[0]

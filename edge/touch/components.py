@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Booleans, Integers
-from edge.touch.active import Grid
+from edge.touch.grid import Grid
 
 Indices = NDArray[np.intp]
 
@@ -116,7 +116,7 @@ def all_of(
     counts: Array,
     wraps: bool,
 ) -> list[tuple[int, int]]:
-    """Taxels, as the bits of `edge.touch.active.Grid`, and peak of each component.
+    """Taxels, as the bits of `edge.touch.grid.Grid`, and peak of each component.
 
     The arguments are those of `largest_of`.
     """

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from edge.arrays import Array, Floats, Integers
-from edge.touch.active import ActiveTaxels, Region, best_cut
+from edge.touch.active import ActiveTaxels, Region
 from edge.touch.feature import Feature
+from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import SHEAR, ZONES
 from edge.touch.transforms import force_floor, length_floor

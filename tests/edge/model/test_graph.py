@@ -8,7 +8,7 @@ from onnx import TensorProto, helper, numpy_helper
 from edge import demo
 from edge.errors import InputError
 from edge.model import onnx_file
-from edge.model.graph import OPERATORS, Graph, coordinates_of
+from edge.model.graph import OPERATORS, Graph
 
 X = np.array([[3.0, -1.0, 2.0], [0.0, 2.5, -0.5]])
 CASES = {
@@ -91,7 +91,8 @@ def graph():
 
 
 def test_any_value_can_be_asked_for_by_name(graph):
-    z = coordinates_of(graph, "mobility")
+    product = graph.makers[graph.makers["mobility_neighbours"].inputs[0]]
+    z = product.inputs[0]
     model = onnx.load(demo.MODEL)
     assert z in {name for node in model.graph.node for name in node.output}
     [coordinates] = graph.run([z], {"features": np.zeros((3, 120))})

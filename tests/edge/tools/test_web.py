@@ -3,6 +3,7 @@ the loop."""
 
 import http.client
 import json
+import math
 import resource
 import socket
 import time
@@ -138,6 +139,7 @@ def test_it_is_watched_as_long_as_a_browser_asks_for_pictures(server, monkeypatc
     with stream(server) as client:
         while b"data" not in client.recv(1 << 16):
             pass
+        monkeypatch.setattr(web, "WATCHED_S", math.inf)
         assert server.watched
         monkeypatch.setattr(web, "WATCHED_S", 0.0)
         assert not server.watched

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from edge.errors import InputError
 from edge.touch import shear
-from edge.touch.active import best_cut
 from edge.touch.features import feature_vector
 from edge.touch.frame import Frame
+from edge.touch.grid import best_cut
 from edge.touch.layout import SkinLayout
 from edge.touch.measures import SHEAR, ZONES, feature
 from edge.touch.zones import ZONE_WIDTH
