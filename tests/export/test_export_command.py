@@ -74,6 +74,7 @@ def test_it_prints_its_files(printed):
     assert golden.endswith("golden.npz")
 
 
+@pytest.mark.slow
 def test_the_same_data_gives_the_same_files(recordings, exported, tmp_path):
     export(tmp_path, "--data", recordings, *PAPER, "--jobs", 2)
     for name in ("model.onnx", "golden.npz"):

@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
@@ -13,11 +16,16 @@ from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import TRIAL, kinds_of
 from train.fitting import FitOptions, fit, trials_of, windows_of
+from train.report.score import paired
+from train.report.work import Workers
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
 """Windows of the report, closer where most things begin to move."""
+BETWEEN_S = {0.9: (0.8, 1.0), 1.1: (1.0, 1.2)}
+"""{window: those before and after it}; where the accuracies of these do not differ by
+more than chance, the curve is flat and the window is left out."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
@@ -87,6 +95,39 @@ def chosen(
     default a quick one."""
     usual = {"quick": True, "decision_points_s": (), "jobs": 1}
     return fit(dataset, window_s=window_s, **{**usual, **options}).chosen
+
+
+def choices_at(
+    dataset: DataSet,
+    windows: Sequence[float],
+    workers: Workers,
+    *,
+    quick: bool,
+) -> Points:
+    """The choice at each window, but for those of `BETWEEN_S` where the curve is
+    flat."""
+
+    def made(times_s: Sequence[float]) -> dict[float, dict[str, Chosen]]:
+        cases = [(dataset, window_s) for window_s in times_s]
+        results = workers.map("windows", partial(chosen, quick=quick), cases)
+        return dict(zip(times_s, results, strict=True))
+
+    points = made([w for w in windows if w not in BETWEEN_S])
+    steep = []
+    for window_s, (before_s, after_s) in BETWEEN_S.items():
+        if window_s in windows and differ(points[before_s], points[after_s]):
+            steep.append(window_s)
+    return dict(sorted((points | made(steep)).items()))
+
+
+def differ(before: Mapping[str, Chosen], after: Mapping[str, Chosen]) -> bool:
+    """Whether two choices differ in some task's accuracy by more than chance."""
+    for task, choice in before.items():
+        hits = np.asarray(choice.by_trial.hits)
+        _, low, high = paired(hits, np.asarray(after[task].by_trial.hits))
+        if low > 0.0 or high < 0.0:
+            return True
+    return False
 
 
 def unseen(choice: Chosen) -> Result | None:

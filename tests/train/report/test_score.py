@@ -1,4 +1,4 @@
-"""Scores of the reports: their columns, the best cell, transfers, nested accuracy,
+"""Scores of the reports: their columns, the best cell, nested accuracy,
 baselines."""
 
 import numpy as np
@@ -18,7 +18,6 @@ from train.report.score import (
     percent,
     points,
     score,
-    transfer,
 )
 
 ONE = ("max_force",)
@@ -38,26 +37,6 @@ def test_the_best_cell_is_reported_with_its_answers():
     table = accuracies(neighbours(vectors.X, features=ONE), y)
     assert best.accuracy == table.max() == table[best.components - 1, best.k - 1]
     assert best.right == int((best.answers == y).sum())
-
-
-def test_a_changed_trial_is_never_recognised_by_its_own_twin():
-    """Unrelated trials are named by chance, though their twins would recognise them."""
-    rng = np.random.default_rng(4)
-    X = rng.normal(size=(40, 9))
-    y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}
-    best = {"t": Result(0, 40, 8, 1)}
-    changed = transfer(X, y, best, X + 1e-6)["t"]
-    same = transfer(X, y, best, X)["t"]
-    assert changed.accuracy < 0.75
-    assert same.accuracy == accuracies(neighbours(X, features=ONE), y["t"])[7, 0]
-
-
-def test_a_change_that_moves_trials_among_others_costs():
-    X, y = clear()
-    best = grid_search(X, {"t": y})
-    assert transfer(X, {"t": y}, best, X + 0.01)["t"].accuracy > 0.8
-    next_trials = np.roll(X, 1, axis=0)
-    assert transfer(X, {"t": y}, best, next_trials)["t"].accuracy < 0.3
 
 
 def test_nested_accuracy_of_clear_classes_is_one():

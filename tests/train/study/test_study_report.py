@@ -3,16 +3,24 @@ trials."""
 
 import re
 from collections import Counter
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from edge import demo
+from edge.errors import InputError
 from edge.saving import save
 from tests import browser
 from tests.conftest import save_touches
 from train.__main__ import main
 from train.choose.evaluate import Result
+from train.data.dataset import load_trials
+from train.simulate import scene as scenes
 from train.study import methods
 from train.study.paper import (
     comparison,
@@ -22,6 +30,9 @@ from train.study.paper import (
     negative_by_chance,
     right_despite_the_object,
 )
+from train.study.run import require_scene
+
+SCENES = Path(scenes.__file__).parents[1] / "scenes"
 
 PAPERS = {entry.key: entry.percent for entry in entries()}
 HEADLINES = [entry for entry in entries() if entry.headline]
@@ -210,6 +221,19 @@ def test_bad_input_is_one_sentence(words, sentence, recordings, tmp_path, refusa
     data = [] if "--data" in words else ["--data", recordings]
     assert sentence in refusal("study", "--out", tmp_path / "out", *data, *words)
     assert not any((tmp_path / "out").iterdir())
+
+
+def test_recordings_of_another_scene_are_refused():
+    scene = scenes.load(SCENES / "demo.toml")
+    touch = load_trials(demo.recordings()).trials[0]
+    meta = {**touch.recording.meta, "simulation": {"seed": scene.seed}}
+    for changed in ({}, {"source": "a robot"}, {"simulation": {"seed": -1}}):
+        recording = replace(touch.recording, meta={**meta, **changed})
+        trials = SimpleNamespace(trials=[replace(touch, recording=recording)])
+        message = "was not simulated from the scene demo with seed"
+        refused = pytest.raises(InputError, match=message)
+        with refused if changed else nullcontext():
+            require_scene(trials, scene)
 
 
 def test_trials_of_one_class_are_nothing_to_study(make_touch, tmp_path, refusal):
