@@ -23,7 +23,6 @@ COMMANDS = {
     "calibrate": "edge.commands.calibrate",
     "record": "edge.tools.record",
     "label": "edge.tools.label",
-    "teach": "edge.tools.teach",
     "run": "edge.commands.run",
     "view": "edge.tools.view",
     "replay": "edge.tools.replay",

@@ -183,12 +183,6 @@ def stopping_rules(model: Model, error: float) -> dict[str, StoppingRule | None]
             f"{model.path}: the model has no calibration, so no error rate can be "
             "held; export it with --decision-points"
         )
-    if model.info.taught:
-        raise InputError(
-            f"{model.path}: was taught {model.info.taught} trials after its error "
-            "rates were "
-            "certified; leave --error out, or export a model with these trials"
-        )
     rules = {
         task: stopping.rule(error) for task, stopping in model.info.stopping.items()
     }

@@ -113,12 +113,12 @@ def _task(fitted: Fitted, task: str) -> Task:
     classifier = fitted.classifier
     choice = classifier.choices[task]
     chosen = fitted.chosen.get(task)
-    classes = classifier.classes_[task]
+    classes = classifier.tasks_[task].classes
     labels = {*classes, *fitted.dataset.untouched_labels(task)}
     return Task(
         labels=tuple(map(str, classes)),
         k=choice.k,
-        components=classifier.components_[task],
+        components=classifier.tasks_[task].components,
         scaling=choice.scaling,
         accuracy=0.0 if chosen is None else chosen.accuracy.accuracy,
         projection=choice.projection,

@@ -45,10 +45,7 @@ class Builder:
 
     def constant(self, value: Any, name: str = "") -> str:
         """Name of a constant of the value's type; equal ones are stored once, but for
-        those that are given a name.
-
-        `edge.tools.teaching` changes these.
-        """
+        those that are given a name."""
         array = np.asarray(value)
         key = (name, array.dtype.str, array.shape, array.tobytes())
         if key not in self._constants:

@@ -31,6 +31,7 @@ from train.model.projection import KINDS
 from train.model.scaling import SCALINGS
 from train.model.stopping import FEWEST
 from train.report.summary import summary
+from train.threads import single_thread
 from train.tradeoff import front as fronts
 
 FIXED = ("features", "projection", "scaling", "components", "k", "window", "tasks")
@@ -181,7 +182,18 @@ def run(arguments: argparse.Namespace) -> int:
     _check_apart(arguments.data, held_out)
     for file in held_out:
         load(file)
-    fitted = _fit(arguments)
+    with single_thread():
+        fitted = _fit(arguments)
+        return _written(arguments, fitted, former, held_out)
+
+
+def _written(
+    arguments: argparse.Namespace,
+    fitted: Fitted,
+    former: Model | None,
+    held_out: Sequence[Path],
+) -> int:
+    """Write a fitted model, and report."""
     path = arguments.out / "model.onnx"
     size = save(path, fitted, arguments.name)
     prices = measure(fitted)

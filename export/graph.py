@@ -18,14 +18,13 @@ from onnx import helper, numpy_helper
 from skl2onnx import convert_sklearn, update_registered_converter
 from skl2onnx.common.data_types import DoubleTensorType, Int64TensorType
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Array, Booleans, Floats, Integers
 from edge.model import onnx_file
 from edge.model.info import METADATA_KEY, ModelInfo
 from edge.model.metadata import to_json
-from edge.tools.teaching import NOVELTY_COLUMNS, NOVELTY_LENGTHS, label_tables
 from export.build import OPSET, Builder, project, widened
 from train.model.novelty import CLIP, FARTHEST, STEP_BITS, NoveltySpace
-from train.model.pipeline import ContactClassifier, Space
+from train.model.pipeline import ContactClassifier, FittedSpace, nearest_of_label
 from train.model.stopping import SequentialClassifier
 
 IR_VERSION = 8
@@ -132,13 +131,13 @@ def _convert(scope: Any, operator: Any, container: Any) -> None:
         _task(build, points, task, projected[_spaces(points, task)], names)
 
 
-Spaces = tuple[Space, ...]
+Spaces = tuple[FittedSpace, ...]
 """The space of a task at each decision point. Tasks whose spaces are equal at every one
 share the nodes of a projection."""
 
 
 def _spaces(points: Sequence[ContactClassifier], task: str) -> Spaces:
-    return tuple(point.spaces_[task] for point in points)
+    return tuple(point.tasks_[task].space for point in points)
 
 
 def _projected(
@@ -148,11 +147,8 @@ def _projected(
     spaces: Spaces,
 ) -> tuple[str, str]:
     """Nodes that project features x to a task's spaces; see `project`."""
-    projections = []
-    columns = []
-    for point, space in zip(points, spaces, strict=True):
-        projections.append(point.projections_[space])
-        columns.append(point.columns_[space])
+    projections = [space.projection for space in spaces]
+    columns = [space.columns for space in spaces]
     return project(build, x, points[-1].n_features_in_, projections, columns)
 
 
@@ -172,25 +168,25 @@ def _task(
         projected: names of the coordinates, and of the excess over the limits.
         names: {output: its name in the graph}.
     """
-    last = points[-1]
-    members = last.members_[last.spaces_[task]]
-    units = [point.unit(task) for point in points]
+    trials = points[-1].n_trials_
+    at_points = [point.tasks_[task] for point in points]
+    last = at_points[-1]
+    members = last.space.members
+    units = [fitted.unit for fitted in at_points]
     rows = []
-    for point, unit in zip(points, units, strict=True):
-        space = point.spaces_[task]
-        of_all = np.zeros((last.n_trials_, point.rows_[space].shape[1]))
-        of_all[members] = point.rows_[space] / unit
+    for fitted in at_points:
+        of_all = np.zeros((trials, fitted.space.rows.shape[1]))
+        of_all[members] = fitted.space.rows / fitted.unit
         rows.append(of_all)
-    labels = np.full(last.n_trials_, -1)
-    labels[members] = last.labels_[task]
-    classes = len(last.classes_[task])
-    k = last.choices[task].k
+    labels = np.full(trials, -1)
+    labels[members] = last.labels
+    classes = len(last.classes)
     output = names[f"{task}_label"].removesuffix("_label")
     components = [point.choices[task].components for point in points]
     z, off = projected
     rows = widened(rows, max(row.shape[1] for row in rows))
     squares, length = _squares(build, output, z, rows, components, labels < 0)
-    voters = build.constant([k], f"k of {output}")
+    voters = build.constant([last.k], f"k of {output}")
     outputs = ["", names[f"{task}_neighbours"]]
     nearest, neighbours = build.nodes(
         "TopK",
@@ -202,12 +198,11 @@ def _task(
     roots = build.node("Sqrt", build.node("Add", nearest, length))
     scales = build.by_decision_point(units)
     build.node("Mul", roots, scales, output=f"{output}_distances")
-    _vote(build, output, labels, classes, neighbours, k, off)
+    _vote(build, output, labels, classes, neighbours, last.k, off)
     if f"{task}_label_distances" in names:
         all_squares = build.node("Add", squares, length)
-        slopes = [point.slopes_[task] for point in points]
         scales = build.by_decision_point(
-            [u * s for u, s in zip(units, slopes, strict=True)]
+            [fitted.unit * fitted.slope for fitted in at_points]
         )
         roots = _label_distances(build, output, all_squares, labels, classes)
         build.node("Mul", roots, scales, output=names[f"{task}_label_distances"])
@@ -243,9 +238,11 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     y = build.shifted("MatMul", z, whitening, [p.shift for p in points])
     y, _ = build.clipped(y, [FARTHEST] * len(points))
     # Twice the rows, so that |row|^2 - 2 row.y needs no further product.
-    columns = build.stored([-2.0 * p.rows.T for p in points], np.int16, NOVELTY_COLUMNS)
+    columns = build.stored(
+        [-2.0 * p.rows.T for p in points], np.int16, "columns of novelty"
+    )
     lengths = build.by_decision_point(
-        [(p.rows**2).sum(axis=1) for p in points], NOVELTY_LENGTHS
+        [(p.rows**2).sum(axis=1) for p in points], "lengths of novelty"
     )
     length = build.squared_length(y)
     distances = build.node("Gemm", y, columns, lengths)
@@ -254,6 +251,32 @@ def _novelty(build: Builder, x: str, space: NoveltySpace, output: str) -> None:
     product = build.node("Mul", build.node("Sqrt", outside), root)
     units = build.by_decision_point([p.unit for p in points])
     build.node("Squeeze", build.node("Mul", product, units), [1], output=output)
+
+
+def label_tables(labels: Integers, classes: int) -> dict[str, Array]:
+    """The constants from which the graph takes the distances of labels.
+
+    Args:
+        labels: (n,) of the trials; -1 where one has none.
+        classes: how many labels there are.
+
+    Returns:
+        `members` (classes, largest): the trials of each label, filled up with n;
+        `most` (1,): the largest count; `taken` (classes, most): True in the first
+        columns of each label, as many as its count; `counts` (classes,): how many
+        trials stand for each label.
+    """
+    sizes = np.bincount(labels[labels >= 0], minlength=classes)
+    counts = nearest_of_label(sizes)
+    members = np.full((classes, int(sizes.max())), len(labels))
+    for label, size in enumerate(sizes):
+        members[label, :size] = np.flatnonzero(labels == label)
+    return {
+        "members": members,
+        "most": counts.max(keepdims=True),
+        "taken": np.arange(counts.max()) < counts[:, None],
+        "counts": counts.astype(np.float64),
+    }
 
 
 def _label_distances(
@@ -286,11 +309,7 @@ def _label_distances(
 
 
 def _outputs(model: Fitted) -> dict[str, Any]:
-    """{output: its type}.
-
-    ONNX Runtime derives the sizes from the constants, which `edge.tools.teaching`
-    enlarges.
-    """
+    """{output: its type}; ONNX Runtime derives the sizes from the constants."""
     sequential = isinstance(model, SequentialClassifier)
     of_task = {
         "label": Int64TensorType([None]),

@@ -1,4 +1,4 @@
-"""`make kills`: record, label, teach, a map and export are killed 60 times each.
+"""`make kills`: record, label and export are killed 60 times each.
 
 Each run is killed at a moment that a seed draws: at any time of a whole run, or shortly
 after a file of its folder changed. Then every file must be whole, and the next start of
@@ -6,7 +6,6 @@ the same command must finish or name what was interrupted, and leave no temporar
 """
 
 import argparse
-import json
 import os
 import random
 import shutil
@@ -28,7 +27,6 @@ from edge.saving import find
 from edge.writing import PREFIX
 from tests.bench import tables
 from tests.conftest import ended
-from train.touch_map import TouchMap
 
 EDGE = (sys.executable, "-m", "edge")
 EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none")
@@ -121,38 +119,6 @@ def before_exporting(folder):
         shutil.copy(GOLDEN / name, folder / name)
 
 
-def before_teaching(folder):
-    before_exporting(folder)
-    shutil.copytree(GOLDEN, folder / "source")
-
-
-def teaching(folder):
-    model = folder / "source" / "model.onnx"
-    words = ["--model", model, "--out", folder, "--new-labels", folder / "touches"]
-    return [*EDGE, "teach", *words]
-
-
-def mapping(folder):
-    fake = demo.recordings()[0]
-    words = ["--model", demo.MODEL, "--fake", fake, "--loop", "--seconds", 3]
-    return [*EDGE, "run", *words, "--map", folder / "map.jsonl"]
-
-
-def readable_map(folder):
-    path = folder / "map.jsonl"
-    if path.exists():
-        for line in path.read_bytes().split(b"\n")[:-1]:
-            json.loads(line)
-        if path.stat().st_size:
-            list(TouchMap(path))
-    return ""
-
-
-def longer_map(folder, printed):
-    path = folder / "map.jsonl"
-    return "" if any(TouchMap(path)) else "the map holds no touch"
-
-
 def exporting(folder):
     words = ["--features", "paper", "--projection", "pca", "--components", 4, "-k", 1]
     return [*EXPORT, "--data", folder / "touches", "--out", folder, "--jobs", 1, *words]
@@ -161,8 +127,6 @@ def exporting(folder):
 VICTIMS = {
     "record": Victim(lambda folder: None, recorded, loadable, all_recorded),
     "label --set": Victim(copied, relabelled, loadable, all_or_none),
-    "teach": Victim(before_teaching, teaching, together, agreeing),
-    "run --map": Victim(lambda folder: None, mapping, readable_map, longer_map),
     "export": Victim(before_exporting, exporting, together, agreeing),
 }
 

@@ -1,53 +1,33 @@
-"""Recordings to a fitted model: settings are chosen, and their accuracy measured."""
+"""Recordings to a fitted model: load, choose, calibrate, fit."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import cpu_count
-from scipy.spatial.distance import cdist
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Floats
 from edge.errors import InputError
-from edge.recording import Recording
 from edge.tools.slips import slips
-from edge.touch.arm import Chain
-from edge.touch.features import SAMPLES, WINDOW_S
-from train.choose.candidates import Candidate, Fixed, candidates, features_of
-from train.choose.choose import Choosing, Chosen
-from train.choose.decision_points import MOST_TRIALS, usual_points
-from train.choose.settings import Settings
-from train.data import thresholds
-from train.data.dataset import (
-    DataSet,
-    Measurement,
-    Recordings,
-    Untouched,
-    load_trials,
-    read,
-)
-from train.data.groups import LEAVE_OUT, Divisions, kinds_of
+from edge.touch.features import WINDOW_S
+from train.choose.candidates import Candidate
+from train.choose.decision_points import decision_points, has_early_points
+from train.choose.options import FitOptions, Loaded, trials_of
+from train.choose.settings import Chosen, Settings
+from train.choose.windows import windows_of
+from train.data.dataset import DataSet, read
+from train.data.groups import are_drawn
+from train.data.leaks import copies, leaks
+from train.data.tasks import labels_of_tasks, lacking
 from train.data.vectors import Labels, Vectors
-from train.mix import Mixing, mix
 from train.model.pipeline import Choice, ContactClassifier
-from train.model.stopping import FEWEST, Early, SequentialClassifier
+from train.model.stopping import Early, SequentialClassifier
 
-LEAK = 0.5
-"""Warn of a leak if a nearest neighbour on the first frame beats the majority class by
-more than this share of the remainder."""
 FEWEST_TRIALS = 3
-LONG_TOUCHES = 2.0
-"""Longer windows are tried where half of the touches last so many windows."""
-LONG_SHARE = 0.9
-"""Share of the touches that may end before the longest window."""
-LONGEST_WINDOW_S = 60.0
-LAST_RATIO = 1.2
-"""The longest window is tried where it is so much longer than the one before it."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +64,11 @@ class Fitted:
         their own."""
         return None if self.sequential is None else self.sequential.early
 
+    @cached_property
+    def _vectors(self) -> Vectors:
+        """The trials with the features of every candidate."""
+        return self.measured.vectors(self.window_s, self.samples, {})
+
     def selection(self, choices: Iterable[Choice]) -> tuple[DataSet, Vectors]:
         """The trials, and their vectors, with the features and labels that some
         settings of the tasks take."""
@@ -92,95 +77,8 @@ class Fitted:
         for choice in choices:
             tasks.update(choice.targets)
             features += choice.features
-        dataset = self.measured.of(features)
-        y = {task: dataset.labels(task) for task in tasks}
-        return dataset, dataset.vectors(self.window_s, self.samples, y)
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitOptions(Fixed):
-    """The settings that a fit holds fixed; it chooses the others. See `fit`."""
-
-    window_s: float | None = None
-    samples: int = SAMPLES
-    tasks: Sequence[str] | None = None
-    leave_out: str = LEAVE_OUT
-    decision_points_s: Sequence[float] | None = None
-    threshold: int | None = None
-    onset: int | None = None
-    arm: Chain | None = None
-    quick: bool = False
-    jobs: int | None = None
-    progress: bool = False
-
-    @property
-    def processes(self) -> int:
-        """Number of processes."""
-        return self.jobs or cpu_count()
-
-    @property
-    def fixed_window_s(self) -> float | None:
-        """The window that is asked for; None where it is to be chosen."""
-        if self.window_s is None and self.decision_points_s:
-            return self.decision_points_s[-1]
-        return self.window_s
-
-    def candidates_for(
-        self,
-        dataset: DataSet,
-        y: Labels,
-        *,
-        drawn: bool,
-    ) -> list[Candidate]:
-        """The candidates for some trials."""
-        joints = dataset.joints > 0
-        shear = dataset.layout.axes is not None
-        return candidates(
-            y,
-            self,
-            joints=joints,
-            shear=shear,
-            drawn=drawn,
-            quick=self.quick,
-        )
-
-    def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
-        """The choice of the settings of some trials.
-
-        Raises:
-            InputError: `k` is not possible where some of them are left out.
-        """
-        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
-        most = divisions.fewest_left
-        if self.k is not None and not 1 <= self.k <= most:
-            raise InputError(
-                f"k must be 1 to {most}, the trials that remain of "
-                f"{len(divisions.folds)} where some are left out, not {self.k}"
-            )
-        return Choosing(
-            dataset,
-            y,
-            self.candidates_for(dataset, y, drawn=drawn),
-            divisions,
-            self.samples,
-            self.processes,
-            self.progress,
-        )
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """The trials of a fit.
-
-    Attributes:
-        dataset: with the features of every candidate.
-        windows: that may be chosen, the usual one first.
-        notes: sentences that a user should read.
-    """
-
-    dataset: DataSet
-    windows: tuple[float, ...]
-    notes: list[str]
+        y = {task: self.measured.labels(task) for task in tasks}
+        return self.measured.of(features), replace(self._vectors.of(features), y=y)
 
 
 def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fitted:
@@ -229,27 +127,24 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     """
     fixed = FitOptions(**options)
     loaded = load(data, fixed)
-    y = _labels(loaded.dataset, fixed.tasks)
+    y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
     _check_size(len(loaded.dataset.trials))
     settings = choose(loaded, y, fixed)
-    if loaded.dataset.is_own is not None:
-        y = {task: y[task] for task in settings.chosen}
     measured = loaded.dataset.with_kernels(settings.window_s)
-    notes = [*doubts, *_lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*settings.notes, *_leaks(measured, y)]
-    points = _decision_points(measured, settings, fixed, notes)
+    notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
+    notes += [*settings.notes, *leaks(measured, y)]
+    points = decision_points(measured, settings, fixed, notes)
     if len(points) < 2:
         settings = replace(settings, early=None)
     dataset = measured.of(sorted(settings.features()))
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
     if points:
-        sequential = calibrate(measured, y, points, settings, fixed)
+        sequential, of_known = calibrate(measured, y, points, settings, fixed)
         classifier = sequential.decision_points_[-1]
-        if not fixed.quick:
-            notes += _early_of_known(measured, y, points, settings, fixed, sequential)
+        notes += of_known
     else:
         classifier = ContactClassifier.of(settings.choices, vectors)
     return Fitted(
@@ -275,102 +170,11 @@ def load(
         return Loaded(data, windows, [])
     paths = [data] if isinstance(data, str | Path) else data
     recordings = read(paths, progress=options.progress)
-    if options.fixed_window_s is None and not (options.quick or recordings.mixed):
+    if options.fixed_window_s is None and not options.quick:
         seconds = [float(r.t[-1] - r.t[0]) for r in recordings.recordings]
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
-    return replace(loaded, notes=[*_copies(recordings), *loaded.notes])
-
-
-def _copies(recordings: Recordings) -> list[str]:
-    """A warning where some recordings are others' copies, by which they are told."""
-    originals: dict[bytes, Path] = {}
-    copies = []
-    for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
-        sha = hashlib.sha256(recording.t.tobytes())
-        sha.update(recording.frames.tobytes())
-        original = originals.get(sha.digest())
-        if original is None:
-            originals[sha.digest()] = path
-        elif recording.frames.any():
-            copies.append(f"{path} of {original}")
-    if not copies:
-        return []
-    return [
-        f"warning: {len(copies)} of {len(recordings.paths)} recordings are copies, such "
-        f"as {copies[0]}; a copy is told by its original, so the accuracy is too high: "
-        "leave copies out"
-    ]
-
-
-def trials_of(
-    recordings: Recordings,
-    windows: tuple[float, ...],
-    options: FitOptions,
-) -> Loaded:
-    """The trials of recordings, up to the last of some windows, by thresholds that are
-    given, saved, proposed or chosen."""
-    usual = candidates(
-        {},
-        options,
-        joints=recordings.joints,
-        shear=recordings.shear,
-        drawn=recordings.mixed or kinds_of(recordings.recordings) is not None,
-        quick=options.quick,
-    )
-    measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
-
-    def by(threshold: int | None, onset: int | None) -> DataSet:
-        return load_trials(
-            recordings,
-            replace(measurement, threshold=threshold, onset=onset),
-            partial=True,
-            progress=options.progress,
-            jobs=options.processes,
-        )
-
-    def accuracy(trials: DataSet) -> float:
-        hasty = replace(options, quick=True, progress=False)
-        y = _labels(trials, options.tasks)
-        choosing = hasty.choosing(trials, y, drawn=_are_drawn(trials))
-        return choosing.accuracy(windows[0])
-
-    if options.threshold is not None or options.onset is not None:
-        return Loaded(by(options.threshold, options.onset), windows, [])
-    dataset, notes = _by_noise(recordings, by)
-    if not any("simulation" in r.meta for r in recordings.recordings):
-        dataset, lower = thresholds.chosen(dataset, by, accuracy)
-        notes += lower
-    return Loaded(dataset, windows, notes)
-
-
-def _by_noise(
-    recordings: Recordings,
-    by: Callable[[int | None, int | None], DataSet],
-) -> tuple[DataSet, list[str]]:
-    """The trials by the thresholds that the skin was saved with, or else by those that
-    its noise suggests, and the warning of these."""
-    reason = "the skin was saved without thresholds"
-    if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
-        try:
-            return by(None, None), []
-        except Untouched:
-            reason = "no recording has a contact at its own thresholds"
-    proposal = thresholds.proposed(recordings.of_owner)
-    warning = (
-        f"warning: {reason}; a threshold of {proposal.threshold} and an onset of "
-        f"{proposal.onset} counts come from {proposal.source}"
-    )
-    return by(proposal.threshold, proposal.onset), [warning]
-
-
-def _are_drawn(dataset: DataSet) -> bool:
-    """Whether the trials are of things that a scene drew from kinds."""
-    return kinds_of([trial.recording for trial in dataset.trials]) is not None
-
-
-def _labels(dataset: DataSet, tasks: Sequence[str] | None) -> Labels:
-    return {task: dataset.labels(task) for task in _tasks(dataset, tasks)}
+    return replace(loaded, notes=[*copies(recordings), *loaded.notes])
 
 
 def _check_size(trials: int) -> None:
@@ -382,57 +186,17 @@ def _check_size(trials: int) -> None:
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     """The settings of each task, and the window."""
     dataset = loaded.dataset
-    if dataset.is_own is not None:
-        return _choose_mixed(loaded, y, dataset.is_own, options)
-    choosing = options.choosing(dataset, y, drawn=_are_drawn(dataset))
+    choosing = options.choosing(dataset, y, drawn=are_drawn(dataset))
     windows = loaded.windows
     if len(windows) > 1:
         windows = windows_of(
             [float(t.recording.t[-1]) - t.onset_s for t in dataset.trials]
         )
     window_s, notes = choosing.window(windows)
-    chosen, folds, without = choosing.choose(window_s)
-    settings = Settings(chosen, folds, without, choosing.candidates, window_s, notes)
-    if options.quick or not _has_early_points(settings, options):
+    settings = replace(choosing.choose(window_s), notes=notes)
+    if options.quick or not has_early_points(settings, options):
         return settings
-    return replace(settings, early=choosing.early(window_s, chosen))
-
-
-def _choose_mixed(
-    loaded: Loaded,
-    y: Labels,
-    is_own: Booleans,
-    options: FitOptions,
-) -> Settings:
-    """The settings where simulated trials stand beside the owner's."""
-    dataset = loaded.dataset
-    window_s = loaded.windows[0]
-    X = dataset.with_kernels(window_s).features(window_s, options.samples)
-
-    def settings(trials: DataSet, labels: Labels) -> dict[str, Chosen]:
-        return options.choosing(trials, labels, drawn=True).choose(window_s)[0]
-
-    mixing = Mixing(
-        dataset,
-        y,
-        is_own,
-        X,
-        options.samples,
-        options.leave_out,
-        options.quick,
-        options.processes,
-    )
-    mixed = mix(mixing, settings)
-    y = {task: y[task] for task in mixed.chosen}
-    usual = options.candidates_for(dataset, y, drawn=True)
-    return Settings(
-        mixed.chosen,
-        mixed.folds,
-        mixed.without,
-        usual,
-        window_s,
-        mixed.notes,
-    )
+    return replace(settings, early=choosing.early(window_s, settings.chosen))
 
 
 def calibrate(
@@ -441,9 +205,12 @@ def calibrate(
     points: tuple[float, ...],
     settings: Settings,
     options: FitOptions,
-) -> SequentialClassifier:
-    """A classifier for all decision points, with its stopping rules."""
-    dataset = measured.of(sorted(settings.features(folds=True)))
+) -> tuple[SequentialClassifier, list[str]]:
+    """A classifier for all decision points, with its stopping rules, and sentences that
+    a user should read."""
+    known = settings.of_known
+    names = settings.features(folds=True) | known.features(folds=True)
+    dataset = measured.of(sorted(names))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
         settings.choices,
@@ -453,164 +220,42 @@ def calibrate(
         widths=dataset.widths(options.samples),
         early=None if settings.early is None else settings.early.settings,
     )
-    return classifier.fit(
+    classifier.fit(
         at_points,
         y,
         settings.folds,
         settings.without,
-        measured.is_own,
     )
+    tasks = [
+        task for task, c in settings.chosen.items() if c.choice_of_known is not None
+    ]
+    if options.quick or not tasks:
+        return classifier, []
+    instead = classifier.smallest_errors(
+        at_points,
+        y,
+        known.without,
+        None if known.early is None else known.early.settings,
+    )
+    return classifier, [_errors_of_known(tasks, classifier, instead)]
 
 
-def _early_of_known(
-    measured: DataSet,
-    y: Labels,
-    points: tuple[float, ...],
-    settings: Settings,
-    options: FitOptions,
+def _errors_of_known(
+    tasks: Sequence[str],
     exported: SequentialClassifier,
-) -> list[str]:
+    instead: Mapping[str, float],
+) -> str:
     """What early decisions about recorded objects would gain by settings for these.
 
     Where groups are left out, settings are chosen for objects never met, though
     certificates are for recorded ones.
     """
-    tasks = [
-        task for task, c in settings.chosen.items() if c.choice_of_known is not None
-    ]
-    if not tasks:
-        return []
-    calibrated = calibrate(measured, y, points, settings.of_known, options)
     errors = []
     for task in tasks:
         smallest = exported.stopping_[task].smallest_error
-        instead = calibrated.stopping_[task].smallest_error
-        errors.append(f"{task} {smallest:.1%}, instead {instead:.1%}")
-    return [
+        errors.append(f"{task} {smallest:.1%}, instead {instead[task]:.1%}")
+    return (
         "the settings are chosen for objects never met; `--leave-out trial` chooses "
         "them for the recorded ones, whose smallest certified errors of early decisions "
         f"(--error) are: {'; '.join(errors)}"
-    ]
-
-
-def _is_usual(dataset: DataSet, task: str) -> bool:
-    """Whether most trials have a label for a task, of those that no other task gives."""
-    labels = dataset.labels(task)
-    labelled = int(np.count_nonzero(labels))
-    return dataset.is_own is not None or 2 * labelled > len(labels)
-
-
-def _lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
-    """A sentence for each task that most trials lack, and that is not named."""
-    if tasks is not None:
-        return []
-    sentences = []
-    for task in dataset.tasks:
-        if not _is_usual(dataset, task):
-            count = np.count_nonzero(dataset.labels(task))
-            sentences.append(
-                f"warning: task {task} is left out: {count} of {len(dataset.trials)} "
-                "trials have a label for it; --tasks names it where it is meant"
-            )
-    return sentences
-
-
-def _tasks(dataset: DataSet, tasks: Sequence[str] | None) -> tuple[str, ...]:
-    if tasks is None:
-        return tuple(task for task in dataset.tasks if _is_usual(dataset, task))
-    missing = [task for task in tasks if task not in dataset.tasks]
-    if missing:
-        raise InputError(
-            f"not every recording has a label {missing[0]!r}; all have "
-            f"{', '.join(dataset.tasks)}"
-        )
-    return tuple(tasks)
-
-
-def windows_of(seconds: Sequence[float]) -> tuple[float, ...]:
-    """The windows to try for touches that last so many seconds each.
-
-    They reach the time that a tenth of the touches last; of shorter ones the last
-    values are held.
-    """
-    if float(np.median(seconds)) < LONG_TOUCHES * WINDOW_S:
-        return (WINDOW_S,)
-    longest_s = min(float(np.quantile(seconds, LONG_SHARE)), LONGEST_WINDOW_S)
-    windows = [WINDOW_S]
-    while 2.0 * windows[-1] <= longest_s:
-        windows.append(2.0 * windows[-1])
-    if longest_s >= LAST_RATIO * windows[-1]:
-        windows.append(round(longest_s, 1))
-    return tuple(windows)
-
-
-def _leaks(dataset: DataSet, y: Labels) -> list[str]:
-    """Warnings where the first frame gives labels away, or most recordings begin in
-    contact, of the trials that the owner has felt."""
-    if dataset.is_own is not None:
-        y = {task: labels[dataset.is_own] for task, labels in y.items()}
-        dataset = dataset.part(dataset.is_own)
-    recordings = [t.recording for t in dataset.trials]
-    untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
-    if 2 * untouched.sum() < len(untouched):
-        return [_late_recordings(recordings, float((~untouched).mean()))]
-    X = np.stack([recording.frames[0].reshape(-1) for recording in recordings])
-    squares = cdist(X[untouched], X[untouched], "sqeuclidean")
-    np.fill_diagonal(squares, np.inf)
-    notes = []
-    for task, all_labels in y.items():
-        labelled = np.flatnonzero(all_labels[untouched])
-        if len(labelled) < 2:
-            continue
-        labels = all_labels[untouched][labelled]
-        nearest = squares[np.ix_(labelled, labelled)].argmin(axis=1)
-        share = float((labels[nearest] == labels).mean())
-        _, counts = np.unique(labels, return_counts=True)
-        usual = float(counts.max() / len(labels))
-        if share > usual + LEAK * (1.0 - usual):
-            notes.append(
-                f"warning: the first frame alone tells {task} in {share:.0%} of the "
-                "trials, before anything is touched. The accuracy holds only where "
-                "this is so in use too; `python -m train import --zero` subtracts the "
-                "first frames"
-            )
-    return notes
-
-
-def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
-    """The warning that a share of the recordings begins in contact."""
-    mend = "record from before the touch"
-    proposal = thresholds.proposed(recordings)
-    low = proposal.threshold
-    high = proposal.onset
-    with_contact, _ = thresholds.count_contacts(recordings, low, high)
-    if with_contact >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
-        mend += f", or take --threshold {low} --onset {high}, by which it begins later"
-    return (
-        f"warning: {share:.0%} of the touches begin with their recording, so their "
-        f"onset is not known; {mend}"
     )
-
-
-def _decision_points(
-    measured: DataSet,
-    settings: Settings,
-    options: FitOptions,
-    notes: list[str],
-) -> tuple[float, ...]:
-    """The decision points asked for, or the usual ones."""
-    asked_s = options.decision_points_s
-    if asked_s is None:
-        return usual_points(measured, settings, options.samples, notes)
-    if not asked_s:
-        notes.append(
-            "decisions carry no confidence, as the model has no decision points"
-        )
-    return tuple(asked_s)
-
-
-def _has_early_points(settings: Settings, options: FitOptions) -> bool:
-    """Whether decision points before the full window are asked for, or usual."""
-    if options.decision_points_s is not None:
-        return len(options.decision_points_s) > 1
-    return FEWEST <= settings.tested <= MOST_TRIALS

@@ -125,20 +125,16 @@ def place(model: Path, golden: Path, target: Path) -> None:
     """Put the model and its golden file in place, and keep the former ones."""
     for source, goal in ((golden, target.with_name("golden.npz")), (model, target)):
         data = read_bytes(source, LARGEST_BYTES)
-        keep_former(goal, data)
+        _keep_former(goal, data)
         _write(goal, data)
 
 
-def keep_former(goal: Path, data: bytes) -> bool:
-    """Copy the file that other bytes are to replace, under a longer name; whether
-    there is one."""
-    if not goal.is_file():
-        return False
-    former = read_bytes(goal, LARGEST_BYTES)
-    if former == data:  # installed twice, it would be its own way back
-        return False
-    _write(former_of(goal), former)
-    return True
+def _keep_former(goal: Path, data: bytes) -> None:
+    """Copy the file that other bytes are to replace, under a longer name."""
+    if goal.is_file():
+        former = read_bytes(goal, LARGEST_BYTES)
+        if former != data:  # installed twice, it would be its own way back
+            _write(former_of(goal), former)
 
 
 def _return_by_itself(target: Path) -> bool:

@@ -82,14 +82,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 class UnknownTouches:
-    """Notices once that most of the last touches are unlike everything in training.
+    """Notices once that most of the last touches are unlike everything in training."""
 
-    Args:
-        model: names the model's file in the remedy.
-    """
-
-    def __init__(self, model: str) -> None:
-        self._model = model
+    def __init__(self) -> None:
         self._touches: dict[tuple[float, int | None], bool] = {}
         """Whether each of the last touches was unknown, by onset and number."""
         self._noticed = False
@@ -110,9 +105,8 @@ class UnknownTouches:
         self._noticed = True
         LOG.warning(
             f"{count} of the last {touches} touches are unlike all training trials: "
-            "the model does not know these things. Record some touches of them, and "
-            "add them with `edge-classify teach --new-labels --model "
-            f"{self._model} REC...`"
+            "the model does not know these things. Record some touches of them, label "
+            "them, and export a model with them"
         )
         return {"event": "unknown_touches", "unknown": count, "touches": touches}
 
@@ -180,7 +174,7 @@ def run(arguments: argparse.Namespace) -> int:
             closing(live.lines(arguments.udp, writers)) as lines,
             _listeners(arguments, model, live.opened) as listeners,
         ):
-            unknown_touches = UnknownTouches(arguments.model)
+            unknown_touches = UnknownTouches()
             frames = 0
             for frame, faults in live.frames():
                 frames += 1

@@ -263,9 +263,6 @@ class ModelInfo:
     training trials}; empty without decision points."""
     several: float = 1.0
     """Share of the training trials with a second region beside the contact."""
-    taught: int = 0
-    """Number of the last trials, which were added on a board
-    (`edge.tools.teaching`)."""
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -31,6 +31,11 @@ def from_json(text: str, name: str) -> ModelInfo:
                 f"{where} is of format {short_text(meta.raw['format'])}, but this "
                 f"edge-classify reads {FORMAT}"
             )
+        if meta.has("taught"):
+            raise InputError(
+                f"{where} counts trials that were added on a board, which voids its "
+                "accuracies and error rates"
+            )
         info = _read(meta)
     except InputError as error:
         raise InputError(f"{error}; export it again") from None
@@ -91,7 +96,6 @@ def _read(meta: ConfigTable) -> ModelInfo:
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
         several=meta.number("several", 1.0, low=0.0, high=1.0),
-        taught=meta.whole("taught", 0, allowed=range(1 << 31)),
     )
     tracking.refuse_unknown()
     return info

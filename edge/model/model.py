@@ -41,7 +41,7 @@ class Decision(NamedTuple):
         neighbours: (k,) rows of the training set, nearest first.
         tie: another label had as many votes; the nearest of the tied won.
         label_distances: (labels,) how far the nearest training trials of each label lie
-            (`edge.tools.teaching.nearest_of_label` says how many), in log odds, of a
+            (`train.model.pipeline.nearest_of_label` says how many), in log odds, of a
             model with decision points or with tasks that are decided together. For
             these it is the distance of the nearest answer with this label in which they
             agree.

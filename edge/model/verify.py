@@ -36,7 +36,6 @@ from edge.errors import InputError
 from edge.files import parsing
 from edge.model.model import Model
 from edge.recording import Recording, load_arrays, load_meta
-from edge.saving import save_arrays
 from edge.touch.contact import FeatureSeries
 from edge.touch.first_contact import first_contact
 from edge.touch.layout import SkinLayout
@@ -271,30 +270,6 @@ def _outputs(
     rows = range(len(vectors))
     single = [model.run(vectors[i : i + 1], decision_point) for i in rows]
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
-
-
-def renew(
-    path: str | os.PathLike[str],
-    target: str | os.PathLike[str],
-    model: Model,
-    vectors: Floats,
-) -> None:
-    """Write a golden file of a model whose neighbours were changed.
-
-    Args:
-        path: the golden file from before.
-        target: the new one.
-        model: with the new neighbours.
-        vectors: (decision points, m, width) further vectors.
-    """
-    arrays = load_arrays(path)
-    meta = {**load_meta(os.fspath(path), arrays), "model": model.info.data_digest}
-    del arrays["meta"]
-    arrays["vectors"] = np.concatenate([arrays["vectors"], vectors[-1]])
-    if model.info.decision_points_s:
-        early = arrays["decision_point_vectors"]
-        arrays["decision_point_vectors"] = np.concatenate([early, vectors], axis=1)
-    save_arrays(target, arrays | answers(model, arrays), meta, compress=True)
 
 
 def compared(

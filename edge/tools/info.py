@@ -121,7 +121,7 @@ def description(info: ModelInfo, about: dict[str, Any]) -> str:
         f"Decides after {info.window_s:g} s, from {info.samples} samples of each of",
     ]
     lines += wrapped(units, "  ")
-    if info.decision_points_s and not info.taught:
+    if info.decision_points_s:
         points = ", ".join(f"{point:g}" for point in info.decision_points_s)
         lines.append(f"With --error, it may decide at {points} s.")
     for sentence in _origin(info):
@@ -148,9 +148,4 @@ def _origin(info: ModelInfo) -> list[str]:
         f"Fitted on {info.rows} trials, data digest {info.data_digest[:16]}, with "
         f"{versions}."
     )
-    if info.taught:
-        sentences.append(
-            f"Taught {info.taught} of them on a board: accuracies are those from "
-            "before, and no error rate is certified."
-        )
     return sentences

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
 
-from edge.tools.teaching import JOINED, label_counts
+from edge.labels import CATEGORY
 
 RARE_SHARE = 0.1
 """A task that fewer of the recordings have is named."""
@@ -40,12 +40,17 @@ def counts_text(labels: Labels) -> list[str]:
     """A line for each task: how many recordings have each label."""
     lines = []
     for task in sorted(set().union(*labels)):
-        counts = label_counts(task, labels)
+        counts = _label_counts(task, labels)
         total = counts.total()
         names = ", ".join(f"{label} {count}" for label, count in counts.most_common(12))
         more = f" and {len(counts) - 12} more" if len(counts) > 12 else ""
         lines.append(f"{task} ({total} of {len(labels)}): {names}{more}")
     return lines
+
+
+def _label_counts(task: str, labels: Labels) -> Counter[str]:
+    """How many recordings have each label of a task."""
+    return Counter(trial[task] for trial in labels if task in trial)
 
 
 def _rare_tasks(labels: Labels) -> list[str]:
@@ -62,7 +67,7 @@ def _rare_tasks(labels: Labels) -> list[str]:
 
 
 def _rare_labels(task: str, labels: Labels) -> list[str]:
-    counts = label_counts(task, labels)
+    counts = _label_counts(task, labels)
     total = counts.total()
     sentences = []
     for label, count in sorted(counts.items()):
@@ -106,16 +111,15 @@ def _alike(first: str, second: str) -> bool:
 
 def _contradictions(labels: Labels) -> list[str]:
     """Sentences on trials whose category is not that of their softness and mobility."""
-    product, *factors = JOINED
+    task = CATEGORY.task
     contradictions = []
     for trial in labels:
-        if trial.keys() >= set(JOINED):
-            implied = "-".join(trial[factor] for factor in factors)
-            if trial[product] != implied:
-                contradictions.append(f"{trial[product]!r} beside {implied!r}")
+        implied = CATEGORY.label(trial)
+        if implied is not None and trial.get(task, implied) != implied:
+            contradictions.append(f"{trial[task]!r} beside {implied!r}")
     if not contradictions:
         return []
     return [
-        f"{product} contradicts {' and '.join(factors)} on {len(contradictions)} of "
+        f"{task} contradicts {' and '.join(CATEGORY.factors)} on {len(contradictions)} of "
         f"{len(labels)} recordings, such as {contradictions[0]}"
     ]

@@ -40,8 +40,9 @@ from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
 from train.data.parts import part
 from train.fitting import fit
+from train.model.held_out import answers
 from train.model.rules import RISK
-from train.model.stopping import answers, unlike
+from train.model.stopping import unlike
 from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write

@@ -11,6 +11,7 @@ from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
 from export.api import measure
+from train.model.pipeline import ContactClassifier
 from train.report.summary import names, warnings
 
 
@@ -73,7 +74,7 @@ def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     choices["category"] = replace(choices["category"], features=("log_max_force@5",))
     names = fitted.dataset.names
     widths = fitted.dataset.widths(fitted.samples)
-    classifier = train.fitting.ContactClassifier(choices, names, widths)
+    classifier = ContactClassifier(choices, names, widths)
     y = {task: fitted.dataset.labels(task) for task in choices}
     classifier.fit(fitted.X, y)
     path = tmp_path / "model.onnx"
@@ -81,7 +82,7 @@ def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):
     queries = 1.01 * fitted.X
     answers = Model(path).run(queries)
     for task in choices:
-        _, rows = classifier.neighbours(task, queries)
+        _, rows = classifier.tasks_[task].neighbours(queries)
         assert (answers[f"{task}_neighbours"] == rows).all()
 
 

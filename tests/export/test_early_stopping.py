@@ -5,7 +5,6 @@ import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,12 +16,10 @@ from edge.early import stopping_rules
 from edge.errors import InputError
 from edge.events import Decided
 from edge.model.model import Model
-from edge.model.verify import first_series, renew, verify
+from edge.model.verify import first_series, verify
 from edge.saving import save
-from edge.tools.teaching import taught
 from edge.touch.features import FEATURES
 from export.api import save as save_model
-from export.graph import to_onnx
 from tests.conftest import PAPER, export, save_touches
 from tests.edge.model.test_engines import assert_same_bits, hostile
 from tests.hard_cases.models import session
@@ -91,13 +88,15 @@ def test_the_graph_measures_each_label_as_the_estimator_does(early, tmp_path):
     sequential, model = fitted_model(path, early.info, choices, X, {"t": labels})
     for point, fitted in enumerate(sequential.decision_points_):
         for label, (size, count) in enumerate([(100, 5), (30, 3), (2, 2)]):
-            squares = fitted.squares("t", queries)[:, fitted.labels_["t"] == label]
+            squares = fitted.tasks_["t"].squares(queries)[
+                :, fitted.tasks_["t"].labels == label
+            ]
             assert squares.shape[1] == size
             nearest = np.sort(squares, axis=1)[:, :count]
             distances = model.run(queries, point)["t_label_distances"][:, label]
-            expected = [mean_of_roots(row, fitted.unit("t")) for row in nearest]
+            expected = [mean_of_roots(row, fitted.tasks_["t"].unit) for row in nearest]
             assert distances.tolist() == [
-                fitted.slopes_["t"] * mean for mean in expected
+                fitted.tasks_["t"].slope * mean for mean in expected
             ]
 
 
@@ -129,12 +128,11 @@ def test_decision_points_may_have_features_and_directions_of_their_own(
     for point, fitted in enumerate(sequential.decision_points_):
         answers = model.run(queries, point)
         for task in sequential.choices:
-            distances, rows = fitted.neighbours(task, queries)
+            distances, rows = fitted.tasks_[task].neighbours(queries)
             assert (answers[f"{task}_neighbours"] == rows).all()
             assert (answers[f"{task}_distances"] == distances).all()
-    assert [len(c) for c in sequential.decision_points_[0].columns_.values()] == [
-        len(queries[0]) // len(FEATURES)
-    ]
+    for fitted in sequential.decision_points_[0].tasks_.values():
+        assert len(fitted.space.columns) == len(queries[0]) // len(FEATURES)
 
 
 def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
@@ -151,21 +149,6 @@ def test_early_settings_are_the_same_bits_in_numpy(with_early_settings):
     _, _, model = with_early_settings
     rng = np.random.default_rng(2)
     assert_same_bits(model.path, hostile(model.info.width, rng))
-
-
-def test_a_taught_trial_is_nearest_to_itself_at_every_decision_point(
-    with_early_settings, tmp_path
-):
-    X, _, model = with_early_settings
-    more = np.random.default_rng(5).normal(scale=0.5, size=(3, 1, X.shape[2]))
-    path = tmp_path / "taught.onnx"
-    path.write_bytes(taught(model, ["new"], more, [{"t": "a", "u": "y"}]))
-    after = Model(path)
-    for point, vectors in enumerate(more):
-        answers = after.run(vectors, point)
-        for task in ("t", "u"):
-            assert answers[f"{task}_neighbours"][0, 0] == 45
-            assert answers[f"{task}_distances"][0, 0] == 0.0
 
 
 def test_the_golden_file_holds_what_is_answered_at_each_decision_point(early, folder):
@@ -374,128 +357,6 @@ def test_the_board_decides_as_the_trials_that_certified_its_rules_were(
             event = decided(model, recording, error)[task]
             assert event.window_s == model.decision_points_s[at[i]]
             assert (event.label != truth[task][i]) == wrong[i]
-
-
-def add_rows(point, task, vectors, labels):
-    """Give a task at a decision point the rows of {further trial: its label}, in a
-    space of its own."""
-    space = point.spaces_[task]
-    alone = (*space, task)
-    point.spaces_[task] = alone
-    for of_space in (point.projections_, point.columns_):
-        of_space[alone] = of_space[space]
-    trials = np.array([*labels])
-    rows = point.project(alone, vectors[trials])
-    point.rows_[alone] = np.vstack([point.rows_[space], rows])
-    former = np.arange(point.n_trials_)
-    point.members_[alone] = np.append(former, point.n_trials_ + trials)
-    classes = sorted({*map(str, point.classes_[task]), *labels.values()})
-    indices = [classes.index(label) for label in labels.values()]
-    point.labels_[task] = np.append(point.labels_[task], indices)
-    point.classes_[task] = np.array(classes)
-
-
-def add_novelty_rows(space, more):
-    """A space of novelty with the further trials (points, m, width), of which those
-    beyond the reach of the stored type are placed at its edge."""
-    points = []
-    for k, point in enumerate(space.points):
-        rows = np.clip(space.coordinates(k, more[k]), -16383, 16383)
-        points.append(replace(point, rows=np.vstack([point.rows, rows])))
-    return replace(space, points=tuple(points))
-
-
-def add_trials(sequential, more, labels):
-    """Give an estimator the further trials (points, m, width) and {task: {trial: its
-    label}}, without fitting it again."""
-    for point, vectors in zip(sequential.decision_points_, more, strict=True):
-        for task, of_trials in labels.items():
-            add_rows(point, task, vectors, of_trials)
-        point.n_trials_ += len(vectors)
-        spaces = point.spaces_.values()
-        point.projections_ = {space: point.projections_[space] for space in spaces}
-    sequential.space_ = add_novelty_rows(sequential.space_, more)
-
-
-FURTHER = [{"t": "d", "u": "y"}, {"t": "a", "u": "z"}, {"u": "x", "t": "d"}]
-"""Labels of three further trials; `d` and `z` are new."""
-COUNTED = {"t": {1: "a"}, "u": {0: "y", 2: "x"}}
-"""{task: {further trial: the label that counts}}, where no label may be new."""
-ALL_COUNTED = {"t": {0: "d", 1: "a", 2: "d"}, "u": {0: "y", 1: "z", 2: "x"}}
-
-
-@pytest.fixture(
-    scope="module",
-    params=[False, True],
-    ids=["known labels", "new labels"],
-)
-def lesson(early, tmp_path_factory, request):
-    """A model of two tasks, taught further trials, and the estimators with their rows.
-
-    Without new labels, each trial has a label for one task, and the tasks are of one
-    space. With them, no more than the two trials of `d` vote, and one task takes one of
-    the features.
-    """
-    new = request.param
-    rng = np.random.default_rng(1)
-    X, more, queries = (rng.normal(size=(3, n, early.info.width)) for n in (45, 3, 9))
-    of_u = ("contact_area",) if new else FEATURES
-    choices = {"t": Choice("none", 4, 3), "u": Choice("none", 3, 1, features=of_u)}
-    path = tmp_path_factory.mktemp("taught") / "model.onnx"
-    sequential, before = fitted_model(path, early.info, choices, X, LABELS)
-    data = taught(before, ["one", "two", "three"], more, FURTHER, new_labels=new)
-    path.write_bytes(data)
-    model = Model(path)
-    if new:
-        choices["t"] = Choice("none", 4, 2)
-    add_trials(sequential, more, ALL_COUNTED if new else COUNTED)
-    described = replace(before.info, rows=48, tasks=model.info.tasks)
-    oracle = path.with_name("oracle.onnx")
-    oracle.write_bytes(to_onnx(sequential, described))
-    return SimpleNamespace(
-        new=new,
-        model=model,
-        more=more,
-        queries=queries,
-        oracle=Model(oracle),
-    )
-
-
-def test_a_taught_model_is_the_graph_of_the_estimators_with_the_further_rows(lesson):
-    vectors = np.concatenate([lesson.queries, lesson.more], axis=1)
-    for point, at_point in enumerate(vectors):
-        expected = lesson.oracle.run(at_point, point)
-        for key, values in lesson.model.run(at_point, point).items():
-            assert (values == expected[key]).all(), key
-
-
-def test_a_taught_model_says_how_many_trials_and_which_labels_it_has(lesson):
-    info = lesson.model.info
-    assert info.rows == 48
-    assert info.taught == 3
-    added = {name: (task.labels[2:], task.k) for name, task in info.tasks.items()}
-    if lesson.new:
-        assert added == {"t": (("c", "d"), 2), "u": (("z",), 1)}
-    else:
-        assert added == {"t": (("c",), 3), "u": ((), 1)}
-
-
-def test_the_golden_file_of_a_taught_model_holds_the_further_trials(
-    lesson,
-    folder,
-    tmp_path,
-):
-    renewed = tmp_path / "golden.npz"
-    renew(folder / "out" / "golden.npz", renewed, lesson.model, lesson.more)
-    golden = np.load(renewed)
-    assert (golden["decision_point_vectors"][:, -3:] == lesson.more).all()
-    assert (golden["vectors"][-3:] == lesson.more[-1]).all()
-
-
-def test_a_taught_model_has_no_error_rate(lesson):
-    sentence = "taught 3 trials after its error rates were certified"
-    with pytest.raises(InputError, match=sentence):
-        stopping_rules(lesson.model, 0.2)
 
 
 def test_the_graph_scores_novelty_as_the_estimator_does(early, tmp_path):

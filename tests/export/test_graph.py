@@ -59,13 +59,15 @@ def differences(fitted, answers, queries):
     bit."""
     wrong = []
     for task in fitted.choices:
-        distances, rows = fitted.neighbours(task, queries)
-        nearest = fitted.nearest(task, fitted.squares(task, queries))
-        named = fitted.labels_[task][nearest]
+        distances, rows = fitted.tasks_[task].neighbours(queries)
+        nearest = fitted.tasks_[task].nearest(fitted.tasks_[task].squares(queries))
+        named = fitted.tasks_[task].labels[nearest]
         expected = {
             f"{task}_neighbours": rows,
             f"{task}_label": vote(named),
-            f"{task}_scores": np.eye(len(fitted.classes_[task]))[named].mean(axis=1),
+            f"{task}_scores": np.eye(len(fitted.tasks_[task].classes))[named].mean(
+                axis=1
+            ),
             f"{task}_distances": distances,
         }
         for name, values in expected.items():
@@ -112,15 +114,14 @@ def hard_set(kind, draw):
 
 def by_hand(fitted, rows, points, k):
     """The answers to points in whole numbers (m, c), from rows (n, c)."""
-    (projection,) = fitted.projections_.values()
-    unit = projection.grid_.unit
+    unit = fitted.tasks_["t"].unit
     answers = {"distances": [], "neighbours": [], "label": []}
     for point in points:
         nearest, squares = exact.nearest(rows, point, k)
         assert max(squares) < 2**53
         answers["distances"].append([exact.distance(squares[j], unit) for j in nearest])
         answers["neighbours"].append(nearest)
-        voters = fitted.labels_["t"][nearest].tolist()
+        voters = fitted.tasks_["t"].labels[nearest].tolist()
         answers["label"].append(exact.winner(voters))
     return answers
 
@@ -154,12 +155,13 @@ def test_every_number_of_the_graph_is_that_of_whole_numbers(
     data = to_onnx(fitted, describe(fitted, samples=8))
     proto = onnx.load_from_string(data)
     z_name = coordinates_of(proto.graph)
-    [(space, p)] = fitted.projections_.items()
-    c = fitted.components_["t"]
+    task_fit = fitted.tasks_["t"]
+    p = task_fit.space.projection
+    c = task_fit.components
     rows = exact.coordinates(X, p, c)
     points = exact.coordinates(queries, p, c)
     expected = by_hand(fitted, rows, points, k)
-    assert (fitted.rows_[space][:, :c] / p.grid_.unit).tolist() == rows.tolist()
+    assert (task_fit.rows / p.grid_.unit).tolist() == rows.tolist()
     outputs = [z_name, *(f"t_{name}" for name in expected)]
     runs = engines(proto.SerializeToString(), outputs).values()
     ours, theirs = (run(queries) for run in runs)
@@ -219,7 +221,8 @@ OF_TWO_SPACES = {
 def test_tasks_of_one_space_have_their_own_neighbours(export):
     X = features(50)
     fitted, model = export(X, OF_TWO_SPACES)
-    assert fitted.components_ == {"a": 20, "b": 3, "c": 7, "d": 20}
+    components = {task: fit.components for task, fit in fitted.tasks_.items()}
+    assert components == {"a": 20, "b": 3, "c": 7, "d": 20}
     queries = np.concatenate([X, features(40, seed=1)])
     assert differences(fitted, model.run(queries), queries) == []
 
@@ -233,7 +236,6 @@ def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     shapes = [tuple(tensor.dims) for tensor in proto.graph.initializer]
     matrices = Counter(shape for shape in shapes if len(shape) == 2)
     weights = {(120, 7): 1, (120, 20): 1}
-    # A task's rows are its own, so that it can be taught alone.
     rows = {(7, 50): 1, (20, 50): 3}
     ballots = {(6, 5): 4}
     assert matrices == weights | rows | ballots

@@ -43,9 +43,9 @@ def describe(fitted, info=None, samples=40):
     last = getattr(fitted, "decision_points_", [fitted])[-1]
     tasks = {
         task: Task(
-            tuple(map(str, last.classes_[task])),
+            tuple(map(str, last.tasks_[task].classes)),
             choice.k,
-            last.components_[task],
+            last.tasks_[task].components,
             choice.scaling,
             0.0,
             features=choice.features,
@@ -96,8 +96,8 @@ class Ours:
         self.fitted = ContactClassifier({"t": choice}).fit(X, {"t": y})
         self.data, self.model = exported(self.fitted, None, X.shape[1] // 3)
         self.k = choice.k
-        self.labels = self.fitted.labels_["t"].tolist()
-        self.projection = next(iter(self.fitted.projections_.values()))
+        self.labels = self.fitted.tasks_["t"].labels.tolist()
+        self.projection = self.fitted.tasks_["t"].space.projection
         self._X = X
 
     @cached_property
@@ -107,7 +107,9 @@ class Ours:
 
     def whole(self, vectors):
         """The exact coordinates of vectors."""
-        return exact.coordinates(vectors, self.projection, self.fitted.components_["t"])
+        return exact.coordinates(
+            vectors, self.projection, self.fitted.tasks_["t"].components
+        )
 
     def alone(self, queries):
         """The graph's answers to queries one by one, as the board asks."""

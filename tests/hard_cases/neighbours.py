@@ -155,7 +155,7 @@ class Outlier:
         queries = features(200, seed + 1)
         ours = Ours(X, choice=Choice("none", 6, 1))
         p = ours.projection
-        rows = ours.fitted.rows_[ours.fitted.spaces_["t"]]
+        rows = ours.fitted.tasks_["t"].space.rows
         self.named = coarseness(rows, p.grid_.unit) < FEWEST_UNITS
         vectors = np.concatenate([X, queries])
         points = exact.unrounded(vectors, p.mean_, p.weights_)
@@ -190,7 +190,7 @@ def grid_error(spread, seed):
     true = exact.unrounded(np.concatenate([X, queries]), p.mean_, p.weights_).astype(
         float
     )
-    z = ours.fitted.rows_[ours.fitted.spaces_["t"]]
+    z = ours.fitted.tasks_["t"].space.rows
     true *= np.linalg.norm(z) / np.linalg.norm(
         true[:80]
     )  # proportional numbers, to 1e-7

@@ -95,8 +95,8 @@ class Whole:
         """What the graph is to answer to vectors (n, 120) at a decision point."""
         fitted = self.fitted.decision_points_[point]
         spaces = {
-            space: exact.projected(vectors[:, fitted.columns_[space]], projection)
-            for space, projection in fitted.projections_.items()
+            space: exact.projected(vectors[:, space.columns], space.projection)
+            for space in {task.space for task in fitted.tasks_.values()}
         }
         cut = np.any([projected.cut for projected in spaces.values()], axis=0)
         expected = {
@@ -104,21 +104,21 @@ class Whole:
             "novelty": self._novelty(vectors, point),
         }
         for task in CHOICES:
-            points = spaces[fitted.spaces_[task]].units
+            points = spaces[fitted.tasks_[task].space].units
             expected |= self._task(task, fitted, points, point)
         return expected
 
     def _task(self, task, fitted, points, point):
-        space = fitted.spaces_[task]
+        task_fit = fitted.tasks_[task]
+        space = task_fit.space
         members = np.flatnonzero(self.y[task] != "")
         labels = self.y[task][members].tolist()
         classes = sorted(set(labels))
-        columns = fitted.columns_[space]
-        X = self.X[point][members][:, columns]
-        rows = exact.projected(X, fitted.projections_[space]).units
-        kept = fitted.components_[task]
-        unit = fitted.projections_[space].grid_.unit
-        scale = Fraction(unit) * Fraction(fitted.slopes_[task])
+        X = self.X[point][members][:, space.columns]
+        rows = exact.projected(X, space.projection).units
+        kept = task_fit.components
+        unit = task_fit.unit
+        scale = Fraction(unit) * Fraction(task_fit.slope)
         answers = []
         for query in points:
             k = CHOICES[task].k

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
-from train.choose.candidates import Candidate, costs, features_of, places_of
+from train.choose.candidates import Candidate, features_of
 from train.choose.evaluate import (
-    VARIANCE,
     AnswerTable,
     Promise,
     Result,
@@ -20,21 +19,21 @@ from train.choose.evaluate import (
     evaluate,
     fits,
 )
+from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
 from train.choose.search import SearchGrid
+from train.choose.settings import Chosen, EarlySettings, Settings
 from train.data.dataset import DataSet
 from train.data.groups import TRIAL, Divisions, Groups
-from train.data.labels import NO_CONTACT
 from train.data.vectors import Labels, Vectors
 from train.model.agreement import families
+from train.model.held_out import held_out
 from train.model.pipeline import Choice, Choices
-from train.model.stopping import Early, held_out
+from train.model.stopping import Early
 from train.progress import bar
 
 EARLY_SHARES = (0.25, 0.5, 0.75)
 """Parts of the full window at which the settings of the earlier decision points are
 chosen, by the mean of their accuracies."""
-UNSEEN_MARGIN = 0.01
-"""Accuracy on left-out groups within which the cheaper candidate is taken."""
 UNSEEN_SHRINKAGE = 0.1
 """Smallest shrinkage tried where entire groups are left out. Less shrinkage relies on
 differences that are small beside the features' spread, which do not carry over to new
@@ -45,54 +44,6 @@ WINDOW_MARGIN = 0.02
 
 Plan = tuple[Integers, Sequence[Choices]]
 """(n,) the fold of each trial, and [fold]{task: the choice made without its trials}."""
-
-
-@dataclass(frozen=True)
-class EarlySettings:
-    """The settings of the decision points before the full window.
-
-    Attributes:
-        settings: chosen as those of the full window are.
-        settings_of_known: chosen for objects that were recorded.
-    """
-
-    settings: Early
-    settings_of_known: Early
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """The settings that a task is fitted with, and their accuracy.
-
-    Attributes:
-        choice: the features, scaling, projection and numbers.
-        accuracy: nested accuracy of the entire choice, with entire groups left out
-            where `left_out` is not `trial`. Tasks that agree are decided together, as
-            the model does. Its interval is that of the exported model on other trials.
-        by_trial: the same with single trials left out.
-        left_out: `trial`, or the label whose groups were left out.
-        candidates: nested accuracy of each candidate's own choice of numbers, by the
-            task alone.
-        picks: the best settings of each candidate.
-        folds: (n,) of `accuracy`.
-        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
-            `accuracy` counts: those of the task and of the tasks that are decided
-            together with it.
-        choice_of_known: the settings that are best for objects that were recorded, where groups
-            were left out to choose the others.
-        known_by_fold: [fold] the same, chosen without the fold's trials.
-    """
-
-    choice: Choice
-    accuracy: Promise
-    by_trial: Promise
-    left_out: str
-    candidates: tuple[Promise, ...] = ()
-    picks: tuple[Choice, ...] = ()
-    folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
-    by_fold: tuple[dict[str, Choice], ...] = ()
-    choice_of_known: Choice | None = None
-    known_by_fold: tuple[Choice, ...] = ()
 
 
 class Choosing:
@@ -191,7 +142,7 @@ class Choosing:
         right: dict[str, Floats] = {}
         for task in self._y:
             table = groups if self._is_grouped(task) else trials
-            answers = table.held_out(task)[:, table.tested[task]]
+            answers = table.plain(task)[:, table.tested[task]]
             right[task] = answers[Rule().choose(answers)]
         return right
 
@@ -232,30 +183,44 @@ class Choosing:
             "it)"
         ]
 
-    def choose(
-        self, window_s: float
-    ) -> tuple[dict[str, Chosen], Integers, list[dict[str, Choice]]]:
-        """Each task's settings.
-
-        Returns:
-            {task: its settings}, the fold of each trial, and
-            [fold]{task: the choice made without the fold's trials}.
-        """
+    def choose(self, window_s: float) -> Settings:
+        """Each task's settings."""
         vectors = self._vectors(window_s)
-        trials, groups = self._tables(vectors, self.candidates, "choosing", nested=True)
+        trials, groups = self._protocols(
+            *self._tables(vectors, self.candidates, "choosing", nested=True)
+        )
         chosen = {}
         of_task = {}
         for task in self._y:
-            chosen[task], of_task[task] = self._settle(task, trials, groups)
+            protocol = self._protocol(task, trials, groups)
+            chosen[task], of_task[task] = self._settle(task, protocol, trials)
         without = _by_fold(of_task)
         plans: dict[str, Plan] = {TRIAL: (trials.folds, without)}
-        if self._groups is not None:
-            by_group = {
-                task: self._without_groups(task, groups) for task in groups.right
-            }
-            plans[self._groups.name] = groups.folds, _by_fold(by_group)
+        if groups is not None:
+            by_group = {task: groups.by_fold(task) for task in groups.table.right}
+            plans[groups.name] = groups.folds, _by_fold(by_group)
         together = decided_together(chosen, vectors, plans, self._jobs)
-        return together, trials.folds, without
+        return Settings(together, trials.folds, without, self.candidates, window_s, [])
+
+    def _protocols(
+        self,
+        trials: AnswerTable,
+        groups: AnswerTable,
+    ) -> tuple[TrialsLeftOut, GroupsLeftOut | None]:
+        """What is left out, with the answers to it."""
+        by_trial = TrialsLeftOut(trials, self._widths)
+        if self._groups is None:
+            return by_trial, None
+        return by_trial, GroupsLeftOut(groups, self._widths, self._groups)
+
+    def _protocol(
+        self,
+        task: str,
+        trials: TrialsLeftOut,
+        groups: GroupsLeftOut | None,
+    ) -> TrialsLeftOut:
+        """By what a task's settings are chosen."""
+        return groups if groups is not None and self._is_grouped(task) else trials
 
     def early(
         self,
@@ -267,16 +232,16 @@ class Choosing:
         if not self._early_candidates:
             return None
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
-        trials = averaged([by_trial for by_trial, _ in tables])
-        groups = averaged([by_group for _, by_group in tables])
+        trials, groups = self._protocols(*map(averaged, zip(*tables, strict=True)))
+        folds = self._divisions.folds
         of_known = {}
         usual = {}
         for task in self._y:
+            # The graph has one number of neighbours for all decision points.
             k = chosen[task].choice.k
-            of_known[task] = self._settle_early(task, trials, k)
-            usual[task] = of_known[task]
-            if self._is_grouped(task):
-                usual[task] = self._settle_early(task, groups, k, UNSEEN_MARGIN)
+            protocol = self._protocol(task, trials, groups)
+            of_known[task] = trials.with_neighbours(task, k, folds)
+            usual[task] = protocol.with_neighbours(task, k, folds)
         return EarlySettings(_early(window_s, usual), _early(window_s, of_known))
 
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
@@ -287,91 +252,37 @@ class Choosing:
         what = f"{window_s:g} s"
         return self._tables(vectors, candidates, what, nested=False, repeated=False)
 
-    def _settle_early(
-        self,
-        task: str,
-        table: AnswerTable,
-        k: int,
-        margin: float = 0.0,
-    ) -> list[Choice]:
-        """A task's settings by a table, and those chosen without each fold of the
-        trials.
-
-        The graph has one number of neighbours, `k`, for all decision points.
-        """
-        choices = table.choices[task]
-        allowed = np.flatnonzero([choice.k == k for choice in choices])
-        rule = replace(self._rule(task, table, margin), allowed=allowed)
-        folds = self._divisions.folds
-        places = [table.chosen(task, rule), *table.by_other_fold(task, folds, rule)]
-        return [choices[place] for place in places]
-
-    def _rule(self, task: str, table: AnswerTable, margin: float = 0.0) -> Rule:
-        """The rule that chooses among a table's candidates."""
-        return Rule(costs(table.choices[task], self._widths), margin=margin)
-
     def _settle(
         self,
         task: str,
-        trials: AnswerTable,
-        groups: AnswerTable,
+        protocol: TrialsLeftOut,
+        trials: TrialsLeftOut,
     ) -> tuple[Chosen, list[Choice]]:
-        """A task's settings, by the answers to left-out trials and to left-out groups;
-        and [fold] those chosen without the trials of a fold.
-
-        These too are chosen by answers to left-out groups, where the settings are.
-        """
-        if self._groups is None or not self._is_grouped(task):
-            left_out = TRIAL
-            count = 0
-            table = trials
-            rule = self._rule(task, trials)
-            places = trials.by_fold(task, rule)
-        else:
-            left_out = self._groups.name
-            count = self._groups.count(self._y[task])
-            table = groups
-            rule = self._rule(task, groups, UNSEEN_MARGIN)
-            places = groups.by_other_fold(task, trials.folds, rule)
-        choices = table.choices[task]
-        without = [choices[place] for place in places]
-        trial_places = [trials.choices[task].index(choice) for choice in without]
+        """A task's settings by a protocol; and [fold] those chosen without the trials
+        of a fold."""
+        without = protocol.without(task, trials.folds)
         untouched = self._dataset.untouched_labels(task)
-        of_trials = promised(trials.answered(task, trial_places), untouched)
-        promise = partial(promised, untouched=untouched, groups=count)
-        by_error = self._rule(task, table)
-        candidate_rules = [
-            replace(by_error, allowed=places_of(candidate, choices))
-            for candidate in self.candidates
+        groups = protocol.count(self._y[task])
+        promise = partial(promised, untouched=untouched, groups=groups)
+        own_choices = [
+            protocol.of_candidate(task, candidate) for candidate in self.candidates
         ]
         chosen = Chosen(
-            choice=choices[table.chosen(task, rule)],
-            accuracy=promise(table.nested(task, rule)),
-            by_trial=of_trials,
-            left_out=left_out,
-            candidates=tuple(promise(table.nested(task, r)) for r in candidate_rules),
-            picks=tuple(choices[table.chosen(task, r)] for r in candidate_rules),
-            folds=table.folds,
+            choice=protocol.choice(task),
+            accuracy=promise(protocol.accuracy(task)),
+            by_trial=promised(trials.answered(task, without), untouched),
+            left_out=protocol.name,
+            candidates=tuple(promise(result) for result, _ in own_choices),
+            picks=tuple(choice for _, choice in own_choices),
+            folds=protocol.folds,
         )
-        if table is not trials:
-            chosen = self._with_known(chosen, task, trials)
+        if protocol is not trials:
+            chosen = replace(
+                chosen,
+                choice_of_known=trials.choice(task),
+                known_by_fold=tuple(trials.by_fold(task)),
+            )
         return chosen, without
-
-    def _with_known(self, chosen: Chosen, task: str, trials: AnswerTable) -> Chosen:
-        """A task's settings, with those that are best for recorded objects."""
-        choices = trials.choices[task]
-        rule = self._rule(task, trials)
-        return replace(
-            chosen,
-            choice_of_known=choices[trials.chosen(task, rule)],
-            known_by_fold=tuple(choices[i] for i in trials.by_fold(task, rule)),
-        )
-
-    def _without_groups(self, task: str, groups: AnswerTable) -> list[Choice]:
-        """[fold] a task's settings chosen without the groups of a fold."""
-        margin = UNSEEN_MARGIN if self._is_grouped(task) else 0.0
-        places = groups.by_fold(task, self._rule(task, groups, margin))
-        return [groups.choices[task][place] for place in places]
 
 
 def _unseen(groups: Groups, grids: Sequence[SearchGrid]) -> list[SearchGrid]:
@@ -476,28 +387,8 @@ def _right_together(
     folds, choices = plan
     at_end = replace(vectors, X=vectors.X[None])
     of_family = [[_of_tasks(by_task, family)] for by_task in choices]
-    right = {task: np.zeros(len(folds), dtype=bool) for task in family}
-    for fold, answers in enumerate(held_out(at_end, folds, of_family, jobs)):
-        in_fold = folds == fold
-        for task, (labels, _) in answers.items():
-            right[task][in_fold] = labels[0] == vectors.y[task][in_fold]
+    (answered,) = held_out(at_end, folds, [of_family], jobs)
     return {
-        task: hits[(folds >= 0) & (vectors.y[task] != "")]
-        for task, hits in right.items()
+        task: hits[0][(folds >= 0) & (vectors.y[task] != "")]
+        for task, hits in answered.right.items()
     }
-
-
-def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
-    """A result as a promise of the accuracy on other trials, or on other groups.
-
-    Args:
-        result: on the trials with a contact.
-        untouched: labels of the recordings without one. Missed touches count as wrong,
-            and recordings of no touch as right.
-        groups: number of the groups left out; 0 for single trials.
-    """
-    right = result.right + untouched.count(NO_CONTACT)
-    total = result.total + len(untouched)
-    variance = max(VARIANCE, total / groups if groups else 0.0)
-    counted = {"right": right, "total": total, "variance": variance}
-    return Promise(**{**vars(result), **counted})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from edge.touch.features import WINDOW_S
+from train.choose.options import FitOptions
 from train.choose.settings import Settings
 from train.data.dataset import DataSet
 from train.model.novelty import MOST_COMPONENTS
@@ -20,6 +21,30 @@ MOST_TRIALS = 2000
 must be asked for."""
 LARGEST_BYTES = 1_150_000
 """Bytes of weights with which a model stays below 1.2 MB."""
+
+
+def decision_points(
+    measured: DataSet,
+    settings: Settings,
+    options: FitOptions,
+    notes: list[str],
+) -> tuple[float, ...]:
+    """The decision points asked for, or the usual ones."""
+    asked_s = options.decision_points_s
+    if asked_s is None:
+        return usual_points(measured, settings, options.samples, notes)
+    if not asked_s:
+        notes.append(
+            "decisions carry no confidence, as the model has no decision points"
+        )
+    return tuple(asked_s)
+
+
+def has_early_points(settings: Settings, options: FitOptions) -> bool:
+    """Whether decision points before the full window are asked for, or usual."""
+    if options.decision_points_s is not None:
+        return len(options.decision_points_s) > 1
+    return FEWEST <= settings.tested <= MOST_TRIALS
 
 
 def usual_points(

@@ -32,7 +32,7 @@ from edge.statistics import wilson
 from train.choose.crossval import votes_right
 from train.choose.search import Decomposition, SearchGrid
 from train.data.vectors import Strings, Vectors
-from train.model.pipeline import Choice, columns_of, how_often, types_of
+from train.model.pipeline import Choice
 from train.model.scaling import centred_and_scaled, finite
 from train.threads import single_thread
 
@@ -110,33 +110,28 @@ class _Fit:
     train: Integers
     test: Integers
 
-    def counted(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
-        """A grid's tasks, by how often each of the `train` trials counts for them."""
-        by_counts: dict[bytes, tuple[list[str], Integers]] = {}
+    def labelled(self, grid: SearchGrid) -> list[tuple[list[str], Integers]]:
+        """A grid's tasks, by the `train` trials that have labels for them."""
+        by_trials: dict[bytes, tuple[list[str], Integers]] = {}
         for task, labels in self.classes.items():
             if grid.is_for(task):
-                of_all = how_often(labels >= 0, self.vectors.is_own, grid.weights)
-                counts = of_all[self.train]
-                tasks, _ = by_counts.setdefault(counts.tobytes(), ([], counts))
+                trials = self.train[labels[self.train] >= 0]
+                tasks, _ = by_trials.setdefault(trials.tobytes(), ([], trials))
                 tasks.append(task)
-        return list(by_counts.values())
+        return list(by_trials.values())
 
-    def decomposition(self, grid: SearchGrid, counts: Integers) -> Decomposition:
-        """The scaled vectors of a grid's features, where each trial counts so often."""
-        vectors = self.vectors
-        rows = np.repeat(self.train, counts)
-        columns = columns_of(grid.features, vectors.features, vectors.columns)
-        types = types_of(grid.features, vectors.features, vectors.columns)
-        X = vectors.X
+    def decomposition(self, grid: SearchGrid, rows: Integers) -> Decomposition:
+        """The scaled vectors of a grid's features, fitted on some trials."""
+        vectors = self.vectors.of(grid.features)
         mean, gain, scaled = centred_and_scaled(
-            X[np.ix_(rows, columns)],
+            vectors.X[rows],
             grid.scaling,
-            *types,
+            vectors.features,
+            vectors.columns,
         )
         labels_of = {task: labels[rows] for task, labels in self.classes.items()}
-        first = (np.cumsum(counts) - counts)[counts > 0]
-        new = (X[np.ix_(self.test, columns)] - mean) * gain
-        return Decomposition(scaled, new, labels_of, first)
+        new = (vectors.X[self.test] - mean) * gain
+        return Decomposition(scaled, new, labels_of)
 
     def right(
         self,
@@ -168,13 +163,12 @@ def _answers(
     decomposed = None
     with single_thread():
         for grid in grids:
-            for tasks, counts in fit.counted(grid):
-                members = fit.train[counts > 0]
+            for tasks, members in fit.labelled(grid):
                 # Neighbouring grids often differ in the projection alone.
-                scaled = grid.scaling, grid.features, counts.tobytes()
+                scaled = grid.scaling, grid.features, members.tobytes()
                 if decomposed != scaled:
                     decomposed = scaled
-                    decomposition = fit.decomposition(grid, counts)
+                    decomposition = fit.decomposition(grid, members)
                 neighbours = None
                 for task in tasks:
                     if neighbours is None or (
@@ -262,50 +256,64 @@ class AnswerTable:
                     right[:, folds == tested] | untested
                 )
 
-    def held_out(self, task: str) -> Floats:
+    def _alone(self, task: str) -> NDArray[Any]:
+        """(candidates, n) answers to each trial by the fits of this table without its
+        fold."""
+        trials = np.arange(len(self.folds))
+        return np.asarray(self.right[task][self.folds, :, trials].T)
+
+    def plain(self, task: str) -> Floats:
         """(candidates, n) share of right answers to each trial, by the fits without its
         fold in this table and in the `repeated` ones."""
-        right = self.right[task][self.folds, :, np.arange(len(self.folds))].T
-        shares = right.astype(np.float64)
+        shares = self._alone(task).astype(np.float64)
         for table in self.repeated:
-            shares += table.held_out(task)
+            shares += table.plain(task)
         return shares / (1 + len(self.repeated))
 
-    def chosen(self, task: str, rule: Rule = MOST_ACCURATE) -> int:
-        """The candidate chosen by all trials."""
-        return rule.choose(self.held_out(task))
-
-    def by_fold(self, task: str, rule: Rule = MOST_ACCURATE) -> list[int]:
-        """[fold] the candidate chosen without the trials of a fold."""
-        return [
-            rule.choose(right[:, self.folds != fold])
-            for fold, right in enumerate(self.right[task])
-        ]
-
-    def by_other_fold(self, task: str, folds: Integers, rule: Rule) -> list[int]:
-        """[fold] the candidate chosen without the trials of one of other folds (n,).
-
-        The fits behind the answers may have seen these trials, which take no part in
-        the choice otherwise.
-        """
-        answers = self.held_out(task)
-        return [rule.choose(answers[:, folds != fold]) for fold in fold_numbers(folds)]
-
-    def nested(self, task: str, rule: Rule = MOST_ACCURATE) -> Result:
-        """The accuracy of the choice itself, with the numbers that it most often
-        takes."""
-        return self.answered(task, self.by_fold(task, rule))
+    def nested(self, task: str, fold: int) -> NDArray[Any]:
+        """(candidates, others) answers to the trials outside a fold, by the fits
+        without the fold and without the trial's own."""
+        return np.asarray(self.right[task][fold][:, self.folds != fold])
 
     def answered(self, task: str, candidates: Sequence[int]) -> Result:
         """The accuracy where the candidate `candidates` for a fold answers the trials of
         that fold."""
-        hits = np.zeros(len(self.folds), dtype=bool)
-        for fold, candidate in enumerate(candidates):
-            in_fold = self.folds == fold
-            hits[in_fold] = self.right[task][fold][candidate, in_fold]
+        trials = np.arange(len(self.folds))
+        hits = self._alone(task)[np.array(candidates)[self.folds], trials]
         hits = hits[self.tested.get(task, self.folds >= 0)]
         usual = self.choices[task][int(np.bincount(candidates).argmax())]
         return Result(int(hits.sum()), len(hits), usual.components, usual.k, hits=hits)
+
+
+def chosen(table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE) -> int:
+    """The candidate chosen by all trials."""
+    return rule.choose(table.plain(task))
+
+
+def chosen_by_fold(
+    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
+) -> list[int]:
+    """[fold] the candidate chosen without the trials of a fold, nor fits to them."""
+    return [rule.choose(table.nested(task, fold)) for fold in fold_numbers(table.folds)]
+
+
+def chosen_by_other_fold(
+    table: AnswerTable, task: str, folds: Integers, rule: Rule
+) -> list[int]:
+    """[fold] the candidate chosen without the trials of one of other folds (n,).
+
+    The fits behind the answers may have seen these trials, which take no part in the
+    choice otherwise.
+    """
+    answers = table.plain(task)
+    return [rule.choose(answers[:, folds != fold]) for fold in fold_numbers(folds)]
+
+
+def nested_accuracy(
+    table: AnswerTable, task: str, rule: Rule = MOST_ACCURATE
+) -> Result:
+    """The accuracy of the choice itself, with the numbers that it most often takes."""
+    return table.answered(task, chosen_by_fold(table, task, rule))
 
 
 def averaged(tables: Sequence[AnswerTable]) -> AnswerTable:
@@ -354,7 +362,7 @@ def evaluate(
         jobs: processes.
         progress: called after each of the `fits`.
         nested: False makes the fits without each fold only, a fifth of the work. Of the
-            table, `AnswerTable.held_out` alone is then valid.
+            table, `AnswerTable.plain` alone is then valid.
 
     Raises:
         InputError: there are fewer than three folds, or the vectors are not finite.

@@ -34,7 +34,6 @@ class SearchGrid:
         targets: tasks whose discriminants `lda` sets side by side; the task itself
             where empty.
         tasks: the tasks it is a candidate for; all where empty.
-        weights: of simulated trials and the owner's, see `train.model.pipeline.Choice`.
     """
 
     scaling: str = "none"
@@ -46,7 +45,6 @@ class SearchGrid:
     neighbours: tuple[int, ...] = NEIGHBOURS
     targets: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
-    weights: tuple[int, int] = (1, 1)
 
     def is_for(self, task: str) -> bool:
         """Whether these are candidates for a task."""
@@ -72,7 +70,6 @@ class SearchGrid:
                 s,
                 self.features,
                 self.targets,
-                self.weights,
             )
             for c, s in cells
             for k in self.neighbours
@@ -142,11 +139,9 @@ class Decomposition:
     weights.
 
     Args:
-        rows: (n, p) of training, scaled and centred; a trial that counts twice is there
-            twice.
+        rows: (n, p) of training, scaled and centred.
         new: (m, p) others, scaled and centred alike.
         labels: {task: (n,) class indices} of the training rows.
-        first: (trials,) a row of each trial.
     """
 
     def __init__(
@@ -154,25 +149,20 @@ class Decomposition:
         rows: Floats,
         new: Floats,
         labels: Mapping[str, Integers],
-        first: Integers,
     ) -> None:
         self._spectrum = Spectrum(rows)
         self._new = new
         self._labels = labels
-        self._first = first
         self._along: dict[
             tuple[str, tuple[float, ...]], list[tuple[Floats, Floats]]
         ] = {}
 
     def neighbours(self, grid: SearchGrid, task: str) -> Integers:
-        """(projections, m, k) places among the trials, for each projection of a
-        grid."""
-        k = min(grid.neighbours[-1], len(self._first))
+        """(projections, m, k) training rows, for each projection of a grid."""
+        k = min(grid.neighbours[-1], len(self._spectrum.rows))
         if grid.projection == "pca":
             axes = self._spectrum.leading(grid.components[-1]).T
-            training, tested = _rounded(
-                self._spectrum.rows[self._first] @ axes, self._new @ axes
-            )
+            training, tested = _rounded(self._spectrum.rows @ axes, self._new @ axes)
             spaces = [(training[:, :c], tested[:, :c]) for c in grid.components]
             return _nearest(spaces, k)
         by_target = [
@@ -196,13 +186,13 @@ class Decomposition:
         task: str,
         shrinkages: tuple[float, ...],
     ) -> list[tuple[Floats, Floats]]:
-        """[shrinkage] coordinates (trials, c) and (m, c) along the discriminants of a
+        """[shrinkage] coordinates (n, c) and (m, c) along the discriminants of a
         task's labels."""
         if (task, shrinkages) not in self._along:
             spectrum = self._spectrum
             classes = spectrum.classes(self._labels[task])
             self._along[task, shrinkages] = [
-                ((spectrum.scores @ along)[self._first], self._new_scores @ along)
+                (spectrum.scores @ along, self._new_scores @ along)
                 for along in spectrum.directions(classes, shrinkages)
             ]
         return self._along[task, shrinkages]

@@ -3,12 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from edge.arrays import Integers
 from train.choose.candidates import Candidate
-from train.choose.choose import Chosen, EarlySettings
+from train.choose.evaluate import Promise
 from train.model.pipeline import Choice, Choices
+from train.model.stopping import Early
+
+
+@dataclass(frozen=True)
+class EarlySettings:
+    """The settings of the decision points before the full window.
+
+    Attributes:
+        settings: chosen as those of the full window are.
+        settings_of_known: chosen for objects that were recorded.
+    """
+
+    settings: Early
+    settings_of_known: Early
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The settings that a task is fitted with, and their accuracy.
+
+    Attributes:
+        choice: the features, scaling, projection and numbers.
+        accuracy: nested accuracy of the entire choice, with entire groups left out
+            where `left_out` is not `trial`. Tasks that agree are decided together, as
+            the model does. Its interval is that of the exported model on other trials.
+        by_trial: the same with single trials left out.
+        left_out: `trial`, or the label whose groups were left out.
+        candidates: nested accuracy of each candidate's own choice of numbers, by the
+            task alone.
+        picks: the best settings of each candidate.
+        folds: (n,) of `accuracy`.
+        by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
+            `accuracy` counts: those of the task and of the tasks that are decided
+            together with it.
+        choice_of_known: the settings that are best for objects that were recorded, where groups
+            were left out to choose the others.
+        known_by_fold: [fold] the same, chosen without the fold's trials.
+    """
+
+    choice: Choice
+    accuracy: Promise
+    by_trial: Promise
+    left_out: str
+    candidates: tuple[Promise, ...] = ()
+    picks: tuple[Choice, ...] = ()
+    folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
+    by_fold: tuple[dict[str, Choice], ...] = ()
+    choice_of_known: Choice | None = None
+    known_by_fold: tuple[Choice, ...] = ()
 
 
 @dataclass(frozen=True)

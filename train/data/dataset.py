@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress
 from operator import not_
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -22,17 +21,23 @@ from edge.recording import LARGEST_BYTES, Recording, load
 from edge.saving import find
 from edge.touch import measures
 from edge.touch.arm import Chain
-from edge.touch.contact import Contact, FeatureSeries, feature_types
+from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS, Feature
 from edge.touch.features import FEATURES, SAMPLES, WINDOW_S, feature_vector, widths
-from edge.touch.frame import Frame
 from edge.touch.kernels import KernelTable, kernel_channels
-from edge.touch.layout import SkinLayout, for_device
-from edge.touch.track import ContactTracker, WatchfulTracker
+from edge.touch.layout import SkinLayout
 from train.data.arms import arm_of, joint_angles
+from train.data.contacts import (
+    LabelledFile,
+    Named,
+    Trial,
+    collect,
+    follow,
+    with_thresholds,
+)
 from train.data.feature_sets import axes, moves, unit
 from train.data.kernels import MOST_TOUCHES, kernel_table
-from train.data.labels import completed, labels_of, shared_tasks
+from train.data.labels import shared_tasks
 from train.data.vectors import Labels, Strings, Vectors
 from train.progress import bar
 
@@ -58,11 +63,6 @@ class Recordings:
         return recordings or self.recordings
 
     @property
-    def mixed(self) -> bool:
-        """Whether some are simulated, and some are not."""
-        return len(self.of_owner) < len(self.recordings)
-
-    @property
     def joints(self) -> bool:
         """Whether most of the owner's have joint angles."""
         return bool(np.mean([r.joints is not None for r in self.of_owner]) > 0.5)
@@ -81,22 +81,6 @@ class Recordings:
             recordings=tuple(compress(self.recordings, has)),
         )
         return with_part, tuple(compress(self.paths, map(not_, has)))
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One contact of a recording: its first, or each of them where the recording says
-    so."""
-
-    path: Path
-    recording: Recording
-    labels: dict[str, str]
-    onset_s: float
-    series: FeatureSeries
-
-
-LabelledFile = tuple[Path, dict[str, str]]
-"""A recording's file, and {task: label}."""
 
 
 @dataclass(frozen=True)
@@ -132,13 +116,6 @@ class DataSet:
     left_out: dict[str, tuple[Path, ...]]
     unused: tuple[Path, ...]
     kernels: Mapping[str, KernelTable] = field(default_factory=dict)
-
-    @property
-    def is_own(self) -> Booleans | None:
-        """(n,) whether a trial is the owner's; None where all, or none, are
-        simulated."""
-        is_own = ["simulation" not in trial.recording.meta for trial in self.trials]
-        return np.array(is_own) if len(set(is_own)) > 1 else None
 
     def part(self, trials: Booleans) -> DataSet:
         """Some of the trials (n,)."""
@@ -195,7 +172,7 @@ class DataSet:
     def vectors(self, window_s: float, samples: int, y: Labels) -> Vectors:
         """The feature vectors at a window, with the labels of some tasks."""
         X = self.features(window_s, samples)
-        return Vectors(X, y, self.names, self.widths(samples), self.is_own)
+        return Vectors(X, y, self.names, self.widths(samples))
 
     def with_kernels(self, window_s: float) -> DataSet:
         """The same trials with the tables that features of kernels need, for a window.
@@ -356,7 +333,7 @@ def load_trials(
         "joints": posed.joints,
     }
     work = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_followed)(recording, path, layout, **tracked)
+        delayed(follow)(recording, path, layout, **tracked)
         for recording, path in posed.recordings
     )
     trials = bar(
@@ -383,10 +360,6 @@ def load_trials(
         left_out={need: paths for need, paths in left_out.items() if paths},
         unused=touched.unused,
     )
-
-
-Named = tuple[Recording, Path]
-"""A recording and its file."""
 
 
 def with_shear(
@@ -461,138 +434,6 @@ def require_one_arm(
             raise InputError(
                 f"{path}: its arm is not that of {recordings[0][1]}; train on one arm"
             )
-
-
-class Untouched(InputError):
-    """No recording has a contact at the thresholds."""
-
-
-@dataclass(frozen=True)
-class Touched:
-    """The contacts of recordings.
-
-    Attributes:
-        trials: one for each contact that has labels.
-        untouched: files without a contact, with their labels.
-        unused: files with more contacts than labels.
-    """
-
-    trials: tuple[Trial, ...]
-    untouched: tuple[LabelledFile, ...]
-    unused: tuple[Path, ...]
-
-    @property
-    def files(self) -> list[LabelledFile]:
-        """The file and the labels of each trial, and of the untouched."""
-        files = [(trial.path, trial.labels) for trial in self.trials]
-        return [*files, *self.untouched]
-
-    @property
-    def labels(self) -> list[dict[str, str]]:
-        """The labels of each trial, and of the untouched."""
-        return [labels for _, labels in self.files]
-
-    def completed(self) -> Touched:
-        """The same contacts with the labels that follow from their others."""
-        labels = iter(completed(self.labels))
-        trials = [replace(trial, labels=next(labels)) for trial in self.trials]
-        untouched = [(path, next(labels)) for path, _ in self.untouched]
-        return Touched(tuple(trials), tuple(untouched), self.unused)
-
-    def without(self, task: str) -> tuple[Path, ...]:
-        """The files that lack a label for a task, each once."""
-        lacking = (path for path, labels in self.files if task not in labels)
-        return tuple(dict.fromkeys(lacking))
-
-    def labelled(self, tasks: Sequence[str], *, partial: bool) -> Touched:
-        """The contacts that have a label for each task; `partial`, for some.
-
-        Raises:
-            InputError: no trial has.
-        """
-        enough = any if partial else all
-
-        def suffices(labels: dict[str, str]) -> bool:
-            return enough(task in labels for task in tasks)
-
-        trials = tuple(trial for trial in self.trials if suffices(trial.labels))
-        if not trials:
-            raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
-        untouched = tuple(file for file in self.untouched if suffices(file[1]))
-        return Touched(trials, untouched, self.unused)
-
-
-def collect(
-    recordings: Sequence[Named],
-    followed: Iterable[Followed],
-    layout: SkinLayout,
-) -> Touched:
-    """The trials of recordings whose contacts were followed.
-
-    Raises:
-        Untouched: no recording has a contact.
-    """
-    trials: list[Trial] = []
-    untouched = []
-    unused = []
-    for (recording, path), (touches, labels) in zip(recordings, followed, strict=True):
-        if not touches:
-            untouched.append((path, recording.labels))
-        if len(touches) > len(labels):
-            unused.append(path)
-        for trial_labels, touch in zip(labels, touches, strict=False):
-            trials.append(Trial(path, recording, trial_labels, *touch))
-    if not trials:
-        raise Untouched(
-            f"no contact in any of {len(recordings)} recordings; lower the threshold "
-            f"of {layout.threshold_counts} counts"
-        )
-    return Touched(tuple(trials), tuple(untouched), tuple(unused))
-
-
-Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
-"""The contacts of a recording, and the labels of those that are trials."""
-
-
-def _followed(
-    recording: Recording,
-    path: Path,
-    layout: SkinLayout,
-    **tracked: Any,
-) -> Followed:
-    """The contacts of a recording, and the labels of those that are trials."""
-    try:
-        tracker = WatchfulTracker(for_device(layout, recording.layout), **tracked)
-        touches = contacts(recording, tracker)
-        return touches, labels_of(recording, len(touches))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def contacts(
-    frames: Iterable[Frame], tracker: ContactTracker
-) -> list[tuple[float, FeatureSeries]]:
-    """Onset in seconds and series of every contact of a recording, in their order."""
-    followed: dict[int, Contact] = {}
-    for frame in frames:
-        followed |= {id(contact): contact for contact in tracker.push(frame)}
-    if not followed:
-        followed = {id(contact): contact for contact in tracker.finish()}
-    return [(contact.onset_s, contact.series()) for contact in followed.values()]
-
-
-def with_thresholds(
-    layout: SkinLayout,
-    threshold: int | None,
-    onset: int | None,
-) -> SkinLayout:
-    """The skin with these thresholds; one that is None stays, or scales with the
-    other."""
-    if threshold is not None:
-        ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
-        begin = round(threshold * ratio) if onset is None else onset
-        return replace(layout, threshold_counts=threshold, onset_counts=begin)
-    return layout if onset is None else replace(layout, onset_counts=onset)
 
 
 def _dead(recordings: Sequence[Recording]) -> tuple[int, ...]:

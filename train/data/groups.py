@@ -36,17 +36,26 @@ the division."""
 
 
 def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
-    """(n,) kind of thing in each, where all are simulated and some kind has several
-    objects.
+    """(n,) kind of thing in each, where a scene drew several objects of some kind.
 
-    A `[[family]]` of a scene names its objects by the kind and a number. None for all
-    other recordings.
+    A `[[family]]` of a scene names its objects by the kind and a number. Any other
+    object is of a kind of its own. None without such a scene.
     """
-    if any("simulation" not in recording.meta for recording in recordings):
-        return None
-    objects = [recording.labels.get(LEAVE_OUT, "") for recording in recordings]
-    kinds = [re.sub(r" \d+$", "", name) for name in objects]
-    return np.array(kinds) if len(set(kinds)) < len(set(objects)) else None
+    kinds = []
+    drawn: dict[str, set[str]] = {}
+    for recording in recordings:
+        kind = name = recording.labels.get(LEAVE_OUT, "")
+        if "simulation" in recording.meta:
+            kind = re.sub(r" \d+$", "", name)
+            drawn.setdefault(kind, set()).add(name)
+        kinds.append(kind)
+    several = any(len(objects) > 1 for objects in drawn.values())
+    return np.array(kinds) if several else None
+
+
+def are_drawn(dataset: DataSet) -> bool:
+    """Whether the trials are of things that a scene drew from kinds."""
+    return kinds_of([trial.recording for trial in dataset.trials]) is not None
 
 
 def groupable(labels: Strings, groups: Strings) -> bool:

@@ -6,16 +6,15 @@ from itertools import chain, permutations
 from typing import Any
 
 from edge.errors import InputError
+from edge.labels import CATEGORY, Product
 from edge.recording import Recording
-from edge.tools.teaching import JOINED, joined
 
 NO_CONTACT = "none"
 """The label of a recording in which nothing is touched."""
 ALIKE = "alike"
 """`meta.contacts` of a recording whose contacts all have its labels."""
 ENOUGH = 10
-"""Trials with a label that make a task of what most trials lack, and that choose a
-weight."""
+"""Trials with a label that make a task of what most trials lack."""
 
 
 def labels_of(recording: Recording, count: int) -> list[dict[str, str]]:
@@ -54,30 +53,36 @@ def completed(trials: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     """Each trial's {task: label}, with the labels that follow from its others.
 
     Where a task's labels are those of two others joined by a hyphen, `soft-fixed`
-    follows from `soft` and `fixed`, and the reverse. This is so for `JOINED`, and for
+    follows from `soft` and `fixed`, and the reverse. This is so for `CATEGORY`, and for
     tasks for which it holds in every trial that has all three. No task is added that no
     trial has.
     """
     tasks = set().union(*trials)
     out = [dict(labels) for labels in trials]
-    for triple in permutations(sorted(tasks | set(JOINED)), 3):
-        if _holds(triple, trials):
-            out = [joined(labels, triple) for labels in out]
+    names = sorted(tasks | {CATEGORY.task, *CATEGORY.factors})
+    for task, first, second in permutations(names, 3):
+        product = Product(task, (first, second))
+        if _holds(product, trials):
+            out = [product.completed(labels) for labels in out]
     return [
         {task: label for task, label in labels.items() if task in tasks}
         for labels in out
     ]
 
 
-def _holds(triple: tuple[str, ...], trials: Sequence[Mapping[str, str]]) -> bool:
-    """Whether the first task's labels are those of the two others in every trial that
-    has all three; where none has, whether the triple is `JOINED`."""
-    product, *factors = triple
-    complete = [labels for labels in trials if labels.keys() >= set(triple)]
-    names = ["-".join(labels[factor] for factor in factors) for labels in complete]
-    if names != [labels[product] for labels in complete]:
+def _holds(product: Product, trials: Sequence[Mapping[str, str]]) -> bool:
+    """Whether a product's labels are those of its factors in every trial that has all
+    three; where none has, whether it is `CATEGORY`."""
+    implied = []
+    labelled = []
+    for labels in trials:
+        joined = product.label(labels)
+        if joined is not None and product.task in labels:
+            implied.append(joined)
+            labelled.append(labels[product.task])
+    if implied != labelled:
         return False
-    return bool(complete) or triple == JOINED
+    return bool(labelled) or product == CATEGORY
 
 
 def shared_tasks(

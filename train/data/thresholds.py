@@ -11,7 +11,8 @@ from edge.recording import Recording
 from edge.touch.layout import for_device
 from edge.touch.thresholds import MARGIN, QUIET_S, above, noise
 from edge.touch.track import DEBOUNCE, WatchfulTracker
-from train.data.dataset import DataSet, contacts, with_thresholds
+from train.data.contacts import contacts, with_thresholds
+from train.data.dataset import DataSet
 from train.data.labels import NO_CONTACT
 
 MARGINS = (MARGIN, 1.0)

@@ -1,13 +1,14 @@
 """Feature vectors of trials, with their labels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from edge.arrays import Booleans, Floats
+from edge.arrays import Floats, Integers
 from edge.errors import InputError
 from edge.touch.features import FEATURES
 
@@ -48,20 +49,32 @@ class Vectors:
         y: {task: (n,) labels}.
         features: names of the feature types, in the order of X.
         widths: columns of each; equal where None.
-        is_own: (n,) whether a trial is the owner's, where simulated ones are among them;
-            see `train.model.pipeline.Choice.counts`.
     """
 
     X: Floats = field(repr=False)
     y: Labels = field(repr=False)
     features: Sequence[str] = FEATURES
     widths: Sequence[int] | None = None
-    is_own: Booleans | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """Columns of each feature type."""
+        """Number of columns of each feature type."""
         return widths_of(self.X.shape[-1], self.features, self.widths)
+
+    def columns_of(self, names: Collection[str]) -> Integers:
+        """The columns of the features with these names, rising; all if empty."""
+        is_named = [not names or name in names for name in self.features]
+        return np.flatnonzero(np.repeat(is_named, self.columns))
+
+    def of(self, names: Collection[str]) -> Self:
+        """The same trials with the features with these names; all if empty."""
+        is_named = [not names or name in names for name in self.features]
+        return replace(
+            self,
+            X=np.ascontiguousarray(self.X[..., self.columns_of(names)]),
+            features=tuple(compress(self.features, is_named)),
+            widths=tuple(compress(self.columns, is_named)),
+        )
 
     def part(self, trials: NDArray[Any]) -> Self:
         """Some of the trials, by a mask (n,) or by their numbers."""
@@ -69,5 +82,4 @@ class Vectors:
             self,
             X=self.X[..., trials, :],
             y={task: labels[trials] for task, labels in self.y.items()},
-            is_own=None if self.is_own is None else self.is_own[trials],
         )

@@ -24,7 +24,7 @@ from edge.touch.layout import SkinLayout
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.data.arms import arm_of
-from train.data.dataset import contacts
+from train.data.contacts import contacts
 from train.draw.recording import PLAIN_TEXT, UNITS, curves, units
 
 MOST = 6

@@ -23,7 +23,7 @@ from edge.touch.region import largest_region
 from edge.touch.track import ContactTracker
 from edge.writing import write_whole
 from train.data.arms import arm_of
-from train.data.dataset import with_thresholds
+from train.data.contacts import with_thresholds
 from train.draw.sketch import draw_side
 
 FRAMES = 6

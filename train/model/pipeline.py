@@ -7,9 +7,8 @@ graph down.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -17,15 +16,17 @@ from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 from scipy.special import expit
 
-from edge.arrays import Booleans, Floats, Integers
+from edge.arrays import Floats, Integers
 from edge.errors import InputError
 from edge.model.agreement import agreed
-from edge.tools.teaching import nearest_of_label
 from edge.touch.features import FEATURES
-from train.data.vectors import Labels, Strings, Vectors, widths_of
+from train.data.vectors import Labels, Strings, Vectors
 from train.model.agreement import factors_of
 from train.model.projection import Projection
 from train.model.scaling import finite
+
+NEAREST_OF_LABEL = 3
+LABEL_SHARE = 20
 
 
 def vote(labels: Integers) -> Integers:
@@ -44,6 +45,15 @@ def squared_distances(X: Floats, rows: Floats) -> Floats:
     if not X.shape[1]:
         return np.zeros((len(X), len(rows)))
     return np.asarray(cdist(X, rows, "sqeuclidean"))
+
+
+def nearest_of_label(sizes: Integers) -> Integers:
+    """Number of trials that stand for a label: a twentieth of its own, at least three.
+
+    A label with fewer than three trials is represented by all of them. With a share
+    rather than a number, a label's distance does not shrink as its trials become more.
+    """
+    return np.minimum(sizes, np.maximum(-(-sizes // LABEL_SHARE), NEAREST_OF_LABEL))
 
 
 def label_distances(
@@ -118,8 +128,6 @@ class Choice:
         features: names of those it takes; all where empty.
         targets: tasks whose discriminants `lda` sets side by side; the task itself
             where empty.
-        weights: how often a simulated trial and one of the owner's count in scaling and
-            projection, where there are both; 0 for trials that are not used at all.
     """
 
     scaling: str
@@ -129,7 +137,6 @@ class Choice:
     shrinkage: float = 0.01
     features: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
-    weights: tuple[int, int] = (1, 1)
 
     def space(self, task: str) -> Space:
         """Tasks whose spaces are equal share a projection, with the components of the
@@ -137,51 +144,22 @@ class Choice:
 
         So they do if they also lack the labels of the same trials.
         """
-        space = (self.projection, self.scaling, self.features, self.weights)
+        space = (self.projection, self.scaling, self.features)
         if self.projection == "pca":
             return space
         return (*space, self.shrinkage, self.targets or (task,))
-
-    def counts(self, labels: Strings, is_own: Booleans | None = None) -> Integers:
-        """(n,) how often each trial counts: 0 without a label, else by the weights.
-
-        Args:
-            labels: (n,) of the task; empty where a trial has none.
-            is_own: (n,) whether a trial is the owner's; None where no weights are needed.
-        """
-        return how_often(labels != "", is_own, self.weights)
 
 
 Choices = Mapping[str, Choice]
 """{task: its settings}."""
 
 
-def how_often(
-    labelled: Booleans,
-    is_own: Booleans | None,
-    weights: tuple[int, int],
-) -> Integers:
-    """(n,) how often each trial counts; see `Choice.counts`."""
-    if is_own is None:
-        return labelled.astype(np.int64)
-    simulated, of_owner = weights
-    return np.where(labelled, np.where(is_own, of_owner, simulated), 0)
-
-
-def fittable(
-    choices: Choices,
-    y: Labels,
-    is_own: Booleans | None,
-) -> dict[str, Choice]:
+def fittable(choices: Choices, y: Labels) -> dict[str, Choice]:
     """The choices of the tasks that y has labels for, with k at most the number of
-    their trials.
-
-    Args:
-        choices, y, is_own: see `ContactClassifier.fit`.
-    """
+    their trials."""
     possible = {}
     for task, choice in choices.items():
-        count = int(np.count_nonzero(choice.counts(y[task], is_own)))
+        count = int(np.count_nonzero(y[task]))
         if count:
             possible[task] = replace(choice, k=min(choice.k, count))
     return possible
@@ -193,11 +171,95 @@ class Decided(NamedTuple):
     Attributes:
         labels: (m,) indices.
         distances: (m, classes) of the nearest answer with each label, see
-            `label_distances`, `ContactClassifier.slopes_` and `edge.model.agreement`.
+            `label_distances`, `FittedTask.slope` and `edge.model.agreement`.
     """
 
     labels: Integers
     distances: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSpace:
+    """A projection of the vectors, with the trials that tasks compare in it.
+
+    Attributes:
+        columns: of the vectors, that it takes, rising.
+        projection: with the components of the task that has most.
+        members: (m,) the trials that it was fitted on, rising.
+        rows: (m, c) these trials, projected.
+    """
+
+    columns: Integers
+    projection: Projection
+    members: Integers
+    rows: Floats
+
+    def project(self, X: Floats) -> Floats:
+        """Coordinates (n, c) of vectors (n, p)."""
+        return self.projection.transform(X[:, self.columns])
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTask:
+    """A task's labels in its space.
+
+    Attributes:
+        space: that tasks of equal settings share.
+        classes: the labels, sorted.
+        labels: (m,) class indices of the space's trials.
+        components: coordinates that count, at most as many as the space has.
+        k: neighbours that vote.
+        slope: by how much the log odds of a label change with its `label_distances`.
+    """
+
+    space: FittedSpace
+    classes: Strings
+    labels: Integers
+    components: int
+    k: int
+    slope: float = 1.0
+
+    @property
+    def unit(self) -> float:
+        """The unit of the coordinates, a power of two."""
+        return self.space.projection.grid_.unit
+
+    @property
+    def rows(self) -> Floats:
+        """(m, components) the coordinates of the space's trials."""
+        return self.space.rows[:, : self.components]
+
+    def squares(self, X: Floats) -> Floats:
+        """(n, m) squared distances of vectors (n, p) to the space's trials."""
+        return squared_distances(self.space.project(X)[:, : self.components], self.rows)
+
+    def nearest(self, squares: Floats) -> Integers:
+        """(n, k) places of the smallest squares (n, m); of equal ones the first."""
+        return np.argsort(squares, axis=1, kind="stable")[:, : self.k]
+
+    def neighbours(self, X: Floats) -> tuple[Floats, Integers]:
+        """Distances and training rows (n, k) for vectors (n, p), nearest first."""
+        squares = self.squares(X)
+        places = self.nearest(squares)
+        distances = np.sqrt(np.take_along_axis(squares, places, axis=1))
+        return distances, self.space.members[places]
+
+    def to_labels(self, squares: Floats) -> Floats:
+        """(n, classes) `label_distances` of squares (n, m)."""
+        return label_distances(squares, self.labels, len(self.classes), self.unit)
+
+    def gaps(self, X: Floats, labels: Strings) -> Floats:
+        """(n,) by how much nearer than any other the right label is to each of the
+        vectors (n, p)."""
+        distances = self.to_labels(self.squares(X))
+        right = self.classes.searchsorted(labels)[:, None]
+        to_right = np.take_along_axis(distances, right, axis=1)[:, 0]
+        np.put_along_axis(distances, right, np.inf, axis=1)
+        return np.asarray(distances.min(axis=1) - to_right)
+
+
+Fits = dict[tuple[tuple[str, Choice], ...], dict[str, FittedTask]]
+"""{tasks that share a space, with their settings: {task: its fit}}."""
 
 
 @dataclass(eq=False)
@@ -210,17 +272,8 @@ class ContactClassifier:
         widths: columns of each; equal where None.
 
     Attributes:
-        spaces_: {task: Space}.
-        columns_: {space: the columns of the vectors that it takes, rising}.
-        projections_: {space: Projection}, with the components of the task that has
-            most.
         n_trials_: how many there are.
-        members_: {space: (m,) the trials that it was fitted on, rising}.
-        rows_: {space: (m, c)} these trials, projected.
-        classes_: {task: sorted labels}; `labels_`: {task: (m,) class indices}.
-        components_: {task: components kept}, at most as many as there are.
-        slopes_: {task: by how much the log odds of a label change with its
-            `label_distances`}.
+        tasks_: {task: FittedTask}.
         products_: {task: its factors} of the tasks decided together; see
             `edge.model.agreement`.
     """
@@ -234,180 +287,50 @@ class ContactClassifier:
         cls,
         choices: Choices,
         vectors: Vectors,
-        complete: bool = True,
+        fits: Fits | None = None,
     ) -> ContactClassifier:
-        """A classifier fitted on some trials; see `fit`."""
-        model = cls(choices, vectors.features, vectors.widths)
-        return model.fit(vectors.X, vectors.y, vectors.is_own, complete)
+        """A classifier fitted on some trials.
 
-    def fit(
-        self,
-        X: Floats,
-        y: Labels,
-        is_own: Booleans | None = None,
-        complete: bool = True,
-    ) -> ContactClassifier:
+        Args:
+            choices: {task: Choice}.
+            vectors: the trials; labels are empty where a trial has none.
+            fits: on the same trials, which are taken, and added to.
+        """
+        model = cls(choices, vectors.features, vectors.widths)
+        return model._fit(vectors, {} if fits is None else fits)
+
+    def fit(self, X: Floats, y: Labels) -> ContactClassifier:
         """Fit every task on the trials of X (n, p) that have a label y[task] (n,) for
         it.
 
         Args:
             X, y: the trials; labels are empty where a trial has none.
-            is_own: (n,) whether a trial is the owner's, see `Choice.counts`.
-            complete: whether to set `slopes_` and `products_`, which `decide` needs.
         """
-        X = finite(X)
-        self.n_trials_, self.n_features_in_ = X.shape
-        counts = self._set_spaces(y, is_own)
-        self._fit_spaces(X, y, counts)
-        self._set_labels(y)
-        if complete:
-            counting = {}
-            for task, space in self.spaces_.items():
-                counting[task] = np.where(counts[space] > 0, y[task], "")
-            self.products_ = factors_of(counting)
-            vectors = Vectors(X, y, self.features, self.widths, is_own)
-            self.slopes_ = self._slopes(vectors)
+        return self._fit(Vectors(X, y, self.features, self.widths), {})
+
+    def _fit(self, vectors: Vectors, fits: Fits) -> ContactClassifier:
+        """Fit the tasks that have no fit yet."""
+        vectors = replace(vectors, X=finite(vectors.X))
+        self.n_trials_, self.n_features_in_ = vectors.X.shape
+        fitted: dict[str, FittedTask] = {}
+        for choices in sharing_a_space(self.choices, vectors):
+            key = tuple(choices.items())
+            if key not in fits:
+                fits[key] = fit_together(choices, vectors)
+            fitted |= fits[key]
+        self.tasks_ = {task: fitted[task] for task in self.choices}
+        self.products_ = factors_of({task: vectors.y[task] for task in self.choices})
         return self
-
-    def _set_spaces(self, y: Labels, is_own: Booleans | None) -> dict[Space, Integers]:
-        """Set `spaces_`; {space: (n,) how often each trial counts in it}."""
-        self.spaces_: dict[str, Space] = {}
-        counts: dict[Space, Integers] = {}
-        for task, choice in self.choices.items():
-            how_often = choice.counts(y[task], is_own)
-            uneven = () if (how_often == 1).all() else how_often.tobytes()
-            space = (*choice.space(task), uneven)
-            self.spaces_[task] = space
-            counts[space] = how_often
-            n = np.count_nonzero(how_often)
-            if not 1 <= choice.k <= n:
-                raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
-            if choice.components < 1:
-                raise InputError(
-                    f"components must be at least 1, not {choice.components}"
-                )
-        return counts
-
-    def _fit_spaces(self, X: Floats, y: Labels, counts: dict[Space, Integers]) -> None:
-        """Fit the projection of each space, and project its trials."""
-        widths = widths_of(X.shape[1], self.features, self.widths)
-        self.columns_: dict[Space, Integers] = {}
-        self.projections_: dict[Space, Projection] = {}
-        self.members_: dict[Space, Integers] = {}
-        self.rows_: dict[Space, Floats] = {}
-        for space, how_often in counts.items():
-            tasks = [task for task in self.spaces_ if self.spaces_[task] == space]
-            choice = self.choices[tasks[0]]
-            names, named_widths = types_of(choice.features, self.features, widths)
-            columns = columns_of(choice.features, self.features, widths)
-            members = np.flatnonzero(how_often)
-            # A trial that counts twice is there twice.
-            rows = np.repeat(members, how_often[members])
-            targets = [y[target][rows] for target in choice.targets or tasks[:1]]
-            projection = Projection(
-                choice.scaling,
-                max(self.choices[task].components for task in tasks),
-                names,
-                choice.projection,
-                choice.shrinkage,
-                named_widths,
-            )
-            projection.fit(X[rows][:, columns], np.column_stack(targets))
-            self.columns_[space] = columns
-            self.projections_[space] = projection
-            self.members_[space] = members
-            self.rows_[space] = self.project(space, X[members])
-
-    def _set_labels(self, y: Labels) -> None:
-        """Set the labels and the coordinates of each task."""
-        self.classes_: dict[str, Strings] = {}
-        self.labels_: dict[str, Integers] = {}
-        self.components_: dict[str, int] = {}
-        for task, space in self.spaces_.items():
-            labels = y[task][self.members_[space]]
-            classes, indices = np.unique(labels, return_inverse=True)
-            self.classes_[task] = classes
-            self.labels_[task] = indices
-            rank = self.projections_[space].rank_
-            self.components_[task] = min(self.choices[task].components, rank)
-
-    def _slopes(self, vectors: Vectors) -> dict[str, float]:
-        """`slopes_`, from the distances of trials by fits without their fold.
-
-        Distances between training trials would not do. Discriminants of many features
-        with little shrinkage draw the trials of a label up to a hundred times closer
-        together than new ones.
-        """
-        order = np.lexsort([vectors.y[task] for task in sorted(vectors.y)])
-        vectors = vectors.part(order[:: -(-len(order) // MOST_MEASURED)])
-        folds = np.arange(len(vectors.X)) % SLOPE_FOLDS
-        gaps: dict[str, list[float]] = {task: [] for task in self.choices}
-        for fold in range(SLOPE_FOLDS):
-            new = folds == fold
-            training = vectors.part(~new)
-            choices = fittable(self.choices, training.y, training.is_own)
-            model = ContactClassifier.of(choices, training, complete=False)
-            for task, classes in model.classes_.items():
-                labels = vectors.y[task]
-                counting = self.choices[task].counts(labels, vectors.is_own) > 0
-                tested = new & counting & np.isin(labels, classes)
-                if len(classes) > 1:
-                    gaps[task] += model._gaps(task, vectors.X[tested], labels[tested])
-        return {task: slope(np.array(task_gaps)) for task, task_gaps in gaps.items()}
-
-    def _gaps(self, task: str, X: Floats, labels: Strings) -> list[float]:
-        """By how much nearer than any other the right label is to each of the vectors
-        (m, p)."""
-        distances = self._to_labels(task, self.squares(task, X))
-        right = self.classes_[task].searchsorted(labels)[:, None]
-        to_right = np.take_along_axis(distances, right, axis=1)[:, 0]
-        np.put_along_axis(distances, right, np.inf, axis=1)
-        gaps: list[float] = (distances.min(axis=1) - to_right).tolist()
-        return gaps
-
-    def _to_labels(self, task: str, squares: Floats) -> Floats:
-        """(m, classes) `label_distances` of squares (m, members)."""
-        classes = len(self.classes_[task])
-        return label_distances(squares, self.labels_[task], classes, self.unit(task))
-
-    def project(self, space: Space, X: Floats) -> Floats:
-        """Coordinates (m, c) of vectors (m, p)."""
-        return self.projections_[space].transform(X[:, self.columns_[space]])
-
-    def squares(self, task: str, X: Floats) -> Floats:
-        """(m, members) squared distances of vectors (m, p) to the trials of the task's
-        space."""
-        space = self.spaces_[task]
-        c = self.components_[task]
-        return squared_distances(
-            self.project(space, X)[:, :c], self.rows_[space][:, :c]
-        )
-
-    def unit(self, task: str) -> float:
-        """The unit of a task's coordinates, a power of two."""
-        return self.projections_[self.spaces_[task]].grid_.unit
-
-    def neighbours(self, task: str, X: Floats) -> tuple[Floats, Integers]:
-        """Distances and training rows (m, k) for vectors (m, p), nearest first."""
-        squares = self.squares(task, X)
-        rows = self.nearest(task, squares)
-        distances = np.sqrt(np.take_along_axis(squares, rows, axis=1))
-        return distances, self.members_[self.spaces_[task]][rows]
-
-    def nearest(self, task: str, squares: Floats) -> Integers:
-        """(m, k) places of the smallest squares (m, members); of equal ones the
-        first."""
-        return np.argsort(squares, axis=1, kind="stable")[:, : self.choices[task].k]
 
     def decide(self, X: Floats) -> dict[str, Decided]:
         """{task: decisions} on vectors (m, p), as `edge.Model` makes them of the
         graph's votes."""
         labels = {}
         distances = {}
-        for task, trial_labels in self.labels_.items():
-            squares = self.squares(task, X)
-            labels[task] = vote(trial_labels[self.nearest(task, squares)])
-            distances[task] = self._to_labels(task, squares) * self.slopes_[task]
+        for task, fitted in self.tasks_.items():
+            squares = fitted.squares(X)
+            labels[task] = vote(fitted.labels[fitted.nearest(squares)])
+            distances[task] = fitted.to_labels(squares) * fitted.slope
         for task, factors in self.products_.items():
             together, nearest_answers = agreed(task, factors, distances)
             labels |= together
@@ -415,23 +338,87 @@ class ContactClassifier:
         return {task: Decided(labels[task], distances[task]) for task in labels}
 
 
-def columns_of(
-    names: Collection[str],
-    features: Sequence[str],
-    widths: Sequence[int],
-) -> Integers:
-    """The columns of vectors of `features` that hold the `names` ones, rising; all if
-    empty."""
-    is_named = [not names or name in names for name in features]
-    return np.flatnonzero(np.repeat(is_named, widths))
+def sharing_a_space(choices: Choices, vectors: Vectors) -> list[dict[str, Choice]]:
+    """The choices of each space: tasks share one of equal settings and trials.
+
+    Raises:
+        InputError: a choice asks for more neighbours than there are trials, or for no
+            component.
+    """
+    spaces: dict[tuple[object, ...], dict[str, Choice]] = {}
+    for task, choice in choices.items():
+        labelled = vectors.y[task] != ""
+        n = np.count_nonzero(labelled)
+        if not 1 <= choice.k <= n:
+            raise InputError(f"k must be 1 to {n} training trials, not {choice.k}")
+        if choice.components < 1:
+            raise InputError(f"components must be at least 1, not {choice.components}")
+        key = (choice.space(task), labelled.tobytes())
+        spaces.setdefault(key, {})[task] = choice
+    return list(spaces.values())
 
 
-def types_of(
-    names: Collection[str],
-    features: Sequence[str],
-    widths: Sequence[int],
-) -> tuple[list[str], list[int]]:
-    """Names and widths of the `names` among the features, in their order; all if
-    empty."""
-    is_named = [not names or name in names for name in features]
-    return list(compress(features, is_named)), list(compress(widths, is_named))
+def fit_together(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
+    """Fit tasks that share a space on the trials that have labels for them."""
+    features = next(iter(choices.values())).features
+    columns = vectors.columns_of(features)
+    vectors = vectors.of(features)
+    slopes = _slopes(choices, vectors)
+    fitted = _fit_space(choices, vectors)
+    space = replace(next(iter(fitted.values())).space, columns=columns)
+    return {
+        task: replace(fit, space=space, slope=slopes[task])
+        for task, fit in fitted.items()
+    }
+
+
+def _fit_space(choices: Choices, vectors: Vectors) -> dict[str, FittedTask]:
+    """The tasks in the space that they share, which takes all columns."""
+    task, choice = next(iter(choices.items()))
+    members = np.flatnonzero(vectors.y[task])
+    targets = [vectors.y[target][members] for target in choice.targets or (task,)]
+    projection = Projection(
+        choice.scaling,
+        max(choice.components for choice in choices.values()),
+        vectors.features,
+        choice.projection,
+        choice.shrinkage,
+        vectors.columns,
+    )
+    X = vectors.X[members]
+    projection.fit(X, np.column_stack(targets))
+    columns = np.arange(X.shape[1])
+    projected = projection.transform(X)
+    space = FittedSpace(columns, projection, members, projected)
+    fitted = {}
+    for task, choice in choices.items():
+        classes, labels = np.unique(vectors.y[task][members], return_inverse=True)
+        components = min(choice.components, projection.rank_)
+        fitted[task] = FittedTask(space, classes, labels, components, choice.k)
+    return fitted
+
+
+def _slopes(choices: Choices, vectors: Vectors) -> dict[str, float]:
+    """{task: its slope} of tasks that share a space, from the distances of trials by
+    fits without their fold.
+
+    Distances between training trials would not do. Discriminants of many features with
+    little shrinkage draw the trials of a label up to a hundred times closer together
+    than new ones.
+    """
+    order = np.lexsort([vectors.y[task] for task in sorted(vectors.y)])
+    vectors = vectors.part(order[:: -(-len(order) // MOST_MEASURED)])
+    folds = np.arange(len(vectors.X)) % SLOPE_FOLDS
+    gaps = {task: [np.zeros(0)] for task in choices}
+    for fold in range(SLOPE_FOLDS):
+        left_out = folds == fold
+        training = vectors.part(~left_out)
+        possible = fittable(choices, training.y)
+        if not possible:
+            continue
+        for task, fitted in _fit_space(possible, training).items():
+            labels = vectors.y[task]
+            tested = left_out & np.isin(labels, fitted.classes)
+            if len(fitted.classes) > 1:
+                gaps[task].append(fitted.gaps(vectors.X[tested], labels[tested]))
+    return {task: slope(np.concatenate(of_folds)) for task, of_folds in gaps.items()}

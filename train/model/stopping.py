@@ -31,9 +31,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
-from scipy.optimize import brentq
-from scipy.special import expit
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
@@ -42,35 +39,19 @@ from edge.model.info import (
     Novelty,
     Stopping,
     StoppingRule,
-    margin,
 )
 from edge.touch.features import FEATURES
 from train.data.folds import finest, stratified_folds
 from train.data.vectors import Strings, Vectors
+from train.model.curves import Curve, cross_fitted
+from train.model.held_out import AtPoints, HeldOut, answers, held_out
 from train.model.novelty import FOLDS, NoveltySpace, held_out_scores, limits_of
-from train.model.pipeline import Choices, ContactClassifier, columns_of, types_of
+from train.model.pipeline import Choices, ContactClassifier
 from train.model.rules import RISK, Course, candidates, certify, following
 from train.threads import single_thread
 
 FEWEST = 20
 """Trials that calibration needs."""
-PULL = 0.5
-"""Weight of the prior of a margin's slope, 1 a standard deviation, and of the
-intercept's, 0."""
-DOUBT = 1.0
-"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
-DOUBT_PULL = 10.0
-"""Weight of this prior for an excess of a standard deviation. It is heavy because few
-held-out trials are as novel as what a robot may meet."""
-LEAST_DOUBT = 0.5
-"""The odds fall at least by the root of the novelty, for the same reason."""
-LEAST_SLOPE = 1e-3
-"""Smallest slope a standard deviation: a larger margin never makes a label less
-likely."""
-
-
-AtPoints = Sequence[Choices]
-"""[decision point]{task: Choice}."""
 
 
 @dataclass(frozen=True)
@@ -88,140 +69,6 @@ class Early:
     by_fold: Sequence[Choices]
 
 
-Answers = dict[str, tuple[Strings, Floats]]
-"""{task: labels and margins, (decision points, m) each}."""
-
-
-def answers(models: Sequence[ContactClassifier], X: Floats) -> Answers:
-    """The answers of models, one for each decision point, to vectors (points, m, p)."""
-    by_task: dict[str, tuple[list[Strings], list[list[float]]]] = {}
-    for model, x in zip(models, X, strict=True):
-        for task, (indices, distances) in model.decide(x).items():
-            labels, margins = by_task.setdefault(task, ([], []))
-            labels.append(model.classes_[task][indices])
-            margins.append(list(map(margin, distances.tolist(), indices.tolist())))
-    return {
-        task: (np.array(labels), np.array(margins))
-        for task, (labels, margins) in by_task.items()
-    }
-
-
-def held_out(
-    vectors: Vectors,
-    folds: Integers,
-    fold_choices: Sequence[AtPoints],
-    jobs: int = 1,
-) -> list[Answers]:
-    """[fold] decisions of models without the fold's trials on these, in their order.
-
-    Args:
-        vectors: (decision points, n, p).
-        folds: (n,) from 0, or -1 for trials that are never left out.
-        fold_choices: [fold][decision point]{task: Choice}.
-        jobs: processes.
-    """
-    work = (
-        delayed(_fold)(vectors, folds == fold, choices)
-        for fold, choices in enumerate(fold_choices)
-    )
-    return list(Parallel(n_jobs=jobs)(work))
-
-
-def _fold(vectors: Vectors, left_out: Booleans, choices: AtPoints) -> Answers:
-    training = vectors.part(~left_out)
-    models = []
-    with single_thread():
-        for at_point, x in zip(choices, training.X, strict=True):
-            models.append(ContactClassifier.of(at_point, replace(training, X=x)))
-        return answers(models, vectors.X[:, left_out])
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The probability that a label is right.
-
-    It is the logistic function of slope * margin + intercept - doubt * excess, where the
-    excess is the part of the novelty above that of half of the trials (`excess_of`).
-    """
-
-    slope: float
-    intercept: float
-    doubt: float
-
-    @classmethod
-    def of(
-        cls,
-        margins: Floats,
-        excess: Floats,
-        right: Booleans,
-    ) -> Curve:
-        """The most likely curve for some answers; arrays of one shape."""
-        columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
-        middle = columns.mean(axis=0)
-        spread = columns.std(axis=0)
-        # The spread of equal values is the rounding of their mean.
-        spread[spread <= 1e-12 * np.abs(middle)] = 1.0
-        constant = np.ones((len(columns), 1))
-        scaled = np.hstack([(columns - middle) / spread, constant])
-        prior = np.array([1.0, DOUBT * spread[1], 0.0])
-        solution = _logistic(scaled, right.ravel(), prior)
-        slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
-        intercept = float(solution[2] - slopes @ middle)
-        return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
-
-    def with_mean(
-        self,
-        margins: Floats,
-        excess: Floats,
-        share: float,
-    ) -> Curve:
-        """The curve with the intercept at which the mean probability is `share`."""
-        half_a_trial = 0.5 / margins.size
-        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
-
-        def surplus(shift: float) -> float:
-            shifted = replace(self, intercept=self.intercept + shift)
-            return float(shifted.probabilities(margins, excess).mean()) - target
-
-        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
-        shift = float(brentq(surplus, -reach, reach))
-        return replace(self, intercept=self.intercept + shift)
-
-    def probabilities(self, margins: Floats, excess: Floats) -> Floats:
-        """That labels with these margins are right, in the shape of the margins."""
-        logits = self.slope * margins + self.intercept - self.doubt * excess
-        return np.asarray(expit(logits))
-
-
-def _logistic(
-    columns: Floats,
-    right: Booleans,
-    prior: Floats,
-) -> Floats:
-    """(3,) weights of columns (m, 3) for the log odds of being right."""
-    solution = prior
-    pull = np.array([PULL, DOUBT_PULL, PULL])
-
-    def loss(parameters: Floats) -> float:
-        logits = columns @ parameters
-        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
-        return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
-
-    for _ in range(500):
-        p = expit(columns @ solution)
-        gradient = columns.T @ (p - right) + pull * (solution - prior)
-        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
-        step = np.linalg.solve(hessian, gradient)
-        # Far from the optimum, whole steps may go back and forth for ever. Near it,
-        # they converge, and rounding hides what the loss gains.
-        while np.abs(step).max() > 1e-3 and loss(solution - step) > loss(solution):
-            step /= 2.0
-        solution = solution - step
-        if np.abs(step).max() < 1e-10:
-            break
-    return solution
-
-
 def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     """(points, n) by how much the logarithm of the novelty (points, n) is above that of
     half of the trials; 0 below."""
@@ -237,16 +84,18 @@ def unlike(novelty: Novelty, scores: Floats) -> Booleans:
 
 
 @dataclass(frozen=True)
-class HeldOut:
-    """Answers to each trial by models that were fitted without it.
+class Certified:
+    """A task's certified rules.
 
     Attributes:
-        right: {task: (decision points, n) whether the label is right}.
-        margins: {task: (decision points, n) the label's margin}.
+        rules: in the order of rising error.
+        trials: number of trials that certify them.
+        wrong: number of these that are wrong at the full window.
     """
 
-    right: dict[str, Booleans]
-    margins: dict[str, Floats]
+    rules: Sequence[StoppingRule]
+    trials: int
+    wrong: int
 
 
 @dataclass(eq=False)
@@ -287,7 +136,6 @@ class SequentialClassifier:
         y: Mapping[str, Strings],
         folds: Integers,
         fold_choices: Sequence[Choices],
-        is_own: Booleans | None = None,
     ) -> SequentialClassifier:
         """Fit and calibrate.
 
@@ -296,7 +144,6 @@ class SequentialClassifier:
             y: {task: (n,) labels}; empty where a trial has none.
             folds: (n,) from 0, or -1 for trials that calibrate nothing.
             fold_choices: [fold]{task: Choice}, chosen without the fold's trials.
-            is_own: see `ContactClassifier.fit`.
 
         Raises:
             InputError: there are too few trials, or X is not finite.
@@ -307,22 +154,22 @@ class SequentialClassifier:
                 f"calibration needs at least {FEWEST} trials, not {n}; record more, or "
                 "export without decision points"
             )
-        vectors = Vectors(X, y, self.features, self.widths, is_own)
-        tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
+        vectors = Vectors(X, y, self.features, self.widths)
+        self._folds = folds
+        self._tested = {task: (folds >= 0) & (y[task] != "") for task in self.choices}
         self._fit_novelty(self._fit_points(vectors), folds)
-        without = self._without(fold_choices)
-        chosen_without = self._held_out(vectors, folds, without)
+        of_folds = self.without(fold_choices, self.early)
+        of_all = [self.choices_at] * len(of_folds)
+        chosen_without, chosen_by_all = held_out(
+            vectors,
+            folds,
+            [of_folds, of_all],
+            self.jobs,
+        )
         self.right_ = chosen_without.right
-        rules = self._certify(chosen_without, folds, tested)
-        # Margins are on the scale of the settings. Curves that the exported model uses
-        # come from margins by its own settings, in fits without the trials; as the
-        # trials had a part in the choice of these, the curves' means come from choices
-        # without them.
-        same = [self.choices_at] * len(fold_choices)
-        curves = chosen_without
-        if without != same:
-            curves = self._held_out(vectors, folds, same)
-        self._calibrate(curves, tested, rules)
+        self.stopping_ = self._with_curves(
+            self._certified(chosen_without), chosen_by_all
+        )
         return self
 
     @property
@@ -331,16 +178,16 @@ class SequentialClassifier:
         early = {} if self.early is None else self.early.choices
         return self._at_points(self.choices, early)
 
-    def _without(self, fold_choices: Sequence[Choices]) -> list[AtPoints]:
-        """[fold][decision point]{task: the choice made without the fold's trials}."""
-        early = [{}] * len(fold_choices) if self.early is None else self.early.by_fold
-        return list(map(self._at_points, fold_choices, early))
-
-    def _at_points(
+    def without(
         self,
-        full: Choices,
-        early: Choices,
-    ) -> AtPoints:
+        fold_choices: Sequence[Choices],
+        early: Early | None,
+    ) -> list[AtPoints]:
+        """[fold][decision point]{task: the choice made without the fold's trials}."""
+        early_choices = [{}] * len(fold_choices) if early is None else early.by_fold
+        return list(map(self._at_points, fold_choices, early_choices))
+
+    def _at_points(self, full: Choices, early: Choices) -> AtPoints:
         """[decision point]{task: Choice} of choices for the full window and for early
         points."""
         until_s = 0.0 if self.early is None else self.early.until_s
@@ -349,39 +196,16 @@ class SequentialClassifier:
             for seconds in self.decision_points_s
         ]
 
-    def _held_out(
-        self,
-        vectors: Vectors,
-        folds: Integers,
-        fold_choices: Sequence[AtPoints],
-    ) -> HeldOut:
-        """Answers to each trial by models with some settings, without its fold."""
-        by_fold = held_out(vectors, folds, fold_choices, self.jobs)
-        shape = vectors.X.shape[:2]
-        right = {}
-        margins = {}
-        for task in self.choices:
-            right[task] = np.zeros(shape, dtype=bool)
-            margins[task] = np.zeros(shape)
-            for fold, answers_of in enumerate(by_fold):
-                in_fold = folds == fold
-                labels, sure = answers_of[task]
-                right[task][:, in_fold] = labels == vectors.y[task][in_fold]
-                margins[task][:, in_fold] = sure
-        return HeldOut(right, margins)
-
     def _fit_points(self, vectors: Vectors) -> Vectors:
         """Fit the classifier of each decision point; the vectors that these take."""
         choices = [choice for at in self.choices_at for choice in at.values()]
         features = set().union(*(c.features or self.features for c in choices))
-        self.columns_ = columns_of(features, self.features, vectors.columns)
-        names, widths = types_of(features, self.features, vectors.columns)
+        self.columns_ = vectors.columns_of(features)
         self.n_features_in_ = len(self.columns_)
-        X = np.ascontiguousarray(vectors.X[..., self.columns_])
-        vectors = replace(vectors, X=X, features=names, widths=widths)
+        vectors = vectors.of(features)
         self.decision_points_ = []
         with single_thread():
-            for at_point, x in zip(self.choices_at, X, strict=True):
+            for at_point, x in zip(self.choices_at, vectors.X, strict=True):
                 model = ContactClassifier.of(at_point, replace(vectors, X=x))
                 self.decision_points_.append(model)
         return vectors
@@ -404,18 +228,13 @@ class SequentialClassifier:
         self._excess = excess_of(self.novelty_, scores)
         self.unknown_ = unlike(self.novelty_, scores)
 
-    def _certify(
-        self,
-        answered: HeldOut,
-        folds: Integers,
-        tested: Mapping[str, Booleans],
-    ) -> dict[str, tuple[list[StoppingRule], Booleans]]:
-        """{task: its certified rules, and whether the full window is wrong (n,)}."""
+    def _certified(self, answered: HeldOut) -> dict[str, Certified]:
+        """{task: its rules}, by answers whose settings were chosen without the fold."""
         scores = {}
         for task, right in answered.right.items():
             evidence = answered.margins[task], self._excess, right
-            scores[task] = cross_fitted(*evidence, folds, tested[task])
-        courses = self._courses(scores, answered.right, self.unknown_, tested)
+            scores[task] = cross_fitted(*evidence, self._folds, self._tested[task])
+        courses = self._courses(scores, answered.right, self.unknown_, self._tested)
         seconds = np.array(self.decision_points_s)
         rules = {task: certify(course, seconds) for task, course in courses.items()}
         for task, factors in self.products_.items():
@@ -427,17 +246,25 @@ class SequentialClassifier:
                     seconds,
                 )
         full, _ = candidates(len(seconds))
-        return {task: (rules[task], courses[task].under(full)[1]) for task in rules}
+        certified = {}
+        for task, of_task in rules.items():
+            _, wrong = courses[task].under(full)
+            certified[task] = Certified(of_task, len(wrong), int(wrong.sum()))
+        return certified
 
-    def _calibrate(
+    def _with_curves(
         self,
+        certified: Mapping[str, Certified],
         answered: HeldOut,
-        tested: Mapping[str, Booleans],
-        rules: Mapping[str, tuple[list[StoppingRule], Booleans]],
-    ) -> None:
-        """Set the stopping rules and curves of each task."""
-        self.stopping_ = {}
-        for task, tests in tested.items():
+    ) -> dict[str, Stopping]:
+        """{task: its rules, with curves by answers of the exported settings}.
+
+        Margins are on the scale of the settings, so slopes come from those that the
+        exported model uses, in fits without the trials. As the trials had a part in the
+        choice of these, the curves' means come from choices without them (`right_`).
+        """
+        stopping = {}
+        for task, tests in self._tested.items():
             evidence = (
                 answered.margins[task][:, tests],
                 self._excess[:, tests],
@@ -447,19 +274,39 @@ class SequentialClassifier:
             together = _curve(*evidence)
             curves = map(_curve, *evidence)
             slopes, intercepts, doubts = zip(*map(astuple, curves), strict=True)
-            of_task, wrong = rules[task]
-            self.stopping_[task] = Stopping(
+            stopping[task] = Stopping(
                 slopes=slopes,
                 intercepts=intercepts,
                 doubts=doubts,
                 slope=together.slope,
                 intercept=together.intercept,
                 doubt=together.doubt,
-                rules=tuple(of_task),
-                trials=len(wrong),
-                wrong=int(wrong.sum()),
+                rules=tuple(certified[task].rules),
+                trials=certified[task].trials,
+                wrong=certified[task].wrong,
                 risk=RISK,
             )
+        return stopping
+
+    def smallest_errors(
+        self,
+        X: Floats,
+        y: Mapping[str, Strings],
+        fold_choices: Sequence[Choices],
+        early: Early | None,
+    ) -> dict[str, float]:
+        """{task: the smallest error that would be certified with other settings}, with
+        the novelty of these.
+
+        Args:
+            X, y, fold_choices: as for `fit`.
+            early: settings of early decision points.
+        """
+        vectors = Vectors(X, y, self.features, self.widths)
+        run = self.without(fold_choices, early)
+        (answered,) = held_out(vectors, self._folds, [run], self.jobs)
+        certified = self._certified(answered)
+        return {task: certified[task].rules[0].error for task in certified}
 
     @property
     def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
@@ -534,22 +381,3 @@ def _curve(
     """The curve of answers, with the mean probability of honest ones."""
     share = float(honest.mean())
     return Curve.of(margins, excess, right).with_mean(margins, excess, share)
-
-
-def cross_fitted(
-    margins: Floats,
-    excess: Floats,
-    right: Booleans,
-    folds: Integers,
-    tested: Booleans,
-) -> Floats:
-    """(points, n) confidences for rules, each fold's by the curve of the other folds'
-    tested."""
-    confidences = np.zeros(right.shape)
-    for fold in range(int(folds.max()) + 1):
-        left_out = folds == fold
-        outside = tested & ~left_out
-        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
-        evidence = margins[:, left_out], excess[:, left_out]
-        confidences[:, left_out] = curve.probabilities(*evidence)
-    return confidences

@@ -20,7 +20,13 @@ from train.data.labels import NO_CONTACT
 from train.data.vectors import Strings, Vectors
 from train.draw.explanation import MOST_NEAR, Case, draw_case
 from train.fitting import Fitted
-from train.model.pipeline import Choice, Choices, ContactClassifier, fittable
+from train.model.pipeline import (
+    Choice,
+    Choices,
+    ContactClassifier,
+    FittedTask,
+    fittable,
+)
 from train.model.projection import MOST_STEPS
 from train.report import page
 from train.report.figures import confusion, lines, picture
@@ -88,7 +94,7 @@ def _left_out(
     """
     labels = vectors.y[task]
     classes, index = np.unique(labels, return_inverse=True)
-    counting = choices[task].counts(labels, vectors.is_own) > 0
+    counting = labels != ""
     counting[test] = False
     training = np.flatnonzero(counting)
     quarter_of = stratified_folds(labels[training], QUARTERS)
@@ -97,11 +103,11 @@ def _left_out(
     for quarter in range(QUARTERS):
         train = training[quarter_of <= quarter]
         fewer = vectors.part(train)
-        possible = fittable(choices, fewer.y, fewer.is_own)
+        possible = fittable(choices, fewer.y)
         model = ContactClassifier.of(possible, fewer)
-        answers.append(model.classes_[task][model.decide(X)[task].labels])
-    _, voters = model.neighbours(task, X)
-    space = _space(model, task, index[train])
+        answers.append(model.tasks_[task].classes[model.decide(X)[task].labels])
+    _, voters = model.tasks_[task].neighbours(X)
+    space = _space(model.tasks_[task], index[train])
     form = vectors.features, vectors.columns
 
     def numbered(neighbour: Any) -> Any:
@@ -121,18 +127,16 @@ def _left_out(
     return answers, explained
 
 
-def _space(model: ContactClassifier, task: str, labels: Integers) -> Space:
+def _space(fitted: FittedTask, labels: Integers) -> Space:
     """The space of a task, whose trials have these labels (n,)."""
-    key = model.spaces_[task]
-    c = model.components_[task]
-    projection = model.projections_[key]
+    projection = fitted.space.projection
     grid = projection.grid_
     return Space(
-        columns=model.columns_[key],
+        columns=fitted.space.columns,
         mean=projection.mean_,
         gain=projection.gain_,
-        weights=projection.weights_[:, :c],
-        rows=model.rows_[key][:, :c],
+        weights=projection.weights_[:, : fitted.components],
+        rows=fitted.rows,
         labels=labels,
         reach=MOST_STEPS * grid.step,
         limit=grid.limit * grid.unit,

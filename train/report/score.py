@@ -8,7 +8,7 @@ import numpy as np
 from edge.arrays import Booleans, Floats, Integers
 from edge.touch.features import FEATURES
 from train.choose.crossval import MAX_COMPONENTS, accuracies, neighbours
-from train.choose.evaluate import Result, evaluate
+from train.choose.evaluate import Result, evaluate, nested_accuracy
 from train.choose.search import SearchGrid
 from train.data.vectors import Labels, Strings, Vectors
 from train.model.pipeline import vote
@@ -65,7 +65,7 @@ def nested(
         widths: columns of each; equal where None.
     """
     table = evaluate(Vectors(X, y, features, widths), folds, [grid])
-    return {task: table.nested(task) for task in y}
+    return {task: nested_accuracy(table, task) for task in y}
 
 
 def voted(rows: Integers, y: Strings, components: int, k: int) -> Result:

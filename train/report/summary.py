@@ -11,7 +11,7 @@ from sklearn.neighbors import NearestNeighbors
 from edge.arrays import Floats, Integers
 from edge.errors import printable
 from edge.touch import measures
-from train.choose.choose import Chosen
+from train.choose.settings import Chosen
 from train.data import outliers
 from train.data.dataset import DataSet
 from train.data.feature_sets import SETS, expand, moves
@@ -194,9 +194,9 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
     """The sentences that concern a single task."""
-    classifier = fitted.classifier
+    fitted_task = fitted.classifier.tasks_[task]
     choice = fitted.chosen[task].choice
-    components = classifier.components_[task]
+    components = fitted_task.components
     if any(measures.feature(n).quantity == "joint_angle" for n in choice.features):
         share = posture_accuracy(fitted.dataset, task)
         yield (
@@ -211,7 +211,7 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
             f"{choice.components - components} fewer than asked for"
         )
     yield from _geometry(fitted, task)
-    gap = classifier.projections_[classifier.spaces_[task]].gap_
+    gap = fitted_task.space.projection.gap_
     if gap < CLOSE_EIGENVALUES:
         yield (
             f"warning: {task}: two components explain the same variance to within "
@@ -221,19 +221,18 @@ def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:
 
 def _geometry(fitted: Fitted, task: str) -> Iterator[str]:
     """Sentences on trials that lie at the same place, or far outside."""
-    classifier = fitted.classifier
-    space = classifier.spaces_[task]
-    rows = classifier.rows_[space][:, : classifier.components_[task]]
-    equal = tied_across_labels(rows, classifier.labels_[task])
+    fitted_task = fitted.classifier.tasks_[task]
+    rows = fitted_task.rows
+    equal = tied_across_labels(rows, fitted_task.labels)
     if equal:
         yield (
             f"warning: {task}: {equal} trials have the same coordinates as a trial "
             "with another label; the earlier trial counts as nearer, so their order "
             "decides the label"
         )
-    members = classifier.members_[space]
+    members = fitted_task.space.members
     _, different = np.unique(fitted.X[members], axis=0, return_index=True)
-    steps = coarseness(rows[different], classifier.projections_[space].grid_.unit)
+    steps = coarseness(rows[different], fitted_task.unit)
     if rows.any() and steps < FEWEST_UNITS:
         farthest = members[(rows**2).sum(axis=1).argmax()]
         yield (

@@ -10,12 +10,14 @@ import numpy as np
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
 from train.choose.candidates import candidates, features_of
-from train.choose.choose import Chosen
 from train.choose.evaluate import Result
+from train.choose.options import FitOptions, trials_of
+from train.choose.settings import Chosen
+from train.choose.windows import windows_of
 from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import TRIAL, kinds_of
-from train.fitting import FitOptions, fit, trials_of, windows_of
+from train.fitting import fit
 from train.report.score import paired
 from train.report.work import Workers
 
@@ -48,7 +50,7 @@ class Prepared:
 def prepared(raw: Recordings, *, quick: bool, jobs: int) -> Prepared:
     """The trials of recordings as export takes them."""
     options = FitOptions(quick=quick, jobs=jobs, progress=True)
-    if quick or raw.mixed:
+    if quick:
         loaded = trials_of(raw, CHOSEN_S, options)
         return Prepared(loaded.dataset, CHOSEN_S, loaded.notes)
     seconds = [float(r.t[-1] - r.t[0]) for r in raw.recordings]

@@ -11,7 +11,7 @@ import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
-from train.choose.choose import Chosen
+from train.choose.settings import Chosen
 from train.data.dataset import DataSet, Recordings
 from train.data.folds import finest, stratified_folds
 from train.data.parts import part

@@ -10,7 +10,7 @@ import numpy as np
 
 from edge.arrays import Booleans
 from edge.touch.measures import SHEAR, feature
-from train.choose.choose import Chosen
+from train.choose.settings import Chosen
 from train.data.dataset import DataSet
 from train.data.groups import LEAVE_OUT, TRIAL
 from train.report.figures import PHONE, STROKES, legend, picture

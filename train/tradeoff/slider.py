@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
-from train.choose.choose import Chosen
 from train.choose.evaluate import Result
+from train.choose.settings import Chosen
 from train.report.score import interval
 from train.tradeoff.choices import unseen
 from train.tradeoff.early import soonest_s

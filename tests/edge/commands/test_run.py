@@ -15,20 +15,18 @@ def touch(number, unknown):
 
 
 def test_most_touches_are_unknown_and_it_is_said_once_with_the_remedy(caplog):
-    touches = UnknownTouches("m.onnx")
+    touches = UnknownTouches()
     heard = [touches.push(touch(i, unknown=i % 4)) for i in range(3 * LAST_TOUCHES)]
     events = [event for event in heard if event is not None]
     assert events == [
         {"event": "unknown_touches", "unknown": 6, "touches": FEWEST_TOUCHES}
     ]
     (sentence,) = caplog.messages
-    assert sentence.endswith(
-        "add them with `edge-classify teach --new-labels --model m.onnx REC...`"
-    )
+    assert sentence.endswith("label them, and export a model with them")
 
 
 def test_half_of_the_touches_may_be_unknown_and_old_ones_are_forgotten():
-    touches = UnknownTouches("m.onnx")
+    touches = UnknownTouches()
     for i in range(3 * LAST_TOUCHES):
         assert touches.push(touch(i, unknown=i % 2)) is None
     for i in range(LAST_TOUCHES):

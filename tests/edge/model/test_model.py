@@ -177,6 +177,7 @@ REFUSED = {
         units={"max_force": "newton"}
     ): "units.contact_area is missing; export it again",
     meta(trials=["a"]): "names 1 of 16 trials",
+    meta(taught=3): "counts trials that were added on a board",
     edited(lambda m: m.pop("window_s")): "window_s is missing; export it again",
     edited(
         lambda m: m["tasks"]["category"]["labels"].append("liquid")

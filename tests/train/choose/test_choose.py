@@ -11,8 +11,10 @@ import train
 from edge.saving import save
 from edge.statistics import wilson
 from train.choose.candidates import candidates, features_of
-from train.choose.choose import Choosing, Chosen, decided_together
+from train.choose.choose import Choosing, decided_together
 from train.choose.evaluate import AnswerTable, Promise
+from train.choose.protocols import GroupsLeftOut, TrialsLeftOut
+from train.choose.settings import Chosen
 from train.data.dataset import Measurement, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import Divisions, Groups
@@ -77,7 +79,10 @@ def settled():
     def settle(grouped):
         divisions = Divisions(folds, (), objects if grouped else None)
         choosing = Choosing(dataset, {"t": folds.astype(str)}, (), divisions, samples=1)
-        chosen, without = choosing._settle("t", trials, unseen if grouped else trials)
+        by_trial = TrialsLeftOut(trials, {"max_force": 1})
+        by_group = GroupsLeftOut(unseen, {"max_force": 1}, objects)
+        protocol = by_group if grouped else by_trial
+        chosen, without = choosing._settle("t", protocol, by_trial)
         return {
             "chosen": chosen.choice.k,
             "without a fold": [choice.k for choice in without],
@@ -137,11 +142,12 @@ def hits(agreeing):
         X = vectors.X[test]
         model = ContactClassifier.of(choices, vectors.part(~test))
         answers = {task: decision.labels for task, decision in model.decide(X).items()}
-        near = model.nearest("category", model.squares("category", X))
-        answers["alone"] = vote(model.labels_["category"][near])
+        category = model.tasks_["category"]
+        near = category.nearest(category.squares(X))
+        answers["alone"] = vote(category.labels[near])
         for task, labels in answers.items():
             of_task = "category" if task == "alone" else task
-            named = model.classes_[of_task][labels]
+            named = model.tasks_[of_task].classes[labels]
             right[task][test] = named == vectors.y[of_task][test]
     return right
 

@@ -44,15 +44,15 @@ def overlapping(n=24, seed=0):
 
 @pytest.mark.parametrize("scaling", ["none", "IV"])
 def test_the_table_is_that_of_grid_search(scaling):
-    X, y = overlapping()
-    components = [1, 3, 20]
-    ks = [1, 2, 4, 20]
+    X, y = overlapping(16)
+    components = [1, 20]
+    ks = [1, 4, 9]
     ours = accuracies(neighbours(X, scaling=scaling), y)
     theirs = sklearn_table(X, y, scaling, components, ks)
-    assert ours.shape == (20, 20)
+    assert ours.shape == (20, 15)
     picked = ours[np.ix_([c - 1 for c in components], [k - 1 for k in ks])]
     assert np.abs(picked - theirs).max() < 1e-12
-    assert len(np.unique(picked)) > 3
+    assert len(np.unique(picked)) > 2
 
 
 def test_votes_for_every_k_at_once_are_those_one_by_one():

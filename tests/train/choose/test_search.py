@@ -9,13 +9,12 @@ ROWS = np.array(
     [[0.0, 2.0], [0.0, -2.0], [3.0, 0.0], [-3.0, 0.0], [3.0, 0.0], [-3.0, 0.0]]
 )
 LABELS = {"t": np.array([0, 0, 1, 2, 1, 2])}
-FIRST = np.arange(6)
 
 
 def test_the_nearest_come_first_and_equally_near_ones_in_their_order():
     grid = SearchGrid(components=(1, 2), neighbours=(5,))
     new = np.array([[2.0, 0.0], [0.0, 1.0]])
-    near = Decomposition(ROWS, new, LABELS, FIRST).neighbours(grid, "t")
+    near = Decomposition(ROWS, new, LABELS).neighbours(grid, "t")
     assert near.shape == (2, 2, 5)
     # Along the first axis, then in the plane.
     assert near[0, 0].tolist() == [2, 4, 0, 1, 3]
@@ -25,20 +24,8 @@ def test_the_nearest_come_first_and_equally_near_ones_in_their_order():
 def test_rows_that_never_differ_are_all_equally_near():
     same = np.zeros((6, 2))
     grid = SearchGrid(projection="lda", shrinkages=(0.1,), neighbours=(3,))
-    near = Decomposition(same, same[:2], LABELS, FIRST).neighbours(grid, "t")
+    near = Decomposition(same, same[:2], LABELS).neighbours(grid, "t")
     assert near.tolist() == [[[0, 1, 2], [0, 1, 2]]]
-
-
-def test_a_trial_that_counts_twice_is_found_once():
-    twice = np.repeat(FIRST, 2)
-    grid = SearchGrid(components=(2,), neighbours=(9,))
-    near = Decomposition(
-        ROWS[twice],
-        ROWS[:1],
-        {"t": LABELS["t"][twice]},
-        np.arange(0, 12, 2),
-    ).neighbours(grid, "t")
-    assert near.tolist() == [[[0, 2, 3, 4, 5, 1]]]
 
 
 @pytest.mark.parametrize("n", [20, MANY // 30 + 1])

@@ -7,7 +7,7 @@ from edge.saving import save
 from edge.touch.track import ContactTracker
 from tests.conftest import in_a_row
 from train.__main__ import main
-from train.data.dataset import contacts
+from train.data.contacts import contacts
 
 
 def test_labels_for_too_many_contacts_stop_before_anything_is_written(

@@ -335,11 +335,3 @@ def test_angles_are_measured_by_the_names_of_their_joints(
     straight = load_trials([tmp_path / "a"])
     reordered = load_trials([tmp_path / "b"], Measurement(arm=arm))
     np.testing.assert_array_equal(reordered.features(), straight.features())
-
-
-def test_joint_angles_are_called_for_by_motion_alone(recordings):
-    assert load_trials([recordings], Measurement(["force_motion"])).chain is not None
-    assert (
-        load_trials([recordings], Measurement(["max_force", "skin_force"])).chain
-        is None
-    )

@@ -47,7 +47,8 @@ def test_simulated_things_that_a_scene_numbers_are_of_kinds(make_touch):
     assert kinds.tolist() == [name[:-3] for name in touches]
     assert kinds_of(list(drawn_touches(make_touch, numbered=False).values())) is None
     recorded = replace(touches["hard box 01"], meta={"labels": {"object": "box 03"}})
-    assert kinds_of([*touches.values(), recorded]) is None
+    assert kinds_of([*touches.values(), recorded]).tolist() == [*kinds, "box 03"]
+    assert kinds_of([recorded]) is None
 
 
 @pytest.mark.parametrize(

@@ -3,93 +3,18 @@ task."""
 
 import numpy as np
 import pytest
-from scipy.special import expit, logit
+from scipy.special import logit
 
 from edge.errors import InputError
 from edge.model.info import NOVELTY_RATE
 from train.data.folds import stratified_folds
+from train.model.held_out import answers
 from train.model.pipeline import Choice
 from train.model.stopping import (
-    DOUBT,
-    LEAST_DOUBT,
-    Curve,
     SequentialClassifier,
-    answers,
     excess_of,
     unlike,
 )
-
-
-class TestCurve:
-    def test_finds_the_curve_that_drew_the_outcomes(self):
-        rng = np.random.default_rng(0)
-        margins = rng.normal(scale=2.0, size=40_000)
-        excess = rng.exponential(0.5, size=len(margins))
-        chance = expit(0.5 * margins + 1.0 - 0.8 * excess)
-        curve = Curve.of(margins, excess, rng.random(len(margins)) < chance)
-        assert curve.slope == pytest.approx(0.5, abs=0.05)
-        assert curve.intercept == pytest.approx(1.0, abs=0.05)
-        assert curve.doubt == pytest.approx(0.8, abs=0.08)
-
-    @pytest.mark.parametrize(
-        "margins", [np.full(50, 25.0), np.append(np.linspace(0, 1, 30), 40)]
-    )
-    @pytest.mark.parametrize("right", [False, True])
-    def test_equal_outcomes_and_one_far_margin_have_the_best_curve(
-        self,
-        margins,
-        right,
-    ):
-        outcomes = np.full(len(margins), right)
-        curve = Curve.of(margins, np.zeros(len(margins)), outcomes)
-        mean = margins.mean()
-        spread = margins.std() or 1.0
-        errors = expit(curve.slope * margins + curve.intercept) - right
-        assert errors @ (margins - mean) == pytest.approx(
-            0.5 * spread * (1.0 - curve.slope * spread)
-        )
-        assert errors.sum() == pytest.approx(
-            -0.5 * (curve.intercept + curve.slope * mean)
-        )
-
-    def test_a_larger_margin_never_speaks_against_a_label(self):
-        margins = np.arange(100.0)
-        curve = Curve.of(margins, np.zeros(100), margins < 50)
-        assert 0.0 < curve.slope < 1e-3
-
-    def test_novelty_never_speaks_for_a_label(self):
-        excess = np.linspace(0.0, 1.0, 400)
-        curve = Curve.of(np.zeros(400), excess, excess > 0.5)
-        assert curve.doubt == LEAST_DOUBT
-
-    def test_without_novel_trials_the_odds_fall_as_assumed(self):
-        rng = np.random.default_rng(3)
-        excess = np.full(50, 0.2)
-        curve = Curve.of(rng.normal(size=50), excess, rng.random(50) < 0.8)
-        assert curve.doubt == pytest.approx(DOUBT)
-
-    def test_the_unit_of_the_distances_does_not_matter(self):
-        rng = np.random.default_rng(2)
-        margins = rng.normal(size=60)
-        right = rng.random(60) < 0.8
-        excess = np.zeros(60)
-        in_metres = Curve.of(margins, excess, right)
-        in_microns = Curve.of(1e-6 * margins, excess, right)
-        assert in_metres.probabilities(margins, excess) == pytest.approx(
-            in_microns.probabilities(1e-6 * margins, excess)
-        )
-
-    @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 1.0])
-    def test_the_mean_probability_is_moved_to_a_share(self, share):
-        rng = np.random.default_rng(4)
-        margins = rng.normal(size=200)
-        excess = rng.exponential(size=200)
-        curve = Curve(2.0, 0.5, 1.0).with_mean(margins, excess, share)
-        assert curve.slope == 2.0
-        assert curve.doubt == 1.0
-        expected = min(max(share, 0.5 / 200), 1.0 - 0.5 / 200)
-        assert curve.probabilities(margins, excess).mean() == pytest.approx(expected)
-
 
 SECONDS = np.array([0.4, 0.8, 1.2])
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from train.choose.choose import Chosen
 from train.choose.evaluate import Promise
+from train.choose.settings import Chosen
 from train.model.pipeline import Choice
 from train.tradeoff.commands import Commands
 from train.tradeoff.measured import Measured

@@ -437,7 +437,6 @@ def written(tmp_path_factory):
         patch.setattr(costs, "WAITS_S", (0.4,))
         patch.setattr(costs, "EVERY", ())
         patch.setattr(costs, "coarser", lambda *_: [])
-        patch.setattr(early, "FOLDS", 3)
         report = running.tradeoff([data], folder / "out", str(path), options)
     return Written(report, digest)
 

@@ -1,0 +1,52 @@
+"""Tasks whose labels are made of two others' labels: a category is softness by
+mobility."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+Labels = Mapping[str, str]
+"""{task: label} of a trial."""
+
+
+@dataclass(frozen=True)
+class Product:
+    """A task whose labels are those of its two factors, joined by a hyphen.
+
+    Attributes:
+        task: the product, such as category.
+        factors: the two tasks, in the order of their labels in the product's.
+    """
+
+    task: str
+    factors: tuple[str, str]
+
+    def label(self, labels: Labels) -> str | None:
+        """The product's label that follows from a trial's labels of both factors; None
+        where it lacks one.
+
+        >>> CATEGORY.label({"softness": "soft", "mobility": "fixed"})
+        'soft-fixed'
+        """
+        if not labels.keys() >= set(self.factors):
+            return None
+        return "-".join(labels[factor] for factor in self.factors)
+
+    def completed(self, labels: Labels) -> dict[str, str]:
+        """A trial's labels, with those of the product or of its factors that follow from
+        the others.
+
+        >>> CATEGORY.completed({"category": "soft-fixed"})
+        {'softness': 'soft', 'mobility': 'fixed', 'category': 'soft-fixed'}
+        """
+        implied: dict[str, str] = {}
+        joined = self.label(labels)
+        if labels.get(self.task, "").count("-") == 1:
+            parts = labels[self.task].split("-")
+            implied = dict(zip(self.factors, parts, strict=True))
+        elif joined is not None:
+            implied = {self.task: joined}
+        return {**implied, **labels}
+
+
+CATEGORY = Product("category", ("softness", "mobility"))
+"""The paper's categories."""

@@ -1,0 +1,83 @@
+"""Copies, first frames that tell labels, and recordings that begin in contact."""
+
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from edge.recording import Recording
+from edge.saving import save
+from train.data.dataset import read
+from train.data.leaks import copies, leaks
+
+
+@pytest.fixture
+def few(recordings, tmp_path):
+    """A folder with copies of four recordings under the same names."""
+    for name in ("hard_0", "hard_1", "soft_0", "soft_1"):
+        shutil.copy(recordings / f"{name}.npz", tmp_path)
+    return tmp_path
+
+
+def test_recordings_that_are_there_twice_are_named(few):
+    (note,) = copies(read([few, few / "hard_1.npz"]))
+    assert "1 of 5 recordings are copies" in note
+    assert f"such as {few / 'hard_1.npz'} of {few / 'hard_1.npz'};" in note
+
+
+def test_a_copy_of_another_name_is_named_with_its_original(few):
+    shutil.copy(few / "hard_0.npz", few / "hard_9.npz")
+    (note,) = copies(read([few]))
+    assert f"{few / 'hard_9.npz'} of {few / 'hard_0.npz'}" in note
+
+
+def test_recordings_of_nothing_are_no_copies(few, make_touch):
+    nothing = make_touch(seconds=0.0, labels={"category": "none", "object": "hard 0"})
+    for name in ("none_0", "none_1"):
+        save(few / f"{name}.npz", nothing)
+    assert copies(read([few])) == []
+
+
+LABELS = np.array(["a", "b"] * 10)
+REST = np.where(LABELS == "a", 3, 9)[:, None, None, None] * np.ones((1, 6, 2, 5))
+"""Frames of ten taxels whose rest values tell the label."""
+
+
+def warnings(frames, labels, onset_s=0.1):
+    """The warnings of recordings whose touch begins at some time."""
+    trials = []
+    for of_trial in frames.astype(np.uint16):
+        recording = Recording(np.arange(6) / 10.0, of_trial)
+        trials.append(SimpleNamespace(recording=recording, onset_s=onset_s))
+    return leaks(SimpleNamespace(trials=trials), {"kind": labels})
+
+
+def test_labels_told_by_the_first_frame_are_a_warning():
+    (note,) = warnings(REST, LABELS)
+    assert "the first frame alone tells kind in 100% of the trials" in note
+
+
+def test_a_first_frame_that_tells_only_which_trials_are_labelled_is_none():
+    labels = np.repeat(["a", "b", ""], [16, 6, 18])
+    frames = np.zeros((40, 6, 2, 5))
+    frames[labels == ""] = 100
+    assert warnings(frames, labels) == []
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_single_label_is_told_by_no_other_trial(count):
+    labels = np.where(np.arange(20) < count, "a", "")
+    assert warnings(REST, labels) == []
+
+
+def test_recordings_that_begin_in_contact_are_a_warning():
+    (note,) = warnings(REST, LABELS, onset_s=0.0)
+    assert "begin with their recording, so their onset is not known; record" in note
+
+
+def test_thresholds_by_which_contact_begins_later_are_named():
+    growing = REST.copy()
+    growing[:, 1:] = 50
+    (note,) = warnings(growing, LABELS, onset_s=0.0)
+    assert "or take --threshold 18 --onset 27, by which it begins later" in note

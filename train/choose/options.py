@@ -1,0 +1,167 @@
+"""The settings that a fit holds fixed, and the trials that it then measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from joblib import cpu_count
+
+from edge.errors import InputError
+from edge.touch.arm import Chain
+from edge.touch.features import SAMPLES
+from train.choose.candidates import Candidate, Fixed, candidates, features_of
+from train.choose.choose import Choosing
+from train.data import thresholds
+from train.data.contacts import Untouched
+from train.data.dataset import DataSet, Measurement, Recordings, load_trials
+from train.data.groups import LEAVE_OUT, Divisions, are_drawn, kinds_of
+from train.data.tasks import labels_of_tasks
+from train.data.vectors import Labels
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions(Fixed):
+    """The settings that a fit holds fixed; it chooses the others."""
+
+    window_s: float | None = None
+    samples: int = SAMPLES
+    tasks: Sequence[str] | None = None
+    leave_out: str = LEAVE_OUT
+    decision_points_s: Sequence[float] | None = None
+    threshold: int | None = None
+    onset: int | None = None
+    arm: Chain | None = None
+    quick: bool = False
+    jobs: int | None = None
+    progress: bool = False
+
+    @property
+    def processes(self) -> int:
+        """Number of processes."""
+        return self.jobs or cpu_count()
+
+    @property
+    def fixed_window_s(self) -> float | None:
+        """The window that is asked for; None where it is to be chosen."""
+        if self.window_s is None and self.decision_points_s:
+            return self.decision_points_s[-1]
+        return self.window_s
+
+    def candidates_for(
+        self,
+        dataset: DataSet,
+        y: Labels,
+        *,
+        drawn: bool,
+    ) -> list[Candidate]:
+        """The candidates for some trials."""
+        joints = dataset.joints > 0
+        shear = dataset.layout.axes is not None
+        return candidates(
+            y,
+            self,
+            joints=joints,
+            shear=shear,
+            drawn=drawn,
+            quick=self.quick,
+        )
+
+    def choosing(self, dataset: DataSet, y: Labels, *, drawn: bool) -> Choosing:
+        """The choice of the settings of some trials.
+
+        Raises:
+            InputError: `k` is not possible where some of them are left out.
+        """
+        divisions = Divisions.of(dataset, y, self.leave_out, self.quick)
+        most = divisions.fewest_left
+        if self.k is not None and not 1 <= self.k <= most:
+            raise InputError(
+                f"k must be 1 to {most}, the trials that remain of "
+                f"{len(divisions.folds)} where some are left out, not {self.k}"
+            )
+        return Choosing(
+            dataset,
+            y,
+            self.candidates_for(dataset, y, drawn=drawn),
+            divisions,
+            self.samples,
+            self.processes,
+            self.progress,
+        )
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """The trials of a fit.
+
+    Attributes:
+        dataset: with the features of every candidate.
+        windows: that may be chosen, the usual one first.
+        notes: sentences that a user should read.
+    """
+
+    dataset: DataSet
+    windows: tuple[float, ...]
+    notes: list[str]
+
+
+def trials_of(
+    recordings: Recordings,
+    windows: tuple[float, ...],
+    options: FitOptions,
+) -> Loaded:
+    """The trials of recordings, up to the last of some windows, by thresholds that are
+    given, saved, proposed or chosen."""
+    usual = candidates(
+        {},
+        options,
+        joints=recordings.joints,
+        shear=recordings.shear,
+        drawn=kinds_of(recordings.recordings) is not None,
+        quick=options.quick,
+    )
+    measurement = Measurement(features_of(usual), windows[-1], arm=options.arm)
+
+    def by(threshold: int | None, onset: int | None) -> DataSet:
+        return load_trials(
+            recordings,
+            replace(measurement, threshold=threshold, onset=onset),
+            partial=True,
+            progress=options.progress,
+            jobs=options.processes,
+        )
+
+    def accuracy(trials: DataSet) -> float:
+        hasty = replace(options, quick=True, progress=False)
+        y = labels_of_tasks(trials, options.tasks)
+        choosing = hasty.choosing(trials, y, drawn=are_drawn(trials))
+        return choosing.accuracy(windows[0])
+
+    if options.threshold is not None or options.onset is not None:
+        return Loaded(by(options.threshold, options.onset), windows, [])
+    dataset, notes = _by_noise(recordings, by)
+    if not any("simulation" in r.meta for r in recordings.recordings):
+        dataset, lower = thresholds.chosen(dataset, by, accuracy)
+        notes += lower
+    return Loaded(dataset, windows, notes)
+
+
+def _by_noise(
+    recordings: Recordings,
+    by: Callable[[int | None, int | None], DataSet],
+) -> tuple[DataSet, list[str]]:
+    """The trials by the thresholds that the skin was saved with, or else by those that
+    its noise suggests, and the warning of these."""
+    reason = "the skin was saved without thresholds"
+    if "threshold_counts" in recordings.of_owner[0].meta.get("skin", {}):
+        try:
+            return by(None, None), []
+        except Untouched:
+            reason = "no recording has a contact at its own thresholds"
+    proposal = thresholds.proposed(recordings.of_owner)
+    warning = (
+        f"warning: {reason}; a threshold of {proposal.threshold} and an onset of "
+        f"{proposal.onset} counts come from {proposal.source}"
+    )
+    return by(proposal.threshold, proposal.onset), [warning]

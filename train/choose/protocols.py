@@ -1,0 +1,153 @@
+"""What is left out to choose a task's settings and to measure them: single trials, or
+entire groups of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from edge.arrays import Integers
+from train.choose.candidates import Candidate, costs, places_of
+from train.choose.evaluate import (
+    VARIANCE,
+    AnswerTable,
+    Promise,
+    Result,
+    Rule,
+    chosen,
+    chosen_by_fold,
+    chosen_by_other_fold,
+    nested_accuracy,
+)
+from train.data.groups import TRIAL, Groups
+from train.data.labels import NO_CONTACT
+from train.data.vectors import Strings
+from train.model.pipeline import Choice
+
+UNSEEN_MARGIN = 0.01
+"""Accuracy on left-out groups within which the cheaper candidate is taken."""
+
+
+@dataclass(frozen=True)
+class TrialsLeftOut:
+    """The choice by answers to single trials that are left out.
+
+    Attributes:
+        table: the answers.
+        widths: {feature: its columns}, by which a candidate has a price.
+    """
+
+    table: AnswerTable
+    widths: Mapping[str, int]
+
+    @property
+    def name(self) -> str:
+        """What is left out."""
+        return TRIAL
+
+    @property
+    def folds(self) -> Integers:
+        """(n,) the fold of each trial."""
+        return self.table.folds
+
+    def margin(self, task: str) -> float:
+        """Accuracy within which the cheaper candidate is taken."""
+        return 0.0
+
+    def count(self, labels: Strings) -> int:
+        """Number of groups among the trials with a label (n,); 0 for single trials."""
+        return 0
+
+    def rule(self, task: str) -> Rule:
+        """The rule that chooses among the candidates."""
+        prices = costs(self.table.choices[task], self.widths)
+        return Rule(prices, margin=self.margin(task))
+
+    def choice(self, task: str) -> Choice:
+        """A task's settings."""
+        place = chosen(self.table, task, self.rule(task))
+        return self.table.choices[task][place]
+
+    def by_fold(self, task: str) -> list[Choice]:
+        """[fold] a task's settings chosen without what is left out."""
+        places = chosen_by_fold(self.table, task, self.rule(task))
+        return [self.table.choices[task][place] for place in places]
+
+    def without(self, task: str, folds: Integers) -> list[Choice]:
+        """[fold] a task's settings chosen without the trials of one of the folds (n,)
+        of single trials."""
+        return self.by_fold(task)
+
+    def with_neighbours(self, task: str, k: int, folds: Integers) -> list[Choice]:
+        """A task's settings of k neighbours, and those chosen without each of the folds
+        (n,) of single trials."""
+        choices = self.table.choices[task]
+        allowed = np.flatnonzero([choice.k == k for choice in choices])
+        rule = replace(self.rule(task), allowed=allowed)
+        others = chosen_by_other_fold(self.table, task, folds, rule)
+        return [choices[i] for i in (chosen(self.table, task, rule), *others)]
+
+    def accuracy(self, task: str) -> Result:
+        """The nested accuracy of the choice."""
+        return nested_accuracy(self.table, task, self.rule(task))
+
+    def answered(self, task: str, by_fold: Sequence[Choice]) -> Result:
+        """The accuracy of the choice `by_fold` for each fold on the trials of it."""
+        choices = self.table.choices[task]
+        return self.table.answered(task, list(map(choices.index, by_fold)))
+
+    def of_candidate(self, task: str, candidate: Candidate) -> tuple[Result, Choice]:
+        """The nested accuracy of a candidate's own choice, and this choice."""
+        choices = self.table.choices[task]
+        allowed = places_of(candidate, choices)
+        rule = replace(self.rule(task), allowed=allowed, margin=0.0)
+        place = chosen(self.table, task, rule)
+        return nested_accuracy(self.table, task, rule), choices[place]
+
+
+@dataclass(frozen=True)
+class GroupsLeftOut(TrialsLeftOut):
+    """The choice by answers to entire groups that are left out.
+
+    Attributes:
+        groups: of the trials.
+    """
+
+    groups: Groups
+
+    @property
+    def name(self) -> str:
+        """What is left out."""
+        return self.groups.name
+
+    def margin(self, task: str) -> float:
+        """Accuracy within which the cheaper candidate is taken."""
+        return UNSEEN_MARGIN if task in self.groups.tasks else 0.0
+
+    def count(self, labels: Strings) -> int:
+        """Number of groups among the trials with a label (n,)."""
+        return self.groups.count(labels)
+
+    def without(self, task: str, folds: Integers) -> list[Choice]:
+        """[fold] a task's settings chosen without the trials of one of the folds (n,)
+        of single trials, by answers to left-out groups too."""
+        places = chosen_by_other_fold(self.table, task, folds, self.rule(task))
+        return [self.table.choices[task][place] for place in places]
+
+
+def promised(result: Result, untouched: Sequence[str] = (), groups: int = 0) -> Promise:
+    """A result as a promise of the accuracy on other trials, or on other groups.
+
+    Args:
+        result: on the trials with a contact.
+        untouched: labels of the recordings without one. Missed touches count as wrong,
+            and recordings of no touch as right.
+        groups: number of the groups left out; 0 for single trials.
+    """
+    right = result.right + untouched.count(NO_CONTACT)
+    total = result.total + len(untouched)
+    variance = max(VARIANCE, total / groups if groups else 0.0)
+    counted = {"right": right, "total": total, "variance": variance}
+    return Promise(**{**vars(result), **counted})

@@ -1,0 +1,167 @@
+"""The contacts of recordings, and the trials that they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from edge.errors import InputError
+from edge.recording import Recording
+from edge.touch.contact import Contact, FeatureSeries
+from edge.touch.frame import Frame
+from edge.touch.layout import SkinLayout, for_device
+from edge.touch.track import ContactTracker, WatchfulTracker
+from train.data.labels import completed, labels_of
+
+Named = tuple[Recording, Path]
+"""A recording and its file."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One contact of a recording: its first, or each of them where the recording says
+    so."""
+
+    path: Path
+    recording: Recording
+    labels: dict[str, str]
+    onset_s: float
+    series: FeatureSeries
+
+
+LabelledFile = tuple[Path, dict[str, str]]
+"""A recording's file, and {task: label}."""
+
+
+class Untouched(InputError):
+    """No recording has a contact at the thresholds."""
+
+
+@dataclass(frozen=True)
+class Touched:
+    """The contacts of recordings.
+
+    Attributes:
+        trials: one for each contact that has labels.
+        untouched: files without a contact, with their labels.
+        unused: files with more contacts than labels.
+    """
+
+    trials: tuple[Trial, ...]
+    untouched: tuple[LabelledFile, ...]
+    unused: tuple[Path, ...]
+
+    @property
+    def files(self) -> list[LabelledFile]:
+        """The file and the labels of each trial, and of the untouched."""
+        files = [(trial.path, trial.labels) for trial in self.trials]
+        return [*files, *self.untouched]
+
+    @property
+    def labels(self) -> list[dict[str, str]]:
+        """The labels of each trial, and of the untouched."""
+        return [labels for _, labels in self.files]
+
+    def completed(self) -> Touched:
+        """The same contacts with the labels that follow from their others."""
+        labels = iter(completed(self.labels))
+        trials = [replace(trial, labels=next(labels)) for trial in self.trials]
+        untouched = [(path, next(labels)) for path, _ in self.untouched]
+        return Touched(tuple(trials), tuple(untouched), self.unused)
+
+    def without(self, task: str) -> tuple[Path, ...]:
+        """The files that lack a label for a task, each once."""
+        lacking = (path for path, labels in self.files if task not in labels)
+        return tuple(dict.fromkeys(lacking))
+
+    def labelled(self, tasks: Sequence[str], *, partial: bool) -> Touched:
+        """The contacts that have a label for each task; `partial`, for some.
+
+        Raises:
+            InputError: no trial has.
+        """
+        enough = any if partial else all
+
+        def suffices(labels: dict[str, str]) -> bool:
+            return enough(task in labels for task in tasks)
+
+        trials = tuple(trial for trial in self.trials if suffices(trial.labels))
+        if not trials:
+            raise InputError(f"no recording has a label for each of {', '.join(tasks)}")
+        untouched = tuple(file for file in self.untouched if suffices(file[1]))
+        return Touched(trials, untouched, self.unused)
+
+
+def collect(
+    recordings: Sequence[Named],
+    followed: Iterable[Followed],
+    layout: SkinLayout,
+) -> Touched:
+    """The trials of recordings whose contacts were followed.
+
+    Raises:
+        Untouched: no recording has a contact.
+    """
+    trials: list[Trial] = []
+    untouched = []
+    unused = []
+    for (recording, path), (touches, labels) in zip(recordings, followed, strict=True):
+        if not touches:
+            untouched.append((path, recording.labels))
+        if len(touches) > len(labels):
+            unused.append(path)
+        for trial_labels, touch in zip(labels, touches, strict=False):
+            trials.append(Trial(path, recording, trial_labels, *touch))
+    if not trials:
+        raise Untouched(
+            f"no contact in any of {len(recordings)} recordings; lower the threshold "
+            f"of {layout.threshold_counts} counts"
+        )
+    return Touched(tuple(trials), tuple(untouched), tuple(unused))
+
+
+Followed = tuple[list[tuple[float, FeatureSeries]], list[dict[str, str]]]
+"""The contacts of a recording, and the labels of those that are trials."""
+
+
+def follow(
+    recording: Recording,
+    path: Path,
+    layout: SkinLayout,
+    **tracked: Any,
+) -> Followed:
+    """The contacts of a recording, and the labels of those that are trials."""
+    try:
+        tracker = WatchfulTracker(for_device(layout, recording.layout), **tracked)
+        touches = contacts(recording, tracker)
+        return touches, labels_of(recording, len(touches))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def contacts(
+    frames: Iterable[Frame], tracker: ContactTracker
+) -> list[tuple[float, FeatureSeries]]:
+    """Onset in seconds and series of every contact of a recording, in their order."""
+    followed: dict[int, Contact] = {}
+    for frame in frames:
+        followed |= {id(contact): contact for contact in tracker.push(frame)}
+    if not followed:
+        followed = {id(contact): contact for contact in tracker.finish()}
+    return [(contact.onset_s, contact.series()) for contact in followed.values()]
+
+
+def with_thresholds(
+    layout: SkinLayout,
+    threshold: int | None,
+    onset: int | None,
+) -> SkinLayout:
+    """The skin with these thresholds; one that is None stays, or scales with the
+    other."""
+    if threshold is not None:
+        ratio = layout.onset / layout.threshold_counts if layout.threshold_counts else 1
+        begin = round(threshold * ratio) if onset is None else onset
+        return replace(layout, threshold_counts=threshold, onset_counts=begin)
+    return layout if onset is None else replace(layout, onset_counts=onset)

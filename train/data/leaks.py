@@ -1,0 +1,86 @@
+"""Signs that an accuracy will not hold in use: recordings that are copies, first frames
+that tell labels, and recordings that begin in contact."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from edge.recording import Recording
+from train.data import thresholds
+from train.data.dataset import DataSet, Recordings
+from train.data.vectors import Labels
+
+LEAK = 0.5
+"""Warn of a leak if a nearest neighbour on the first frame beats the majority class by
+more than this share of the remainder."""
+
+
+def copies(recordings: Recordings) -> list[str]:
+    """A warning where some recordings are others' copies, by which they are told."""
+    originals: dict[bytes, Path] = {}
+    copied = []
+    for path, recording in zip(recordings.paths, recordings.recordings, strict=True):
+        sha = hashlib.sha256(recording.t.tobytes())
+        sha.update(recording.frames.tobytes())
+        original = originals.get(sha.digest())
+        if original is None:
+            originals[sha.digest()] = path
+        elif recording.frames.any():
+            copied.append(f"{path} of {original}")
+    if not copied:
+        return []
+    return [
+        f"warning: {len(copied)} of {len(recordings.paths)} recordings are copies, such "
+        f"as {copied[0]}; a copy is told by its original, so the accuracy is too high: "
+        "leave copies out"
+    ]
+
+
+def leaks(dataset: DataSet, y: Labels) -> list[str]:
+    """Warnings where the first frame gives labels away, or most recordings begin in
+    contact."""
+    recordings = [t.recording for t in dataset.trials]
+    untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
+    if 2 * untouched.sum() < len(untouched):
+        return [_late_recordings(recordings, float((~untouched).mean()))]
+    X = np.stack([recording.frames[0].reshape(-1) for recording in recordings])
+    squares = cdist(X[untouched], X[untouched], "sqeuclidean")
+    np.fill_diagonal(squares, np.inf)
+    notes = []
+    for task, all_labels in y.items():
+        labelled = np.flatnonzero(all_labels[untouched])
+        if len(labelled) < 2:
+            continue
+        labels = all_labels[untouched][labelled]
+        nearest = squares[np.ix_(labelled, labelled)].argmin(axis=1)
+        share = float((labels[nearest] == labels).mean())
+        _, counts = np.unique(labels, return_counts=True)
+        usual = float(counts.max() / len(labels))
+        if share > usual + LEAK * (1.0 - usual):
+            notes.append(
+                f"warning: the first frame alone tells {task} in {share:.0%} of the "
+                "trials, before anything is touched. The accuracy holds only where "
+                "this is so in use too; `python -m train import --zero` subtracts the "
+                "first frames"
+            )
+    return notes
+
+
+def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
+    """The warning that a share of the recordings begins in contact."""
+    mend = "record from before the touch"
+    proposal = thresholds.proposed(recordings)
+    low = proposal.threshold
+    high = proposal.onset
+    with_contact, _ = thresholds.count_contacts(recordings, low, high)
+    if with_contact >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
+        mend += f", or take --threshold {low} --onset {high}, by which it begins later"
+    return (
+        f"warning: {share:.0%} of the touches begin with their recording, so their "
+        f"onset is not known; {mend}"
+    )

@@ -1,0 +1,135 @@
+"""Curves of confidence: the probability that a label is right, by its margin and by how
+unlike all trials the contact is.
+
+Logistic regression makes them (Platt, Probabilistic outputs for support vector
+machines, 1999).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import expit
+
+from edge.arrays import Booleans, Floats, Integers
+
+PULL = 0.5
+"""Weight of the prior of a margin's slope, 1 a standard deviation, and of the
+intercept's, 0."""
+DOUBT = 1.0
+"""Prior of the doubt: odds fall as the novelty rises above that of half of the trials."""
+DOUBT_PULL = 10.0
+"""Weight of this prior for an excess of a standard deviation. It is heavy because few
+held-out trials are as novel as what a robot may meet."""
+LEAST_DOUBT = 0.5
+"""The odds fall at least by the root of the novelty, for the same reason."""
+LEAST_SLOPE = 1e-3
+"""Smallest slope a standard deviation: a larger margin never makes a label less
+likely."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The probability that a label is right.
+
+    It is the logistic function of slope * margin + intercept - doubt * excess, where the
+    excess is the part of the novelty above that of half of the trials (`excess_of`).
+    """
+
+    slope: float
+    intercept: float
+    doubt: float
+
+    @classmethod
+    def of(
+        cls,
+        margins: Floats,
+        excess: Floats,
+        right: Booleans,
+    ) -> Curve:
+        """The most likely curve for some answers; arrays of one shape."""
+        columns = np.stack([margins.ravel(), -excess.ravel()], axis=1)
+        middle = columns.mean(axis=0)
+        spread = columns.std(axis=0)
+        # The spread of equal values is the rounding of their mean.
+        spread[spread <= 1e-12 * np.abs(middle)] = 1.0
+        constant = np.ones((len(columns), 1))
+        scaled = np.hstack([(columns - middle) / spread, constant])
+        prior = np.array([1.0, DOUBT * spread[1], 0.0])
+        solution = _logistic(scaled, right.ravel(), prior)
+        slopes = np.maximum(solution[:2], LEAST_SLOPE) / spread
+        intercept = float(solution[2] - slopes @ middle)
+        return cls(float(slopes[0]), intercept, max(float(slopes[1]), LEAST_DOUBT))
+
+    def with_mean(
+        self,
+        margins: Floats,
+        excess: Floats,
+        share: float,
+    ) -> Curve:
+        """The curve with the intercept at which the mean probability is `share`."""
+        half_a_trial = 0.5 / margins.size
+        target = min(max(share, half_a_trial), 1.0 - half_a_trial)
+
+        def surplus(shift: float) -> float:
+            shifted = replace(self, intercept=self.intercept + shift)
+            return float(shifted.probabilities(margins, excess).mean()) - target
+
+        reach = 50.0 + abs(self.slope) * float(np.abs(margins).max(initial=0.0))
+        shift = float(brentq(surplus, -reach, reach))
+        return replace(self, intercept=self.intercept + shift)
+
+    def probabilities(self, margins: Floats, excess: Floats) -> Floats:
+        """That labels with these margins are right, in the shape of the margins."""
+        logits = self.slope * margins + self.intercept - self.doubt * excess
+        return np.asarray(expit(logits))
+
+
+def _logistic(
+    columns: Floats,
+    right: Booleans,
+    prior: Floats,
+) -> Floats:
+    """(3,) weights of columns (m, 3) for the log odds of being right."""
+    solution = prior
+    pull = np.array([PULL, DOUBT_PULL, PULL])
+
+    def loss(parameters: Floats) -> float:
+        logits = columns @ parameters
+        log_loss = np.logaddexp(0.0, np.where(right, -logits, logits)).sum()
+        return float(log_loss + 0.5 * pull @ np.square(parameters - prior))
+
+    for _ in range(500):
+        p = expit(columns @ solution)
+        gradient = columns.T @ (p - right) + pull * (solution - prior)
+        hessian = (columns * (p * (1.0 - p))[:, None]).T @ columns + np.diag(pull)
+        step = np.linalg.solve(hessian, gradient)
+        # Far from the optimum, whole steps may go back and forth for ever. Near it,
+        # they converge, and rounding hides what the loss gains.
+        while np.abs(step).max() > 1e-3 and loss(solution - step) > loss(solution):
+            step /= 2.0
+        solution = solution - step
+        if np.abs(step).max() < 1e-10:
+            break
+    return solution
+
+
+def cross_fitted(
+    margins: Floats,
+    excess: Floats,
+    right: Booleans,
+    folds: Integers,
+    tested: Booleans,
+) -> Floats:
+    """(points, n) confidences for rules, each fold's by the curve of the other folds'
+    tested."""
+    confidences = np.zeros(right.shape)
+    for fold in range(int(folds.max()) + 1):
+        left_out = folds == fold
+        outside = tested & ~left_out
+        curve = Curve.of(margins[:, outside], excess[:, outside], right[:, outside])
+        evidence = margins[:, left_out], excess[:, left_out]
+        confidences[:, left_out] = curve.probabilities(*evidence)
+    return confidences
