@@ -15,7 +15,6 @@ from train.report.score import (
     majority,
     nested,
     paired,
-    percent,
     points,
     score,
 )
@@ -52,12 +51,6 @@ def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
     assert list(score(Result(10, 20))) == columns
 
 
-def test_a_score_lies_in_its_interval():
-    columns = score(Result(10, 20))
-    assert columns["accuracy %"] == 50.0
-    assert columns["from %"] < 50.0 < columns["to %"]
-
-
 def test_a_score_without_a_search_has_empty_settings():
     assert score(Result(10, 20, components=3, k=2))["k"] == 2
     assert score(Result(10, 20))["k"] == ""
@@ -65,10 +58,6 @@ def test_a_score_without_a_search_has_empty_settings():
 
 def test_an_interval_is_in_whole_percent():
     assert interval(Result(10, 20)) == "30 to 70"
-
-
-def test_a_percent_has_two_places():
-    assert percent(2 / 3) == 66.67
 
 
 def test_points_are_whole_and_have_a_sign():

@@ -82,7 +82,3 @@ def test_the_report_again_without_make_names_every_file():
         "python -m train tradeoff --data 'my touches' --board build/tradeoff/board.json "
         f"--out build/tradeoff --scene a.toml {COST}"
     )
-
-
-def test_a_model_without_options():
-    assert Commands(("mine",), BUILD).export() == "make export DATA=mine"
