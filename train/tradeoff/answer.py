@@ -150,8 +150,9 @@ def reasons(measured: Measured) -> Section:
     notes += [
         *measured.notes,
         f"All accuracies belong to the {kind}, made at windows of "
-        f"{windows} s; {between} s are left out where the accuracies before and after "
-        "do not differ by more than chance. To export one of "
+        f"{windows} s; {between} s are left out where the accuracies of "
+        f"{next(iter(measured.y))} before and after do not differ by more than chance. "
+        "To export one of "
         f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
         "of at most 0.9 s) or `accurate` in place of `fast`; `500` is the most accurate "
         "one within 500 ms, and `0.8` the fastest one that reaches 80 %.",

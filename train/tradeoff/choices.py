@@ -26,7 +26,7 @@ WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
 """Windows of the report, closer where most things begin to move."""
 BETWEEN_S = {0.9: (0.8, 1.0), 1.1: (1.0, 1.2)}
-"""{window: those before and after it}; where the accuracies of these do not differ by
+"""{window: those before and after it}; where the main task's accuracies at these do not differ by
 more than chance, the curve is flat and the window is left out."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
@@ -102,11 +102,12 @@ def chosen(
 def choices_at(
     dataset: DataSet,
     windows: Sequence[float],
+    task: str,
     workers: Workers,
     *,
     quick: bool,
 ) -> Points:
-    """The choice at each window, but for those of `BETWEEN_S` where the curve is
+    """The choice at each window, but for those of `BETWEEN_S` where a task's curve is
     flat."""
 
     def made(times_s: Sequence[float]) -> dict[float, dict[str, Chosen]]:
@@ -117,19 +118,18 @@ def choices_at(
     points = made([w for w in windows if w not in BETWEEN_S])
     steep = []
     for window_s, (before_s, after_s) in BETWEEN_S.items():
-        if window_s in windows and differ(points[before_s], points[after_s]):
-            steep.append(window_s)
+        if window_s in windows:
+            if differ(points[before_s][task], points[after_s][task]):
+                steep.append(window_s)
     return dict(sorted((points | made(steep)).items()))
 
 
-def differ(before: Mapping[str, Chosen], after: Mapping[str, Chosen]) -> bool:
-    """Whether two choices differ in some task's accuracy by more than chance."""
-    for task, choice in before.items():
-        hits = np.asarray(choice.by_trial.hits)
-        _, low, high = paired(hits, np.asarray(after[task].by_trial.hits))
-        if low > 0.0 or high < 0.0:
-            return True
-    return False
+def differ(before: Chosen, after: Chosen) -> bool:
+    """Whether the accuracies of two choices for a task differ by more than chance."""
+    hits_before = np.asarray(before.by_trial.hits)
+    hits_after = np.asarray(after.by_trial.hits)
+    _, low, high = paired(hits_before, hits_after)
+    return low > 0.0 or high < 0.0
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -100,7 +100,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     dataset = ready.dataset
     require_enough(len(dataset.trials))
     main = _main_task(dataset, options.task)
-    points = choices_at(dataset, ready.windows, workers, quick=quick)
+    points = choices_at(dataset, ready.windows, main, workers, quick=quick)
     rate = _rate_hz(raw.recordings)
     comparisons = early.compare_stopping(
         dataset,

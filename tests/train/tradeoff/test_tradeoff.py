@@ -98,7 +98,7 @@ def test_a_window_on_a_flat_part_of_the_curve_is_left_out(monkeypatch):
 
     monkeypatch.setattr(choices, "chosen", choice)
     workers = Workers(progress=False)
-    points = choices.choices_at(None, list(right), workers, quick=True)
+    points = choices.choices_at(None, list(right), "t", workers, quick=True)
     assert list(points) == [0.8, 0.9, 1.0, 1.2]
 
 
