@@ -117,10 +117,10 @@ def choices_at(
 
     points = made([w for w in windows if w not in BETWEEN_S])
     steep = []
-    for window_s, (before_s, after_s) in BETWEEN_S.items():
-        if window_s in windows:
-            if differ(points[before_s][task], points[after_s][task]):
-                steep.append(window_s)
+    for window_s in filter(BETWEEN_S.get, windows):
+        before_s, after_s = BETWEEN_S[window_s]
+        if differ(points[before_s][task], points[after_s][task]):
+            steep.append(window_s)
     return dict(sorted((points | made(steep)).items()))
 
 
