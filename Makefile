@@ -223,17 +223,14 @@ ifdef BOARD
 tradeoff: $(READY)
 else
 BOARD := $(OUT)/tradeoff/board.json
-FORMATS := $(OUT)/tradeoff/formats.json
 tradeoff: $(READY)
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) --out $(OUT)/tradeoff --check
 	$(BIN)/python -m export --data $(RECORDINGS) --out $(OUT)/tradeoff \
 	  $(filter --quick,$(TRADEOFF))
 	$(BIN)/edge-classify bench --model $(OUT)/tradeoff/model.onnx --out $(BOARD)
-	$(BIN)/python -m export.arithmetic --model $(OUT)/tradeoff/model.onnx \
-	  --golden $(OUT)/tradeoff/golden.npz --out $(FORMATS)
 endif
 	$(BIN)/python -m train tradeoff --data $(RECORDINGS) $(STUDIED) --board $(BOARD) \
-	  $(addprefix --formats ,$(FORMATS)) --out $(OUT)/tradeoff $(TRADEOFF)
+	  --out $(OUT)/tradeoff $(TRADEOFF)
 
 # The site, with the Python reference from the docstrings; a broken link is an error.
 $(VENV)/.docs: $(READY)

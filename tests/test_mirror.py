@@ -43,7 +43,7 @@ def specified(module):
     if module.parent.name in ("commands", "tools"):
         imported += rf"|main\(\[\"{name.strip('_')}\"|run\(\"{name}\"|edge\(\"{name}\""
     if module.parent.name == "effects":
-        imported += rf"|\"{name}\""
+        imported += rf"|\"{name}\"|\b{name}="
     return any(re.search(imported, text) for text in TESTS.values())
 
 

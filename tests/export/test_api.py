@@ -10,7 +10,6 @@ from edge.model.model import Model
 from edge.model.verify import verify
 from edge.recording import load
 from edge.saving import save
-from export.api import measure
 from train.model.pipeline import ContactClassifier
 from train.report.summary import names, warnings
 
@@ -60,12 +59,6 @@ def test_trials_of_one_recording_are_numbered_and_too_many_names_are_left_out(
     info = Model(tmp_path / "model.onnx").info
     assert info.trials == ()
     assert info.trial(3) == "trial 3"
-
-
-def test_each_candidate_has_a_price(fitted):
-    (price,) = measure(fitted)
-    assert price[0] > 0.0
-    assert 1.0 < price[1] < 100.0
 
 
 def test_tasks_of_different_features_share_one_vector(recordings, tmp_path):

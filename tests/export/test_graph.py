@@ -218,15 +218,6 @@ OF_TWO_SPACES = {
 """Tasks of which three share a space."""
 
 
-def test_tasks_of_one_space_have_their_own_neighbours(export):
-    X = features(50)
-    fitted, model = export(X, OF_TWO_SPACES)
-    components = {task: fit.components for task, fit in fitted.tasks_.items()}
-    assert components == {"a": 20, "b": 3, "c": 7, "d": 20}
-    queries = np.concatenate([X, features(40, seed=1)])
-    assert differences(fitted, model.run(queries), queries) == []
-
-
 def test_tasks_of_one_space_share_its_projection_but_not_their_rows(export):
     _, model = export(features(50), OF_TWO_SPACES)
     proto = onnx.load(model.path)

@@ -23,8 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(
         "--scene",
-        help="the scene that the recordings were simulated from: adds the analyses that simulate "
-        "anew (speeds, stiffness, sensor effects) and the paper's numbers",
+        help="the scene that the recordings were simulated from: adds the paper's numbers",
     )
     option(
         "--out",

@@ -29,8 +29,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option("--board", metavar="board.json", help=text)
     text = "only see whether there are enough recordings, before the long work"
     option("--check", action="store_true", help=text)
-    text = "file that `python -m export.arithmetic` wrote of that model: adds its number formats"
-    option("--formats", metavar="formats.json", help=text)
     option(
         "--cost",
         type=cost,
@@ -88,7 +86,6 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("give --board board.json, which `edge-classify bench` writes")
     options = Options(
         scene=arguments.scene,
-        formats=arguments.formats,
         task=arguments.task,
         wrong=arguments.cost[0],
         second=arguments.cost[1],

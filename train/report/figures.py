@@ -230,7 +230,6 @@ def bars(
     *,
     marks: Mapping[str, Mapping[str, float]] | None = None,
     mark: str = "paper",
-    reference: Mapping[str, float] | None = None,
 ) -> Figure:
     """Bars of accuracy with intervals; those of a name's groups lie side by side.
 
@@ -241,7 +240,6 @@ def bars(
         groups: {group: result for each name}.
         marks: {group: {name: percent}} of diamonds.
         mark: the diamonds' name in the legend.
-        reference: {text: percent} of vertical lines.
     """
     m = len(names)
     g = len(groups)
@@ -271,8 +269,6 @@ def bars(
         if diamonds:
             style = {"color": "black", "mfc": "gold", "ms": 5, "ls": "", "label": mark}
             axes.plot(*zip(*diamonds, strict=True), marker="D", **style)
-        for text, at in (reference or {}).items():
-            axes.axvline(at, color="0.35", lw=1, ls=":", label=text)
         axes.set_yticks(
             range(m), [textwrap.fill(n, 18 if phone else 40) for n in names]
         )

@@ -1,7 +1,6 @@
-"""The accuracies of the reports (nested, leave-one-out, transferred) and their
-columns."""
+"""The accuracies of the reports (nested, leave-one-out) and their columns."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -106,32 +105,6 @@ def grid_search(
         )
         results[task] = voted(rows, labels, components, k)
     return results
-
-
-def transfer(
-    X: Floats,
-    y: Labels,
-    chosen: Mapping[str, Result],
-    changed: Floats,
-) -> dict[str, Result]:
-    """Each task's accuracy when a classifier is trained on trials and tested on changed
-    ones.
-
-    A trial and its changed version have the same random draws, so one would recognise
-    the other. As in leave-one-out, the training set never has the test trial's own
-    version.
-
-    Args:
-        X: (n, p) training trials.
-        y: labels of both.
-        chosen: components and k of each task, as `grid_search` chose them on X.
-        changed: (n, p) the same trials, changed.
-    """
-    rows = neighbours(X, changed)
-    return {
-        task: voted(rows, y[task], best.components, best.k)
-        for task, best in chosen.items()
-    }
 
 
 def majority(y: Strings) -> Result:

@@ -19,7 +19,7 @@ from train.report.work import Workers
 from train.simulate import scene as scenes
 from train.simulate.run import write as simulate
 from train.simulate.scene_model import Scene
-from train.study import methods, paper, robust, sweeps
+from train.study import methods, paper, sweeps
 from train.study.context import Context
 
 COMPARED = (sweeps.resolution, sweeps.scaling, sweeps.features)
@@ -33,7 +33,6 @@ ANALYSES: tuple[Callable[[Context], Section | None], ...] = (
     sweeps.window,
     sweeps.scaling,
     sweeps.features,
-    robust.section,
 )
 """The report's analyses, in its order; one that does not apply to the data set gives
 None."""
@@ -58,6 +57,24 @@ def _studied(data: Sequence[str]) -> DataSet:
     return dataset
 
 
+def require_scene(dataset: DataSet, scene: Scene) -> None:
+    """Refuse trials that were not simulated from a scene.
+
+    Raises:
+        InputError: the sentence names the first of them.
+    """
+    for trial in dataset.trials:
+        meta = trial.recording.meta
+        simulation = meta.get("simulation")
+        seed = simulation.get("seed") if isinstance(simulation, dict) else None
+        is_of_seed = seed in (None, scene.seed)  # early recordings name no seed
+        if meta.get("source") != f"simulated: {scene.name}" or not is_of_seed:
+            raise InputError(
+                f"{trial.path}: was not simulated from the scene {scene.name} with seed "
+                f"{scene.seed}; give its scene, or study the recordings without a scene"
+            )
+
+
 def study(
     data: Sequence[str],
     out: Path,
@@ -73,20 +90,23 @@ def study(
         data: recordings and folders of them.
         out: folder of the report.
         scene: the scene that the recordings were simulated from; without it, the
-            analyses that simulate again are left out.
+            paper's numbers are left out.
         jobs: processes on this machine.
         address: address of a Dask scheduler that runs the sweeps instead.
         seeds: number of data sets of the scene, including these recordings, whose mean
             is compared with the paper's numbers.
 
     Raises:
-        InputError: the data set cannot be used, or there is no scheduler.
+        InputError: the data set cannot be used, its trials are not of the scene, or
+            there is no scheduler.
     """
     if seeds < 1:
         raise InputError(f"--seeds must be at least 1, not {seeds}")
     workers = Workers(jobs, None if address is None else "dask")
     source = None if scene is None else scenes.load(scene)
     dataset = _studied(data)
+    if source is not None:
+        require_scene(dataset, source)
     context = Context(dataset, source, workers)
     constant = [task for task in dataset.tasks if task not in context.labels]
     if not context.labels:
@@ -103,9 +123,8 @@ def study(
 
 def _analysed(context: Context, seeds: int) -> list[Section]:
     """The sections of the analyses that apply to the data set, in their order."""
-    # The last comes first, because it notices when the recordings are of another scene.
-    sections = [analysis(context) for analysis in reversed(ANALYSES)]
-    applicable = list(filter(None, reversed(sections)))
+    sections = [analysis(context) for analysis in ANALYSES]
+    applicable = list(filter(None, sections))
     scene = context.scene
     if scene is not None:
         numbers = [_numbers(applicable)]

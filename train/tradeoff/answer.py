@@ -6,7 +6,7 @@ from train.data.folds import finest
 from train.report.figures import HATCHES, PHONE, STROKES, curve, legend, picture, spread
 from train.report.score import majority, percent, points, shares
 from train.report.section import Figure, Row, Section, Table
-from train.tradeoff.choices import unseen
+from train.tradeoff.choices import BETWEEN_S, unseen
 from train.tradeoff.early import FOLDS, StoppingComparison
 from train.tradeoff.measured import Measured
 from train.tradeoff.slider import slider
@@ -144,10 +144,15 @@ def reasons(measured: Measured) -> Section:
             "each object's friction and mass."
         )
     commands = measured.commands
+    windows = ", ".join(f"{window:g}" for window in measured.points)
+    between = " and ".join(f"{window:g}" for window in BETWEEN_S)
     kind = "quick choice" if commands.quick else "choice of `make export`"
     notes += [
         *measured.notes,
-        f"All accuracies belong to the {kind}, made at each window. To export one of "
+        f"All accuracies belong to the {kind}, made at windows of "
+        f"{windows} s; {between} s are left out where the accuracies of "
+        f"{next(iter(measured.y))} before and after do not differ by more than chance. "
+        "To export one of "
         f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
         "of at most 0.9 s) or `accurate` in place of `fast`; `500` is the most accurate "
         "one within 500 ms, and `0.8` the fastest one that reaches 80 %.",

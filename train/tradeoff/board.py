@@ -62,36 +62,6 @@ def read(path: str | os.PathLike[str]) -> Board:
     return board
 
 
-FORMAT = (
-    "format",
-    "decision us",
-    "size kB",
-    "other labels %",
-    "other distances alone %",
-)
-
-
-def read_formats(path: str | os.PathLike[str]) -> list[dict[str, str | float]]:
-    """Size, time and deviations of a model in each number format.
-
-    Args:
-        path: file that `python -m export.arithmetic` wrote.
-
-    Raises:
-        InputError: the file is missing or has other contents; the sentence names it.
-    """
-    name = os.fspath(path)
-    remedy = f"make one with `python -m export.arithmetic --out {name}`"
-    with json_file(name, "a file of number formats", remedy) as content:
-        return [
-            {
-                "format": str(row["format"]),
-                **{key: float(row[key]) for key in FORMAT[1:]},
-            }
-            for row in content
-        ]
-
-
 def section(board: Board) -> Section:
     """The figures in the board file."""
     rows = [

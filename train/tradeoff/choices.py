@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from edge.touch.features import WINDOW_S
 from edge.touch.layout import SkinLayout
@@ -15,11 +18,16 @@ from train.data.dataset import DataSet, Measurement, Recordings, load_trials
 from train.data.feature_sets import expand
 from train.data.groups import TRIAL, kinds_of
 from train.fitting import fit
+from train.report.score import paired
+from train.report.work import Workers
 
 WINDOWS_S = tuple(round(0.1 * i, 1) for i in range(2, 13))
 """Decision points of the report's early decisions."""
 CHOSEN_S = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0, 1.1, 1.2)
 """Windows of the report, closer where most things begin to move."""
+BETWEEN_S = {0.9: (0.8, 1.0), 1.1: (1.0, 1.2)}
+"""{window: those before and after it}; where the main task's accuracies at these do not differ by
+more than chance, the curve is flat and the window is left out."""
 Points = Mapping[float, Mapping[str, Chosen]]
 """{window: {task: the choice at that window}}."""
 
@@ -89,6 +97,39 @@ def chosen(
     default a quick one."""
     usual = {"quick": True, "decision_points_s": (), "jobs": 1}
     return fit(dataset, window_s=window_s, **{**usual, **options}).chosen
+
+
+def choices_at(
+    dataset: DataSet,
+    windows: Sequence[float],
+    task: str,
+    workers: Workers,
+    *,
+    quick: bool,
+) -> Points:
+    """The choice at each window, but for those of `BETWEEN_S` where a task's curve is
+    flat."""
+
+    def made(times_s: Sequence[float]) -> dict[float, dict[str, Chosen]]:
+        cases = [(dataset, window_s) for window_s in times_s]
+        results = workers.map("windows", partial(chosen, quick=quick), cases)
+        return dict(zip(times_s, results, strict=True))
+
+    points = made([w for w in windows if w not in BETWEEN_S])
+    steep = []
+    for window_s in filter(BETWEEN_S.get, windows):
+        before_s, after_s = BETWEEN_S[window_s]
+        if differ(points[before_s][task], points[after_s][task]):
+            steep.append(window_s)
+    return dict(sorted((points | made(steep)).items()))
+
+
+def differ(before: Chosen, after: Chosen) -> bool:
+    """Whether the accuracies of two choices for a task differ by more than chance."""
+    hits_before = np.asarray(before.by_trial.hits)
+    hits_after = np.asarray(after.by_trial.hits)
+    _, low, high = paired(hits_before, hits_after)
+    return low > 0.0 or high < 0.0
 
 
 def unseen(choice: Chosen) -> Result | None:

@@ -18,7 +18,6 @@ class Commands:
         scene: the scene that the recordings were simulated from, or None.
         quick: whether the report's choices are quick ones.
         board: the board file; by default the one that make writes.
-        formats: the file of number formats, or None.
         task: of front.json, where it was named.
     """
 
@@ -27,7 +26,6 @@ class Commands:
     scene: str | None = None
     quick: bool = False
     board: Path | None = None
-    formats: Path | None = None
     task: str | None = None
 
     def export(self, *options: str) -> str:
@@ -56,7 +54,6 @@ class Commands:
                 "--board": board,
                 "--out": self.out,
                 "--scene": self.scene,
-                "--formats": self.formats,
             }
             for option, file in files.items():
                 words += [] if file is None else [option, str(file)]
@@ -65,9 +62,6 @@ class Commands:
         facts = self._facts
         if board != self.out / "board.json":
             facts += f" BOARD={board}"
-        # make measures the formats where it measures the board.
-        if self.formats not in (None, self.out / "formats.json"):
-            words += ["--formats", str(self.formats)]
         return f'make tradeoff{facts} TRADEOFF="{" ".join([*words, options])}"'
 
     @property
@@ -84,7 +78,7 @@ class Commands:
     @property
     def _by_make(self) -> bool:
         """Whether make can say it: it takes no name that a shell must have quoted."""
-        files = (self.out, self.scene, self.board, self.formats, self.task)
+        files = (self.out, self.scene, self.board, self.task)
         names = [*self.data, *map(str, filter(None, files))]
         plain = all(shlex.quote(name) == name for name in names)
         return self.out.name == "tradeoff" and plain

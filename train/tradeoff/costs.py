@@ -67,9 +67,7 @@ def changes(raw: Recordings, dataset: DataSet, rate_hz: float) -> list[Change]:
         dataset: their trials.
         rate_hz: frames a second.
     """
-    # The longest first: it runs beside the others.
-    cases = [Change(ALL, "longer training", raw, options={"quick": False})]
-    cases += _fewer_frames(raw, dataset.layout, rate_hz)
+    cases = list(_fewer_frames(raw, dataset.layout, rate_hz))
     cases += _fewer_taxels(raw, dataset.layout)
     paper = {"features": ["paper"]}
     name = "the paper's features"
@@ -172,6 +170,8 @@ def measure(
     windows: Points,
     rate_hz: float,
     workers: Workers,
+    *,
+    quick: bool,
 ) -> list[Row]:
     """A row for each change, beside the choice at `WINDOW_S` on the recordings as they
     are.
@@ -183,16 +183,24 @@ def measure(
             other change with the quick choice.
         rate_hz: frames a second.
         workers: the processes.
+        quick: whether the choices at each window are quick ones; if not, that at
+            `WINDOW_S` is the choice among all candidates.
     """
     full = hits(dataset, windows[WINDOW_S])
     rows = []
     for w in WAITS_S:
         wait = Change(f"waiting {w:g} s", f"{WINDOW_S - w:.1f} s sooner", dataset)
         rows.append(row_of(wait, full, hits(dataset, windows[w]), 0.0))
+    thorough = Change(ALL, "longer training", raw, options={"quick": False})
     cases = changes(raw, dataset, rate_hz)
-    quick = Change("the quick choice", "", dataset)
-    jobs = [(case, dataset.layout) for case in (quick, *cases)]
+    if quick:
+        # The longest first: it runs beside the others.
+        cases.insert(0, thorough)
+    unchanged = Change("the quick choice", "", dataset)
+    jobs = [(case, dataset.layout) for case in (unchanged, *cases)]
     (base, _), *afters = workers.map("costs", answered, jobs)
+    if not quick:
+        rows.append(row_of(thorough, base, full, 0.0))
     for case, (after, seconds) in zip(cases, afters, strict=True):
         rows.append(row_of(case, base, after, seconds))
     return rows
@@ -216,17 +224,7 @@ def row_of(
 
 
 def section(measured: Measured) -> Section:
-    """A row for each change, number format and board."""
-    rows = list(measured.costs)
-    for form in measured.formats:
-        price = (
-            f"{form['size kB']:.0f} kB; {form['other labels %']:.1f} % of the labels "
-            f"differ; {form['other distances alone %']:.0f} % of the distances depend "
-            "on the batch"
-        )
-        row: Row = {"change": form["format"], "saves or costs": price}
-        row[TIME] = f"{form['decision us']:.0f} us to decide"
-        rows.append(row)
+    """A row for each change."""
     title = "Accuracy gained or lost by each change"
     return Section(
         "Savings, and the accuracy that they cost",
@@ -235,11 +233,14 @@ def section(measured: Measured) -> Section:
             "of the choice above, everything else of the quick choice, which is made "
             "again with the features that suit the change. A larger taxel reads the sum "
             "of the forces on its area. The last section explains points and intervals.",
-            "The rows of number formats are about the exported graph, measured with "
-            "`python -m export.arithmetic` on this machine. Labels are compared on "
-            "the model's golden vectors. A distance depends on the batch if it has "
-            "other bits when its vector is decided alone. Only whole numbers give the "
-            "same bits in any order of summation, and so on every machine.",
         ],
-        [Table("costs", title, rows, timed=(TIME,), narrow=1 + len(measured.y))],
+        [
+            Table(
+                "costs",
+                title,
+                measured.costs,
+                timed=(TIME,),
+                narrow=1 + len(measured.y),
+            )
+        ],
     )

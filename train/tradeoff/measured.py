@@ -32,7 +32,6 @@ class Measured:
         notes: sentences of the choice.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
-        formats: the number formats (`board.read_formats`); empty if unknown.
         shear: the choices with shear and without; None of recordings without it.
     """
 
@@ -47,7 +46,6 @@ class Measured:
     notes: Sequence[str] = ()
     wrong: float = 10.0
     second: float = 1.0
-    formats: Sequence[Mapping[str, str | float]] = ()
     shear: Compared | None = None
 
     @property

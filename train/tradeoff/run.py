@@ -4,7 +4,6 @@ board."""
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from train.simulate import scene as scenes
 from train.tradeoff import answer, costs, early, shear
 from train.tradeoff import board as boards
 from train.tradeoff.breakaway import breakaway_times
-from train.tradeoff.choices import WINDOWS_S, Points, chosen, prepared
+from train.tradeoff.choices import WINDOWS_S, Points, choices_at, prepared
 from train.tradeoff.commands import Commands
 from train.tradeoff.front import ParetoFront
 from train.tradeoff.measured import Measured
@@ -60,8 +59,6 @@ class Options:
     Attributes:
         scene: the file of the scene that the recordings were simulated from, for the
             physical limit.
-        formats: the file that `python -m export.arithmetic` wrote about the board's
-            model.
         task: of front.json; by default `category`, or else the first.
         wrong, second: an owner's price of a wrong decision, and of waiting for a
             second.
@@ -70,7 +67,6 @@ class Options:
     """
 
     scene: str | None = None
-    formats: str | None = None
     task: str | None = None
     wrong: float = 10.0
     second: float = 1.0
@@ -96,7 +92,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     """
     workers = Workers(options.jobs)
     board = boards.read(board_path)
-    formats = [] if options.formats is None else boards.read_formats(options.formats)
     scene = None if options.scene is None else scenes.load(options.scene)
     raw = read(data, progress=True)
     boards.check(board, board_path, raw.digest)
@@ -105,9 +100,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     dataset = ready.dataset
     require_enough(len(dataset.trials))
     main = _main_task(dataset, options.task)
-    choose = partial(chosen, quick=quick)
-    results = workers.map("windows", choose, [(dataset, w) for w in ready.windows])
-    points = dict(zip(ready.windows, results, strict=True))
+    points = choices_at(dataset, ready.windows, main, workers, quick=quick)
     rate = _rate_hz(raw.recordings)
     comparisons = early.compare_stopping(
         dataset,
@@ -118,7 +111,7 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
     sheared = None
     if dataset.layout.axes:
         sheared = _sheared(dataset, points, comparisons, options)
-    rows = costs.measure(raw, dataset, points, rate, workers)
+    rows = costs.measure(raw, dataset, points, rate, workers, quick=quick)
     notes = list(ready.notes)
     if quick:
         notes.append(_quick_note(rows, main))
@@ -133,7 +126,6 @@ def tradeoff(data: Sequence[str], out: Path, board_path: str, options: Options) 
         costs=rows,
         wrong=options.wrong,
         second=options.second,
-        formats=formats,
         shear=sheared,
         commands=_commands(data, out, board_path, options),
         notes=notes,
@@ -159,7 +151,6 @@ def _commands(data: Sequence[str], out: Path, board: str, options: Options) -> C
         scene=options.scene,
         quick=options.quick,
         board=Path(board),
-        formats=None if options.formats is None else Path(options.formats),
         task=options.task,
     )
 

@@ -2,13 +2,10 @@
 number."""
 
 import numpy as np
-import onnx
-import onnxruntime
 import pytest
 
 from edge.model.model import Model
 from edge.model.verify import compared, verify
-from export.arithmetic import in_float32
 
 NAN = float("nan")
 INF = float("inf")
@@ -62,17 +59,13 @@ def test_another_shape_is_a_difference(bound):
 
 def test_an_engine_that_computes_in_float32_is_found_out(exported):
     path = exported / "model.onnx"
-    narrow = in_float32(onnx.load(path)).SerializeToString()
-    single = onnxruntime.InferenceSession(narrow)
-    names = [output.name for output in single.get_outputs()]
 
     class Narrow(Model):
-        """Runs the same file in float32."""
+        """Rounds the features as float32 does."""
 
         def run(self, vectors, decision_point=None):
-            with np.errstate(over="ignore"):
-                values = single.run(names, {"features": vectors.astype(np.float32)})
-            return dict(zip(names, values, strict=True))
+            rounded = vectors.astype(np.float32).astype(np.float64)
+            return super().run(rounded, decision_point)
 
     checks = {c.name: c for c in verify(Narrow(path), exported / "golden.npz")}
     assert not checks["category_distances"].passed

@@ -1,4 +1,4 @@
-"""Scores of the reports: their columns, the best cell, transfers, nested accuracy,
+"""Scores of the reports: their columns, the best cell, nested accuracy,
 baselines."""
 
 import numpy as np
@@ -15,10 +15,8 @@ from train.report.score import (
     majority,
     nested,
     paired,
-    percent,
     points,
     score,
-    transfer,
 )
 
 ONE = ("max_force",)
@@ -40,26 +38,6 @@ def test_the_best_cell_is_reported_with_its_answers():
     assert best.right == int((best.answers == y).sum())
 
 
-def test_a_changed_trial_is_never_recognised_by_its_own_twin():
-    """Unrelated trials are named by chance, though their twins would recognise them."""
-    rng = np.random.default_rng(4)
-    X = rng.normal(size=(40, 9))
-    y = {"t": rng.permutation(np.repeat(["a", "b"], 20))}
-    best = {"t": Result(0, 40, 8, 1)}
-    changed = transfer(X, y, best, X + 1e-6)["t"]
-    same = transfer(X, y, best, X)["t"]
-    assert changed.accuracy < 0.75
-    assert same.accuracy == accuracies(neighbours(X, features=ONE), y["t"])[7, 0]
-
-
-def test_a_change_that_moves_trials_among_others_costs():
-    X, y = clear()
-    best = grid_search(X, {"t": y})
-    assert transfer(X, {"t": y}, best, X + 0.01)["t"].accuracy > 0.8
-    next_trials = np.roll(X, 1, axis=0)
-    assert transfer(X, {"t": y}, best, next_trials)["t"].accuracy < 0.3
-
-
 def test_nested_accuracy_of_clear_classes_is_one():
     X, y = clear()
     options = {"grid": SearchGrid("IV"), "features": ONE}
@@ -73,12 +51,6 @@ def test_a_result_has_the_same_columns_whether_a_grid_was_searched_or_not():
     assert list(score(Result(10, 20))) == columns
 
 
-def test_a_score_lies_in_its_interval():
-    columns = score(Result(10, 20))
-    assert columns["accuracy %"] == 50.0
-    assert columns["from %"] < 50.0 < columns["to %"]
-
-
 def test_a_score_without_a_search_has_empty_settings():
     assert score(Result(10, 20, components=3, k=2))["k"] == 2
     assert score(Result(10, 20))["k"] == ""
@@ -86,10 +58,6 @@ def test_a_score_without_a_search_has_empty_settings():
 
 def test_an_interval_is_in_whole_percent():
     assert interval(Result(10, 20)) == "30 to 70"
-
-
-def test_a_percent_has_two_places():
-    assert percent(2 / 3) == 66.67
 
 
 def test_points_are_whole_and_have_a_sign():

@@ -82,16 +82,3 @@ def test_the_report_again_without_make_names_every_file():
         "python -m train tradeoff --data 'my touches' --board build/tradeoff/board.json "
         f"--out build/tradeoff --scene a.toml {COST}"
     )
-
-
-def test_the_report_again_with_number_formats():
-    of_make = Commands(("mine",), BUILD, formats=BUILD / "formats.json")
-    assert of_make.tradeoff(COST) == f'make tradeoff DATA=mine TRADEOFF="{COST}"'
-    of_board = Commands(("mine",), BUILD, formats=Path("pi.json"))
-    assert of_board.tradeoff(COST) == (
-        f'make tradeoff DATA=mine TRADEOFF="--formats pi.json {COST}"'
-    )
-
-
-def test_a_model_without_options():
-    assert Commands(("mine",), BUILD).export() == "make export DATA=mine"

@@ -5,6 +5,7 @@ import json
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from train.commands.tradeoff import cost
 from train.data.dataset import Recordings, read
 from train.data.parts import part
 from train.model.rules import Course
+from train.report.work import Workers
 from train.tradeoff import answer, board, choices, costs, early, uses
 from train.tradeoff import run as running
 from train.tradeoff.breakaway import breakaway_times
@@ -85,6 +87,19 @@ def test_the_front_has_the_windows_that_no_other_beats_in_both():
     ]
     # As wide as that of two fifths of the trials.
     assert (best[0].low, best[0].high) == wilson(20, 40)
+
+
+def test_a_window_on_a_flat_part_of_the_curve_is_left_out(monkeypatch):
+    """Ninety trials more at 1 s than at 0.8 s, and one more at 1.2 s."""
+    right = {0.8: 5, 0.9: 50, 1.0: 95, 1.1: 95, 1.2: 96}
+
+    def choice(dataset, window_s, quick):
+        return {"t": chosen(right[window_s])}
+
+    monkeypatch.setattr(choices, "chosen", choice)
+    workers = Workers(progress=False)
+    points = choices.choices_at(None, list(right), "t", workers, quick=True)
+    assert list(points) == [0.8, 0.9, 1.0, 1.2]
 
 
 def test_objects_never_met_have_a_figure_only_where_they_were_left_out():
@@ -155,7 +170,6 @@ class TestCosts:
         raw = read([recordings])
         cases = {case.name: case for case in costs.changes(raw, followed(raw), 100.0)}
         assert list(cases) == [
-            "all candidates",
             "50 frames a second",
             "25 frames a second",
             "96 taxels",
@@ -168,6 +182,26 @@ class TestCosts:
         assert (
             cases["50 frames a second"].price == "AD7147, 2 buses at 400 kHz are enough"
         )
+
+    def test_the_choice_among_all_candidates_is_not_made_twice(self, monkeypatch):
+        """Of four trials the quick choice has two right and the full one three."""
+        trials = [SimpleNamespace(path=Path(name)) for name in "abcd"]
+        dataset = SimpleNamespace(trials=trials, layout=None)
+        full = {"t": chosen(3, of=4)}
+        made = []
+
+        def answered(change, like):
+            made.append(change.name)
+            return costs.hits(dataset, {"t": chosen(2, of=4)}), 1.0
+
+        monkeypatch.setattr(costs, "changes", lambda *_: [])
+        monkeypatch.setattr(costs, "answered", answered)
+        monkeypatch.setattr(costs, "WAITS_S", ())
+        workers = Workers(progress=False)
+        (row,) = costs.measure(None, dataset, {1.2: full}, 100.0, workers, quick=False)
+        assert row["change"] == "all candidates"
+        assert row["t, points"].startswith("+25 (")
+        assert made == ["the quick choice"]
 
     @pytest.mark.parametrize(
         ("side", "place"), [(16, "1 bus of AD7147"), (40, "a microcontroller")]
@@ -270,6 +304,7 @@ class TestEarly:
         assert decisions.early == 1.0
         assert decisions.unknown == 0.0
 
+    @pytest.mark.slow
     def test_clear_contacts_are_decided_at_the_first_decision_point(self, tmp_path):
         dataset = followed(read([save_touches(tmp_path, 20)]))
         compared = early.compare_stopping(dataset, (0.6, 1.2))["category"]
@@ -310,6 +345,7 @@ class TestEarly:
             objects
         )
 
+    @pytest.mark.slow
     def test_features_of_kernels_have_the_tables_of_the_other_folds(
         self,
         tmp_path,
@@ -387,7 +423,7 @@ class Written:
 def written(tmp_path_factory):
     """The report on 28 touches, with few windows and changes."""
     folder = tmp_path_factory.mktemp("tradeoff")
-    data = str(save_touches(folder / "data", 14, rate=50.0))
+    data = str(save_touches(folder / "data", 14, rate=25.0))
     single = part(load(folder / "data" / "hard_00.npz"), slice(1))
     save(folder / "data" / "single_frame.npz", single)
     digest = read([data]).digest
@@ -399,7 +435,8 @@ def written(tmp_path_factory):
         patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
         patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
         patch.setattr(costs, "WAITS_S", (0.4,))
-        patch.setattr(costs, "EVERY", (4,))
+        patch.setattr(costs, "EVERY", ())
+        patch.setattr(costs, "coarser", lambda *_: [])
         report = running.tradeoff([data], folder / "out", str(path), options)
     return Written(report, digest)
 
