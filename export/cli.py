@@ -108,7 +108,7 @@ def _add_choice(top: argparse.ArgumentParser) -> None:
         "--leave-out",
         default=LEAVE_OUT,
         metavar="KEY",
-        help="choose and score a task with entire groups of this label left out, if each of its "
+        help="choose and score a task with entire groups of this label held out, if each of its "
         f"classes has several groups (default: {LEAVE_OUT}); `{TRIAL}` leaves out "
         "single trials",
     )
@@ -311,7 +311,7 @@ def _of_front(
     fixed = [f"--{name}" for name in FIXED if getattr(arguments, name) is not None]
     if fixed:
         raise InputError(
-            f"--front makes the model that was measured; leave out {', '.join(fixed)}"
+            f"--front makes the model that was measured; drop {', '.join(fixed)}"
         )
     front = fronts.ParetoFront.read(arguments.fronts, read(arguments.data).digest)
     point = front.pick(arguments.front)

@@ -53,7 +53,7 @@ def gains(runs):
     """The points gained at each window."""
     rows = []
     for task in runs[0].plain.tasks:
-        for kind in (shear.KNOWN, shear.UNMET):
+        for kind in (shear.KNOWN, shear.UNSEEN):
             cells = {f"{w:g} s": gain(runs, task, w, kind) for w in SHOWN_S}
             if any(cells.values()):
                 rows.append({"points gained": f"{task}, {kind}", **cells})

@@ -197,7 +197,7 @@ def write(
         f"the digest of its recordings begins with {model.info.data_digest[:16]}.",
         "The intervals are for the exported model on other trials: Wilson's for two "
         "fifths of the trials, because that model differs from those of the folds. "
-        "Where entire groups are left out they count groups, whose trials are right or "
+        "Where entire groups are held out they count groups, whose trials are right or "
         "wrong together.",
         *(
             line[0].upper() + line[1:] + "."
@@ -380,7 +380,7 @@ def _learning(exported: Exported) -> Section:
     text.append(
         "Doubling them again usually changes less. All fits use the settings that were "
         "chosen on the full training set, and the smaller sets contain the same "
-        "objects. To recognise objects that the model has never met, record more "
+        "objects. To recognise unseen objects, record more "
         "objects rather than more touches of the same ones."
     )
     title = "Accuracy by the number of training trials"

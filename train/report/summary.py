@@ -103,7 +103,7 @@ def accuracy(chosen: Chosen) -> str:
     )
     if chosen.left_out == TRIAL:
         return f"{numbers}this trial"
-    alone = f"{chosen.by_trial.accuracy:.1%} if only the trial itself is left out"
+    alone = f"{chosen.by_trial.accuracy:.1%} if only the trial itself is held out"
     return f"{numbers}any trial of the same {chosen.left_out}; {alone}"
 
 
@@ -160,7 +160,7 @@ def _left_out(dataset: DataSet) -> Iterator[str]:
     files = {trial.path for trial in dataset.trials}
     for lacking, paths in dataset.left_out.items():
         yield (
-            f"warning: {len(paths)} of {len(files.union(paths))} recordings are left out "
+            f"warning: {len(paths)} of {len(files.union(paths))} recordings are skipped "
             f"for lack of {lacking}: {_files(paths)}"
         )
     if dataset.unused:

@@ -88,7 +88,7 @@ def methods(context: Context) -> dict[str, Callable[..., Answers]]:
 
 
 def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
-    """{method: its accuracy} on trials that were left out, and on objects that were
+    """{method: its accuracy} on held-out trials, and on objects that were
     left out, as far as the labels tell the objects."""
     y = context.labels
     splits = [(y, stratified_folds(y[finest(y)]))]
@@ -104,7 +104,7 @@ def tested(context: Context) -> tuple[dict[str, Answers], dict[str, Answers]]:
 
 
 def section(context: Context) -> Section:
-    """Each method's accuracy on trials that were left out, and on objects that were
+    """Each method's accuracy on held-out trials, and on objects that were
     left out."""
     y = context.labels
     by_trial, by_object = tested(context)
@@ -121,7 +121,7 @@ def section(context: Context) -> Section:
             result = results[task]
             row: Row = {"task": task, "method": method}
             row["accuracy %"] = percent(result.accuracy)
-            row["objects never met %"] = never[task].get(method, "")
+            row["unseen objects %"] = never[task].get(method, "")
             rows.append(row | score(result))
     title = "Accuracy of each method on new contacts"
     return Section(
@@ -130,8 +130,8 @@ def section(context: Context) -> Section:
             *text,
             "These accuracies come from nested cross-validation: the trials that test "
             "a model take no part in choosing its shrinkage, number of components and "
-            "k. The brackets hold the 95 % interval. For objects never met, all trials "
-            "of an object, fixed and movable, are left out together; the paper's claim "
+            "k. The brackets hold the 95 % interval. For unseen objects, all trials "
+            "of an object, fixed and movable, are held out together; the paper's claim "
             "is about such objects.",
             "The paper's method is PCA and k-NN on its three features, unscaled. The "
             "best of its grid is the accuracy that its grid search maximised with "
@@ -143,11 +143,11 @@ def section(context: Context) -> Section:
         [
             figures.bars(
                 "methods",
-                f"{title}; diamonds show objects never met",
+                f"{title}; diamonds show unseen objects",
                 list(by_trial),
                 by_task(by_trial),
                 marks=never,
-                mark="never met",
+                mark="unseen objects",
             )
         ],
     )
@@ -158,15 +158,15 @@ def sentence(
     by_trial: Mapping[str, Answers],
     by_object: Mapping[str, Answers],
 ) -> str:
-    """The accuracy of the paper's method and of the best one, with objects known and
-    never met."""
+    """The accuracy of the paper's method and of the best one, with known objects and
+    unseen ones."""
 
     def share(method: str) -> str:
         result = by_trial[method][task]
         brackets = interval(result)
         if task in by_object.get(method, {}):
             new = by_object[method][task].accuracy
-            brackets += f"; {100 * new:.0f} % with objects never met"
+            brackets += f"; {100 * new:.0f} % with unseen objects"
         return f"{100 * result.accuracy:.0f} % of the contacts right ({brackets})"
 
     best = max(by_trial, key=lambda method: by_trial[method][task].accuracy)

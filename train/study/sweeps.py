@@ -92,7 +92,7 @@ def window(context: Context) -> Section:
         text.append(
             "In the paper, accuracy falls substantially when the window is shortened "
             "from 1.2 s to 0.8 s. Physics sets a limit: a movable object cannot be "
-            "told from a fixed one before static friction breaks."
+            "distinguished from a fixed one before static friction breaks."
         )
     title = "Effect of the time window (Fig. 10)"
     png = figures.lines(

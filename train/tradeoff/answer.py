@@ -30,9 +30,9 @@ def answers(measured: Measured, task: str) -> list[Row]:
         if window is not None:
             if window not in TABLE_S and window <= TABLE_S[-1]:
                 continue
-            unmet = unseen(measured.points[window][task])
-            row["objects never met %"] = (
-                "" if unmet is None else percent(unmet.accuracy)
+            unseen_result = unseen(measured.points[window][task])
+            row["unseen objects %"] = (
+                "" if unseen_result is None else percent(unseen_result.accuracy)
             )
         row["command"] = ", then ".join(f"`{command}`" for command in use.commands)
         rows.append(row)
@@ -127,7 +127,7 @@ def prices(measured: Measured) -> Section:
 
 def reasons(measured: Measured) -> Section:
     """The physical reason for the time, and the commands that export the models."""
-    wire = "The recordings do not tell the skin's wires, whose time is left out. The"
+    wire = "The recordings do not name the skin's wires, whose time is ignored. The"
     if measured.wire_s is not None:
         wire = f"The last frame takes {1e3 * measured.wire_s:.1f} ms over the wire. The"
     notes = [
@@ -139,7 +139,7 @@ def reasons(measured: Measured) -> Section:
     if slow:
         notes.append(
             "Physics sets a lower limit. A movable object stands still, and cannot be "
-            "told from a fixed one, until the arm pushes harder than static friction "
+            "distinguished from a fixed one, until the arm pushes harder than static friction "
             "holds. The table gives this time, mu_s m g / (k v), for the middle of "
             "each object's friction and mass."
         )
@@ -150,7 +150,7 @@ def reasons(measured: Measured) -> Section:
     notes += [
         *measured.notes,
         f"All accuracies belong to the {kind}, made at windows of "
-        f"{windows} s; {between} s are left out where the accuracies of "
+        f"{windows} s; {between} s are skipped where the accuracies of "
         f"{next(iter(measured.y))} before and after do not differ by more than chance. "
         "To export one of "
         f"the measured models, use `{commands.front('fast')}`, or `balanced` (a window "
@@ -160,7 +160,7 @@ def reasons(measured: Measured) -> Section:
         "this model, `edge-classify run --error 0.1` decides as soon as it may while at "
         "most one decision in ten is wrong. It refuses an error rate that the trials "
         "cannot certify, and names the smallest rate that they can. Leave a margin "
-        "above that rate. Early decisions were not measured on objects never met.",
+        "above that rate. Early decisions were not measured on unseen objects.",
     ]
     rows: list[Row] = [
         {"object": name, "time until it moves s": round(at, 2)} for name, at in slow
@@ -187,7 +187,7 @@ GLOSSARY = {
         "wrong, on the same held-out contacts. The brackets hold the 95 % interval of "
         "this paired difference."
     ),
-    "objects never met": (
+    "unseen objects": (
         "The accuracy if all trials of an object are held out together."
     ),
     "confidence": "The calibrated probability that the label is right.",

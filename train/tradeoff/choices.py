@@ -133,5 +133,5 @@ def differ(before: Chosen, after: Chosen) -> bool:
 
 
 def unseen(choice: Chosen) -> Result | None:
-    """The accuracy on objects never met; None if no objects could be left out."""
+    """The accuracy on unseen objects; None if no objects could be held out."""
     return None if choice.left_out == TRIAL else choice.accuracy

@@ -171,14 +171,14 @@ def _sheared(
     without."""
     quick = options.quick
     jobs = options.jobs
-    unmet = early.compare_stopping(
+    unseen_result = early.compare_stopping(
         dataset,
         WINDOWS_S,
         leave_out=LEAVE_OUT,
         quick=quick,
         jobs=jobs,
     )
-    by_kind = {shear.KNOWN: comparisons, shear.UNMET: unmet}
+    by_kind = {shear.KNOWN: comparisons, shear.UNSEEN: unseen_result}
     sheared = shear.Answers(points, by_kind)
     return shear.compared(dataset, sheared, Workers(jobs), quick=quick)
 

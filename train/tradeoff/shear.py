@@ -24,7 +24,7 @@ from train.tradeoff.wires import microcontroller
 LEVELS = (0.8, 0.9, 0.95)
 """Accuracies for which the time is told."""
 KNOWN = "known objects"
-UNMET = "objects never met"
+UNSEEN = "unseen objects"
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Answers:
 
     Attributes:
         points: the choices at each window.
-        early: {kind of objects: {task: early decisions}}, for `KNOWN` and `UNMET`.
+        early: {kind of objects: {task: early decisions}}, for `KNOWN` and `UNSEEN`.
     """
 
     points: Points
@@ -92,7 +92,7 @@ def answers(
             quick=quick,
             jobs=workers.jobs,
         )
-        for kind, leave_out in ((KNOWN, TRIAL), (UNMET, LEAVE_OUT))
+        for kind, leave_out in ((KNOWN, TRIAL), (UNSEEN, LEAVE_OUT))
     }
     return Answers(dict(zip(windows, results, strict=True)), early)
 
@@ -129,7 +129,7 @@ def reached_s(shares: Mapping[float, float | None], level: float) -> float | Non
 def times(compared: Compared) -> list[Row]:
     """The time at which each task reaches each level, with shear and without."""
     sides = {"without s": compared.plain, "with s": compared.sheared}
-    cases = product(compared.sheared.tasks, LEVELS, ("fixed", "early"), (KNOWN, UNMET))
+    cases = product(compared.sheared.tasks, LEVELS, ("fixed", "early"), (KNOWN, UNSEEN))
     rows = []
     for task, level, way, kind in cases:
         row: Row = {"task": task, "right": f"{level:.0%}"}
@@ -151,7 +151,7 @@ def gains(compared: Compared) -> list[Row]:
     for task in compared.sheared.tasks:
         for window, tasks in compared.sheared.points.items():
             row: Row = {"task": task, "window s": window}
-            for kind in (KNOWN, UNMET):
+            for kind in (KNOWN, UNSEEN):
                 before = right(compared.plain.points[window][task], kind)
                 after = right(tasks[task], kind)
                 if before is not None and after is not None:
@@ -218,7 +218,7 @@ def draw_task(axes: Any, compared: Compared, task: str, size: float = 3.0) -> No
     series = {"with shear": compared.sheared, "without": compared.plain}
     for number, (name, answers) in enumerate(series.items()):
         colour, marker, _ = STROKES[number]
-        for kind, dashes in ((KNOWN, "-"), (UNMET, ":")):
+        for kind, dashes in ((KNOWN, "-"), (UNSEEN, ":")):
             shares = answers.shares(task, kind)
             percentages = {w: 100.0 * s for w, s in shares.items() if s is not None}
             axes.plot(

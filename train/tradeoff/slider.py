@@ -135,14 +135,16 @@ def price_lines(measured: Measured) -> list[str]:
 
 
 def _texts(choice: Chosen) -> dict[str, str]:
-    """{class in the page: accuracy, its interval, or accuracy on objects never met, as
+    """{class in the page: accuracy, its interval, or accuracy on unseen objects, as
     text}."""
-    unmet = unseen(choice)
+    unseen_result = unseen(choice)
     result = choice.by_trial
     return {
         "share": f"{100 * result.accuracy:.0f} %",
         "interval": f"({interval(result)})",
-        "unseen": "" if unmet is None else f"{100 * unmet.accuracy:.0f} %",
+        "unseen": ""
+        if unseen_result is None
+        else f"{100 * unseen_result.accuracy:.0f} %",
     }
 
 

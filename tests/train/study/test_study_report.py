@@ -170,14 +170,14 @@ def sentence(papers, best):
     return methods.sentence("softness", answers(papers, best), answers(41, 42))
 
 
-def test_accuracy_on_objects_never_met_stands_beside_that_on_trials():
+def test_accuracy_on_unseen_objects_stands_beside_that_on_trials():
     text = sentence(49, 50)
-    assert "98 % of the contacts right (90 to 100; 82 % with objects never met)" in text
+    assert "98 % of the contacts right (90 to 100; 82 % with unseen objects)" in text
     assert "The best is b: 100 % of the contacts right (93 to 100; 84 %" in text
 
 
 def test_the_findings_name_no_best_method_below_the_papers():
-    assert "never met). No method here does better." in sentence(49, 47)
+    assert "unseen objects). No method here does better." in sentence(49, 47)
 
 
 def test_in_a_browser_nothing_overflows_or_is_missing(studied):

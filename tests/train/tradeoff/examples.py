@@ -12,15 +12,15 @@ from train.tradeoff.commands import Commands
 from train.tradeoff.measured import Measured
 
 
-def chosen(right, unmet=None, of=100):
-    """A choice that answers so many trials rightly, and so many of objects never met
+def chosen(right, unseen=None, of=100):
+    """A choice that answers so many trials rightly, and so many of unseen objects
     where these were left out."""
 
     def result(count):
         return Promise(count, of, hits=np.arange(of) < count)
 
-    left_out = "trial" if unmet is None else "object"
-    accuracy = result(right if unmet is None else unmet)
+    left_out = "trial" if unseen is None else "object"
+    accuracy = result(right if unseen is None else unseen)
     return Chosen(Choice("IV", 1, 1), accuracy, result(right), left_out)
 
 

@@ -7,21 +7,21 @@ import pytest
 
 from tests.train.tradeoff.examples import chosen
 from train.tradeoff import shear
-from train.tradeoff.shear import KNOWN, UNMET, Answers, Compared
+from train.tradeoff.shear import KNOWN, UNSEEN, Answers, Compared
 from train.tradeoff.wires import microcontroller, waited_s
 
 
-def answers(shares, unmet=None, early=()):
+def answers(shares, unseen=None, early=()):
     """Answers about mobility at windows of 0.2, 0.4, ... s."""
-    unmet = unmet or [None] * len(shares)
+    unseen = unseen or [None] * len(shares)
     points = {}
-    for i, (share, share_unmet) in enumerate(zip(shares, unmet, strict=True)):
+    for i, (share, share_unseen) in enumerate(zip(shares, unseen, strict=True)):
         points[round(0.2 * (i + 1), 1)] = {
-            "mobility": chosen(share, share_unmet, of=10)
+            "mobility": chosen(share, share_unseen, of=10)
         }
     rules = [SimpleNamespace(mean_s=s, wrong=wrong) for s, wrong in early]
     of_known = {"mobility": SimpleNamespace(certified=rules)}
-    return Answers(points, {KNOWN: of_known, UNMET: {}})
+    return Answers(points, {KNOWN: of_known, UNSEEN: {}})
 
 
 def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
@@ -31,10 +31,10 @@ def test_the_time_to_an_accuracy_is_the_first_window_from_which_it_is_kept():
     assert shear.reached_s(shear_answers.shares("mobility", KNOWN), 0.7) == 0.2
 
 
-def test_objects_never_met_have_times_of_their_own():
-    shear_answers = answers([9, 9], unmet=[5, 8])
-    assert shear.reached_s(shear_answers.shares("mobility", UNMET), 0.8) == 0.4
-    assert shear.reached_s(answers([9, 9]).shares("mobility", UNMET), 0.1) is None
+def test_unseen_objects_have_times_of_their_own():
+    shear_answers = answers([9, 9], unseen=[5, 8])
+    assert shear.reached_s(shear_answers.shares("mobility", UNSEEN), 0.8) == 0.4
+    assert shear.reached_s(answers([9, 9]).shares("mobility", UNSEEN), 0.1) is None
 
 
 def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
@@ -42,7 +42,7 @@ def test_early_decisions_have_the_shortest_mean_time_that_is_right_enough():
     assert shear_answers.early_s("mobility", KNOWN, 0.9) == 0.5
     assert shear_answers.early_s("mobility", KNOWN, 0.95) == 0.8
     assert shear_answers.early_s("mobility", KNOWN, 0.99) is None
-    assert shear_answers.early_s("mobility", UNMET, 0.9) is None
+    assert shear_answers.early_s("mobility", UNSEEN, 0.9) is None
 
 
 def test_gains_are_paired_differences():
@@ -51,7 +51,7 @@ def test_gains_are_paired_differences():
     assert first["without %, known objects"] == 80.0
     assert first["with %, known objects"] == 90.0
     assert first["points, known objects"].startswith("+10 (")
-    assert first["points, objects never met"].startswith("-10 (")
+    assert first["points, unseen objects"].startswith("-10 (")
     assert second["points, known objects"].startswith("+0 (")
 
 

@@ -102,7 +102,7 @@ def test_a_window_on_a_flat_part_of_the_curve_is_left_out(monkeypatch):
     assert list(points) == [0.8, 0.9, 1.0, 1.2]
 
 
-def test_objects_never_met_have_a_figure_only_where_they_were_left_out():
+def test_unseen_objects_have_a_figure_only_where_they_were_left_out():
     assert unseen(chosen(50)) is None
     assert unseen(chosen(60, 50)).accuracy == 0.5
 
@@ -317,7 +317,7 @@ class TestEarly:
         # Forty trials certify no rate as low as the smallest one.
         assert min(rules) > early.ERRORS[0]
 
-    def test_objects_never_met_are_decided_by_models_that_never_met_them(
+    def test_unseen_objects_are_decided_by_models_that_never_met_them(
         self,
         tmp_path,
         make_touch,
