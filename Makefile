@@ -30,7 +30,7 @@ help:
 	@echo "For a board"
 	@echo "  make wheel         build the package that goes on the board: dist/edge_classify-*.whl"
 	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
-	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
+	@echo "  make board-test    test the wheel on an emulated aarch64"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
 	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
 	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
