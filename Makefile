@@ -270,7 +270,7 @@ peers-test: $(PEERS)/.ready
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
-# FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
+# FAULTS="--every 10": every tenth position.
 faults: $(DEV)
 	$(BIN)/python -m tests.faults $(FAULTS)
 
@@ -381,7 +381,7 @@ constraints: $(VENV)/.upkeep
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
-# KILLS="--count 10 --only record": fewer of them, and of one command.
+# KILLS="--count 10": fewer of them.
 kills: $(DEV)
 	$(BIN)/python -m tests.kills $(KILLS)
 

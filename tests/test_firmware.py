@@ -141,15 +141,6 @@ def test_noise_on_the_line_costs_one_answer_at_most(plugged):
     bus.close()
 
 
-def test_another_shape_than_the_skin_file_says_is_named(plugged):
-    bus = SerialBus(plugged, timeout_s=PATIENT_S)
-    with pytest.raises(
-        WrongChip, match="serves 100 taxels of 12 bits, not 100 taxels of 16"
-    ):
-        Block(bus, 0, taxels=TAXELS, bits=16)
-    bus.close()
-
-
 def test_the_example_skin_reads_the_example_firmware(plugged, tmp_path):
     text = skinfile.shipped("matrix").read_text()
     path = tmp_path / "skin.toml"
