@@ -300,7 +300,6 @@ def scripts():
     chip = {"bus": first, "mux": 0x70, "channel": 1, "address": 0x2D, **lasting}
     yield "NACK on one chip", cody, [Fault(**chip)]
     yield "NACK on one mux", cody, [Fault(bus=first, address=0x70, **lasting)]
-    yield "NACK on all", cody, [Fault(**lasting)]
     for code in (errno.EIO, errno.ETIMEDOUT):
         name = errno.errorcode[code]
         yield f"{name} on one chip", cody, [Fault(code=code, **chip)]
@@ -320,7 +319,6 @@ def scripts():
     )
     flip = [Fault("flip", rate=0.02, **lasting)]
     yield "bit flips in 2 % of reads, AD7147 *", cody, flip
-    yield "the same, MPR121 *", pad, flip
     yield "the same, block (CRC)", SKINS["block"], flip
     yield "a chip that serves the same bytes on and on *", cody, [Fault("hold", **chip)]
     for rate, codes in ((0.01, CODES[:4]), (0.1, CODES[:2])):

@@ -43,37 +43,34 @@ class Victim:
     Attributes:
         prepare: makes the folder's files before a run.
         command: given the folder.
-        complaint: what is wrong with the folder after a kill; "" if nothing.
-        finished: the same after the next run; it is given what that run printed.
+        finished: what is wrong with the folder after the next run, "" if nothing; it
+            is given what that run printed.
     """
 
     prepare: Callable[[Path], None]
     command: Callable[[Path], Sequence[object]]
-    complaint: Callable[[Path], str]
     finished: Callable[[Path, str], str]
 
 
-def loadable(folder):
-    """All recordings of a folder are whole, or the sentence of the first that is not."""
+def damage(folder):
+    """What is wrong with a folder after a kill; "" if nothing.
+
+    Raises:
+        EdgeError: a recording is damaged.
+    """
     for path in folder.glob("**/*.npz"):
         if path.name != "golden.npz":
             load(path)
-    return ""
+    complaint = agreeing(folder, "") if (folder / "model.onnx").exists() else ""
+    return "" if OTHER_MODEL in complaint else complaint
 
 
-def copied(folder, count=12):
+def copied(folder):
     """Fill a folder with the recordings of the demo, over and over."""
     recordings = demo.recordings()
-    for i in range(count):
+    for i in range(12):
         source = recordings[i % len(recordings)]
         shutil.copy(source, folder / f"{source.stem}-{i:02d}.npz")
-
-
-def touches(folder):
-    """A folder of recordings within a folder."""
-    (folder / "touches").mkdir()
-    copied(folder / "touches")
-    return folder / "touches"
 
 
 def recorded(folder):
@@ -104,14 +101,9 @@ def agreeing(folder, printed):
     return f"{result.stdout}{result.stderr}" if result.returncode else ""
 
 
-def together(folder):
-    """The same, or `verify` says that they do not belong together."""
-    complaint = agreeing(folder, "")
-    return "" if OTHER_MODEL in complaint else complaint
-
-
 def before_exporting(folder):
-    touches(folder)
+    (folder / "touches").mkdir()
+    copied(folder / "touches")
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(GOLDEN / name, folder / name)
 
@@ -122,9 +114,9 @@ def exporting(folder):
 
 
 VICTIMS = {
-    "record": Victim(lambda folder: None, recorded, loadable, all_recorded),
-    "label --set": Victim(copied, relabelled, loadable, all_or_none),
-    "export": Victim(before_exporting, exporting, together, agreeing),
+    "record": Victim(lambda folder: None, recorded, all_recorded),
+    "label --set": Victim(copied, relabelled, all_or_none),
+    "export": Victim(before_exporting, exporting, agreeing),
 }
 
 
@@ -202,7 +194,7 @@ def killed_once(victim, most_changes, delay_s):
         command = victim.command(folder)
         alive = killed(command, folder, most_changes, delay_s)
         left = temporaries(folder)
-        complaint = victim.complaint(folder)
+        complaint = damage(folder)
         second_run = ended(*command, timeout=PATIENCE_S)
         if second_run.returncode:
             complaint += second_run.stderr
@@ -233,17 +225,6 @@ def deaths_of(name, victim, count):
         yield killed_once(victim, changes, delay_s)
 
 
-def row(name, deaths, damages):
-    """A row of the table."""
-    return {
-        "command": f"`{name}`",
-        "runs": len(deaths),
-        "killed before their end": sum(death.alive for death in deaths),
-        "left a temporary file": sum(death.left for death in deaths),
-        "damage, or a next start that failed": damages,
-    }
-
-
 def measure(count):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
     rows = []
@@ -252,7 +233,15 @@ def measure(count):
         deaths = list(deaths_of(name, victim, count))
         wrong = [death.complaint for death in deaths if death.complaint]
         complaints += [f"{name}: {text}" for text in wrong]
-        rows.append(row(name, deaths, len(wrong)))
+        rows.append(
+            {
+                "command": f"`{name}`",
+                "runs": count,
+                "killed before their end": sum(death.alive for death in deaths),
+                "left a temporary file": sum(death.left for death in deaths),
+                "damage, or a next start that failed": len(wrong),
+            }
+        )
     for text in complaints:
         print(text, file=sys.stderr)
     tables.write("kills", [rows])

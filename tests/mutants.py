@@ -3,9 +3,9 @@ fails.
 
 mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that
 reach the changed function; `[tool.mutmut]` in pyproject.toml names the files and the
-tests. A run tries `--count` mutants drawn by `--seed` until `--minutes` are over, and
-prints the difference of each mutant that no test noticed. Results are kept in
-`mutants/`, and no mutant is tried twice.
+tests. A run draws `--count` mutants, tries them until `--minutes` are over, and prints
+the difference of each mutant that no test noticed. Results are kept in `mutants/`, and
+no mutant is tried twice.
 """
 
 import shutil
@@ -57,7 +57,7 @@ def run(names, minutes):
         process.wait()
 
 
-def measure(count, seed, minutes, only):
+def measure(count, minutes, only):
     """Try a sample of mutants; print those that no test notices, and a count of each
     status.
 
@@ -68,7 +68,7 @@ def measure(count, seed, minutes, only):
     names = [name for name in statuses() if only in name]
     if not names:
         raise EdgeError(f"no mutant's name contains {only!r}")
-    names = Random(seed).sample(names, min(count, len(names)))
+    names = Random(2012).sample(names, min(count, len(names)))
     run(names, minutes)
     results = statuses()
     for name in sorted(names):
@@ -83,7 +83,6 @@ if __name__ == "__main__":
         measure,
         __doc__,
         ("--count", 200, "mutants to draw"),
-        ("--seed", 2012, "of the draw"),
         ("--minutes", 15.0, "at most"),
         ("--only", "", "draw from mutants whose name contains this"),
     )

@@ -96,61 +96,54 @@ def imported(table, *options):
     return [edge.load(path) for path in sorted(out.glob("*.npz"))]
 
 
-EPISODES = np.arange(2)
 TASKS = ("grasp the cup", "grasp the box")
+COUNTS = np.arange(30)[:, None] + 10 * np.arange(6)
+SHEARED = np.stack([COUNTS // 2, -(COUNTS // 4), COUNTS], axis=2)
 
 
-def data_set(folder, *, in_parts, axes):
-    """A LeRobot data set of two episodes: v2.1 has a file for each, v3 one for many."""
-    (folder / "meta").mkdir(parents=True)
-    (folder / "data" / "chunk-000").mkdir(parents=True)
-    counts = np.arange(30)[:, None] + 10 * np.arange(6)
-    values = np.stack([counts // 2, -(counts // 4), counts], axis=2)
-    episodes = [
-        pd.DataFrame(
-            {
-                "observation.tactile": (values if axes else counts + number).tolist(),
-                "observation.state": np.full((30, 2), [0.1, -0.2]).tolist(),
-                "timestamp": 0.02 * np.arange(30),
-                "episode_index": number,
-                "task_index": number,
-            }
-        )
-        for number in EPISODES
-    ]
-    tasks = pd.DataFrame({"task_index": EPISODES}, index=pd.Index(TASKS, name="task"))
-    if in_parts:
+@pytest.fixture(params=["v2.1", "v3"])
+def data_set(request, tmp_path):
+    """A LeRobot data set of two episodes: v2.1 has a file for each, v3 one for many, here
+    with shear."""
+    pytest.importorskip("pyarrow")
+    folder = tmp_path / "set"
+    chunk = folder / "data" / "chunk-000"
+    for made in (folder / "meta", chunk):
+        made.mkdir(parents=True)
+    tasks = pd.DataFrame({"task_index": [0, 1]}, index=pd.Index(TASKS, name="task"))
+    rows = {"observation.state": [[0.1, -0.2]] * 30, "timestamp": 0.02 * np.arange(30)}
+    if request.param == "v3":
+        rows["observation.tactile"] = SHEARED.tolist()
+        tasks.to_parquet(folder / "meta" / "tasks.parquet")
+    else:
+        rows["observation.tactile"] = COUNTS.tolist()
         lines = tasks.reset_index().to_json(orient="records", lines=True)
         (folder / "meta" / "tasks.jsonl").write_text(lines)
-    else:
-        tasks.to_parquet(folder / "meta" / "tasks.parquet")
-        episodes = [pd.concat(episodes)]
-    for number, data in enumerate(episodes):
-        data.to_parquet(folder / "data" / "chunk-000" / f"file-{number:03}.parquet")
+    files = [
+        pd.DataFrame({**rows, "episode_index": n, "task_index": n}) for n in (0, 1)
+    ]
+    if request.param == "v3":
+        files = [pd.concat(files)]
+    for number, data in enumerate(files):
+        data.to_parquet(chunk / f"file-{number:03}.parquet")
     return folder
 
 
-@pytest.mark.parametrize(
-    ("in_parts", "axes"), [(True, False), (False, True)], ids=["v2.1", "v3, shear"]
-)
-def test_a_lerobot_data_set_is_imported(tmp_path, in_parts, axes):
-    pytest.importorskip("pyarrow")
-    folder = data_set(tmp_path / "set", in_parts=in_parts, axes=axes)
+def test_a_lerobot_data_set_is_imported(tmp_path, data_set):
     table = tmp_path / "all.parquet"
     main = program("import_lerobot.py")
-    main(str(folder), str(table), "observation.tactile", "observation.state")
-    options = ("--axes", "xyz") if axes else ()
+    main(str(data_set), str(table), "observation.tactile", "observation.state")
+    sheared = (data_set / "meta" / "tasks.parquet").exists()
+    options = ("--axes", "xyz") if sheared else ()
     joints = ("--joints", "joint_1-joint_2")
     trials = imported(table, "--shape", "2x3", *joints, *options)
     assert [trial.labels for trial in trials] == [{"object": task} for task in TASKS]
     second = trials[1]
-    assert second.frames[7].ravel().tolist() == [
-        7 + 10 * taxel + (not axes) for taxel in range(6)
-    ]
+    assert (second.frames.reshape(30, 6) == COUNTS).all()
     assert second.t[-1] == pytest.approx(0.58)
     assert second.joints[9].tolist() == [0.1, -0.2]
-    if axes:
-        assert second.shear[8, 1, 2].tolist() == [58 // 2, -(58 // 4)]
+    if sheared:
+        assert (second.shear.reshape(30, 6, 2) == SHEARED[:, :, :2]).all()
 
 
 @pytest.mark.parametrize("axes", [1, 3])

@@ -37,7 +37,7 @@ def test_mutants_without_a_name_are_refused(monkeypatch):
     monkeypatch.setattr(mutants, "generate", lambda: None)
     monkeypatch.setattr(mutants, "statuses", lambda: {"edge.x": "not checked"})
     with pytest.raises(EdgeError, match="no mutant's name contains 'train'"):
-        mutants.measure(200, 2012, 15.0, "train")
+        mutants.measure(200, 15.0, "train")
 
 
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(
