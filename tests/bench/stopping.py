@@ -51,22 +51,13 @@ CHOSEN = "extra trees, set chosen"
 # A curve is [(mean seconds, share wrong)] at each threshold.
 
 
-def first_certain(certainty, limits):
-    """(limits, n) the points at which trials are decided."""
-    passed = np.stack([certainty >= limit for limit in limits])
-    passed[:, -1] = True
-    return passed.argmax(axis=1)
-
-
 class Trees(NamedTuple):
-    """What extra trees of one set of features cost.
+    """What extra trees of one set of features cost when sure.
 
     Attributes:
-        fixed: their curve at fixed windows.
-        seconds, wrong: (thresholds, n) for each trial, when sure.
+        seconds, wrong: (thresholds, n) for each trial.
     """
 
-    fixed: Any
     seconds: Any
     wrong: Any
 
@@ -77,16 +68,19 @@ class Trees(NamedTuple):
 
 
 def extra_trees(X, labels, folds):
-    """The extra trees of a set of features at each decision point, X (points, n, p)."""
+    """Extra trees of a set of features, X (points, n, p): their curve at fixed windows,
+    and what they cost when sure."""
     model = ExtraTreesClassifier(random_state=0)
     options = {"cv": PredefinedSplit(folds), "method": "predict_proba"}
     shares = np.stack([cross_val_predict(model, x, labels, **options) for x in X])
     classes = np.unique(labels)
     right = classes[shares.argmax(axis=2)] == labels
     fixed = list(zip(SECONDS, 1.0 - right.mean(axis=1), strict=True))
-    stops = first_certain(shares.max(axis=2), THRESHOLDS)
+    passed = shares.max(axis=2) >= THRESHOLDS[:, None, None]
+    passed[:, -1] = True
+    stops = passed.argmax(axis=1)
     wrong = ~right[stops, np.arange(len(labels))]
-    return Trees(fixed, SECONDS[stops], wrong)
+    return fixed, Trees(SECONDS[stops], wrong)
 
 
 def of_chosen_set(by_set, folds):
@@ -102,16 +96,17 @@ def of_chosen_set(by_set, folds):
             best = by_set[np.nan_to_num(percentages, nan=np.inf).argmin()]
             taken_s[:, test] = best.seconds[:, test]
             wrong[:, test] = best.wrong[:, test]
-        chosen = Trees(None, taken_s, wrong)
+        chosen = Trees(taken_s, wrong)
         curve.append((seconds, at([chosen.curve()], seconds) / 100))
     return curve
 
 
 def peers(by_set, labels, folds):
     """{peer: its curves on a task, one for each set of features}."""
-    trees = [extra_trees(X, labels, folds) for X in by_set]
+    rivals = [extra_trees(X, labels, folds) for X in by_set]
+    fixed, trees = zip(*rivals, strict=True)
     return {
-        TREES_FIXED: [of_set.fixed for of_set in trees],
+        TREES_FIXED: fixed,
         TREES: [of_set.curve() for of_set in trees],
         CHOSEN: [of_chosen_set(trees, folds)],
     }
