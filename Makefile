@@ -10,7 +10,7 @@ PIP := $(BIN)/$(PINNED) constraints.txt
 export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help venv test test-all test-busy lint types export demo demo-data golden study tradeoff wheel wheel-test \
-  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear shear-transfer docs faults risk shifts \
+  board-test browser-test kernel-test peers-test service-test hard-cases hard-cases-versions mutants fuzz kills accuracy bench transfer shear docs faults risk shifts \
   stopping soak measured constraints clean
 
 help:
@@ -30,7 +30,7 @@ help:
 	@echo "For a board"
 	@echo "  make wheel         build the package that goes on the board: dist/edge_classify-*.whl"
 	@echo "  make wheel-test    test the wheel in an empty environment outside the checkout"
-	@echo "  make board-test    test the wheel on an emulated aarch64 and count its instructions"
+	@echo "  make board-test    test the wheel on an emulated aarch64"
 	@echo "  make kernel-test   run the commands under a real Linux kernel, over modelled chips"
 	@echo "  make browser-test  use the page and the report in Chromium, and look for what excludes people"
 	@echo "  make peers-test    the kernels beside aeon's MiniRocket"
@@ -41,11 +41,10 @@ help:
 	@echo "  make bench         speed beside the alternatives"
 	@echo "  make transfer      score a model of SCENE on trials from another engine (MuJoCo)"
 	@echo "  make shear         how much sooner tasks are decided with shear (a quarter of an hour)"
-	@echo "  make shear-transfer   models with shear and without on trials from another engine (MuJoCo)"
 	@echo "  make faults        the cost of each fault on the skin's wires, as a table"
 	@echo "  make risk          how often certified errors, mean times and FRONT's intervals are not kept"
 	@echo "  make shifts        what touches unlike the training do to answers, and whether doubt tells it"
-	@echo "  make stopping      deciding when sure beside fixed windows and others' early decisions"
+	@echo "  make stopping      deciding when sure beside fixed windows and extra trees"
 	@echo "  make soak          ten minutes of the loop in virtual time, and load on its page"
 	@echo "  make measured      all tables of docs/measured anew, one after another; ONLY=\"risk kills\""
 	@echo "Thorough tests"
@@ -197,18 +196,10 @@ transfer: SCENE := train/scenes/household.toml
 transfer: $(BENCHVENV)
 	$(BIN)/python -m train simulate $(SCENE) --out $(HELD)/simulated
 	$(BIN)/python -m export --data $(HELD)/simulated --out $(HELD)/household $(EXPORT)
-	$(BIN)/python -m tests.bench.transfer --models $(HELD)/household/model.onnx $(TRANSFER)
+	$(BIN)/python -m tests.bench.transfer --model $(HELD)/household/model.onnx $(TRANSFER)
 
 shear: $(DEV)
 	$(BIN)/python -m tests.bench.shear --out $(OUT)/shear $(SHEAR)
-
-shear-transfer: $(BENCHVENV)
-	$(BIN)/python -m train simulate train/scenes/household_shear.toml --out $(HELD)/sheared
-	$(BIN)/python -m export --data $(HELD)/sheared --out $(HELD)/without-shear --features contact joints
-	$(BIN)/python -m export --data $(HELD)/sheared --out $(HELD)/with-shear \
-	  --features contact joints shear
-	$(BIN)/python -m tests.bench.transfer --table shear_transfer --seeds 3 --trials 96 \
-	  --models $(HELD)/without-shear/model.onnx $(HELD)/with-shear/model.onnx
 
 ifndef DATA
 study tradeoff: $(SIMULATED)/.made
@@ -276,7 +267,7 @@ peers-test: $(PEERS)/.ready
 stopping: $(DEV)
 	$(BIN)/python -m tests.bench.stopping --data $(STOPPED) $(STOPPING)
 
-# FAULTS="--overhead 100 --every 10": one overhead of software, every tenth position.
+# FAULTS="--every 10": every tenth position.
 faults: $(DEV)
 	$(BIN)/python -m tests.faults $(FAULTS)
 
@@ -285,7 +276,7 @@ soak: $(DEV)
 
 # Every table of docs/measured, one target after another, with a line for each as it ends. The
 # tables that this writes are no local change.
-ONLY ?= accuracy bench hard-cases kills risk shear shear-transfer shifts soak stopping transfer \
+ONLY ?= accuracy bench hard-cases kills risk shear shifts soak stopping transfer \
   docs/tradeoff.png
 measured: $(DEV)
 	@test -z "`git status --porcelain -uno -- . ':!docs/measured' ':!docs/*.png'`" || \
@@ -387,7 +378,7 @@ constraints: $(VENV)/.upkeep
 fuzz: $(DEV)
 	FUZZ_FILES=5000 $(BIN)/python -m pytest tests/fuzz -n 2 -v $(FUZZ)
 
-# KILLS="--count 10 --only record": fewer of them, and of one command.
+# KILLS="--count 10": fewer of them.
 kills: $(DEV)
 	$(BIN)/python -m tests.kills $(KILLS)
 

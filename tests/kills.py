@@ -5,7 +5,6 @@ after a file of its folder changed. Then every file must be whole, and the next 
 the same command must finish or name what was interrupted, and leave no temporary file.
 """
 
-import argparse
 import os
 import random
 import shutil
@@ -18,15 +17,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tqdm import tqdm
-
 from edge import demo
-from edge.commands.options import within
 from edge.recording import load
 from edge.saving import find
 from edge.writing import PREFIX
 from tests.bench import tables
+from tests.bench.program import start
 from tests.conftest import ended
+from train.progress import bar
 
 EDGE = (sys.executable, "-m", "edge")
 EXPORT = (sys.executable, "-m", "export", "--quick", "--decision-points", "none")
@@ -35,7 +33,6 @@ PATIENCE_S = 120.0
 MOST_CHANGES = 4
 CLOSE_S = 0.003
 """Every other kill comes at most so long after one of the first changes of a file."""
-POSITIVE = within(int, 1, 1e6)
 OTHER_MODEL = "is of another model"
 
 
@@ -46,37 +43,34 @@ class Victim:
     Attributes:
         prepare: makes the folder's files before a run.
         command: given the folder.
-        complaint: what is wrong with the folder after a kill; "" if nothing.
-        finished: the same after the next run; it is given what that run printed.
+        finished: what is wrong with the folder after the next run, "" if nothing; it
+            is given what that run printed.
     """
 
     prepare: Callable[[Path], None]
     command: Callable[[Path], Sequence[object]]
-    complaint: Callable[[Path], str]
     finished: Callable[[Path, str], str]
 
 
-def loadable(folder):
-    """All recordings of a folder are whole, or the sentence of the first that is not."""
+def damage(folder):
+    """What is wrong with a folder after a kill; "" if nothing.
+
+    Raises:
+        EdgeError: a recording is damaged.
+    """
     for path in folder.glob("**/*.npz"):
         if path.name != "golden.npz":
             load(path)
-    return ""
+    complaint = agreeing(folder, "") if (folder / "model.onnx").exists() else ""
+    return "" if OTHER_MODEL in complaint else complaint
 
 
-def copied(folder, count=12):
+def copied(folder):
     """Fill a folder with the recordings of the demo, over and over."""
     recordings = demo.recordings()
-    for i in range(count):
+    for i in range(12):
         source = recordings[i % len(recordings)]
         shutil.copy(source, folder / f"{source.stem}-{i:02d}.npz")
-
-
-def touches(folder):
-    """A folder of recordings within a folder."""
-    (folder / "touches").mkdir()
-    copied(folder / "touches")
-    return folder / "touches"
 
 
 def recorded(folder):
@@ -107,14 +101,9 @@ def agreeing(folder, printed):
     return f"{result.stdout}{result.stderr}" if result.returncode else ""
 
 
-def together(folder):
-    """The same, or `verify` says that they do not belong together."""
-    complaint = agreeing(folder, "")
-    return "" if OTHER_MODEL in complaint else complaint
-
-
 def before_exporting(folder):
-    touches(folder)
+    (folder / "touches").mkdir()
+    copied(folder / "touches")
     for name in ("model.onnx", "golden.npz"):
         shutil.copy(GOLDEN / name, folder / name)
 
@@ -125,9 +114,9 @@ def exporting(folder):
 
 
 VICTIMS = {
-    "record": Victim(lambda folder: None, recorded, loadable, all_recorded),
-    "label --set": Victim(copied, relabelled, loadable, all_or_none),
-    "export": Victim(before_exporting, exporting, together, agreeing),
+    "record": Victim(lambda folder: None, recorded, all_recorded),
+    "label --set": Victim(copied, relabelled, all_or_none),
+    "export": Victim(before_exporting, exporting, agreeing),
 }
 
 
@@ -142,26 +131,15 @@ def listing(folder):
     return times
 
 
-@dataclass(frozen=True)
-class Moment:
-    """When a command is killed.
-
-    Attributes:
-        changes: of the folder's files that it may make before; 0 for none to wait for.
-        delay_s: after these, or after the start.
-    """
-
-    changes: int
-    delay_s: float
-
-
-def killed(command, folder, moment):
+def killed(command, folder, most_changes, delay_s):
     """Start a command, kill it, and say whether it was still alive.
 
     Args:
         command: the words.
         folder: whose files it changes.
-        moment: when to kill it.
+        most_changes: of the folder's files that it may make before; 0 for none to wait
+            for.
+        delay_s: seconds after these, or after the start, until it is killed.
     """
     process = subprocess.Popen(
         list(map(str, command)),
@@ -171,12 +149,12 @@ def killed(command, folder, moment):
     )
     before = listing(folder)
     changes = 0
-    while changes < moment.changes and process.poll() is None:
+    while changes < most_changes and process.poll() is None:
         latest = listing(folder)
         changes += latest != before
         before = latest
     try:
-        process.wait(moment.delay_s)
+        process.wait(delay_s)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
@@ -208,15 +186,15 @@ class Death:
     complaint: str
 
 
-def killed_once(victim, moment):
+def killed_once(victim, most_changes, delay_s):
     """Kill a victim once."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         victim.prepare(folder)
         command = victim.command(folder)
-        alive = killed(command, folder, moment)
+        alive = killed(command, folder, most_changes, delay_s)
         left = temporaries(folder)
-        complaint = victim.complaint(folder)
+        complaint = damage(folder)
         second_run = ended(*command, timeout=PATIENCE_S)
         if second_run.returncode:
             complaint += second_run.stderr
@@ -241,56 +219,34 @@ def deaths_of(name, victim, count):
     """Kill a victim at so many moments, those of odd number shortly after a change."""
     lasts_s = whole_s(victim)
     stream = random.Random(f"kills {name}")
-    for i in tqdm(range(count), desc=name, leave=False, disable=None):
+    for i in bar(range(count), desc=name):
         changes = stream.randint(1, MOST_CHANGES) if i % 2 else 0
         delay_s = stream.uniform(0.0, CLOSE_S if changes else lasts_s)
-        yield killed_once(victim, Moment(changes, delay_s))
+        yield killed_once(victim, changes, delay_s)
 
 
-def row(name, deaths, damages):
-    """A row of the table."""
-    return {
-        "command": f"`{name}`",
-        "runs": len(deaths),
-        "killed before their end": sum(death.alive for death in deaths),
-        "left a temporary file": sum(death.left for death in deaths),
-        "damage, or a next start that failed": damages,
-    }
-
-
-def main(argv=None):
+def measure(count):
     """Kill, and write the table; 1 if a file was damaged or a next start failed."""
-    parser = argparse.ArgumentParser(prog="kills", description=__doc__)
-    parser.add_argument(
-        "--count",
-        type=POSITIVE,
-        default=60,
-        help="kills of each command",
-    )
-    parser.add_argument(
-        "--only",
-        default="",
-        help="commands whose name holds this text",
-    )
-    arguments = parser.parse_args(argv)
-    names = list(filter(lambda name: arguments.only in name, VICTIMS))
-    if not names:
-        parser.error(f"no command's name holds {arguments.only!r}: {[*VICTIMS]}")
     rows = []
     complaints = []
-    for name in names:
-        deaths = list(deaths_of(name, VICTIMS[name], arguments.count))
+    for name, victim in VICTIMS.items():
+        deaths = list(deaths_of(name, victim, count))
         wrong = [death.complaint for death in deaths if death.complaint]
         complaints += [f"{name}: {text}" for text in wrong]
-        rows.append(row(name, deaths, len(wrong)))
+        rows.append(
+            {
+                "command": f"`{name}`",
+                "runs": count,
+                "killed before their end": sum(death.alive for death in deaths),
+                "left a temporary file": sum(death.left for death in deaths),
+                "damage, or a next start that failed": len(wrong),
+            }
+        )
     for text in complaints:
         print(text, file=sys.stderr)
-    if arguments.only:
-        print(tables.markdown(rows))
-    else:
-        tables.write("kills", [rows], "make kills")
+    tables.write("kills", [rows])
     return 1 if complaints else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(measure, __doc__, ("--count", 60, "kills of each command"))

@@ -3,12 +3,11 @@ fails.
 
 mutmut makes the changes in a copy of the tree, `mutants/`, and runs the tests that
 reach the changed function; `[tool.mutmut]` in pyproject.toml names the files and the
-tests. A run tries `--count` mutants drawn by `--seed` until `--minutes` are over, and
-prints the difference of each mutant that no test noticed. Results are kept in
-`mutants/`, and no mutant is tried twice.
+tests. A run draws `--count` mutants, tries them until `--minutes` are over, and prints
+the difference of each mutant that no test noticed. Results are kept in `mutants/`, and
+no mutant is tried twice.
 """
 
-import argparse
 import shutil
 import signal
 import subprocess
@@ -16,7 +15,8 @@ import sys
 from collections import Counter
 from random import Random
 
-from edge.commands.options import within
+from edge.errors import EdgeError
+from tests.bench.program import start
 from tests.conftest import ended
 
 MUTMUT = (sys.executable, "-m", "mutmut")
@@ -57,49 +57,32 @@ def run(names, minutes):
         process.wait()
 
 
-def main(argv=None):
+def measure(count, minutes, only):
     """Try a sample of mutants; print those that no test notices, and a count of each
-    status."""
-    parser = argparse.ArgumentParser(
-        prog="mutants", description=(__doc__ or "").split("\n")[0]
-    )
-    parser.add_argument(
-        "--count",
-        type=within(int, 1, 1e6),
-        default=200,
-        help="mutants to draw (%(default)s)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=2012,
-        help="of the draw (%(default)s)",
-    )
-    parser.add_argument(
-        "--minutes",
-        type=float,
-        default=15.0,
-        help="at most (%(default)s)",
-    )
-    parser.add_argument(
-        "--only",
-        default="",
-        help="draw from mutants whose name contains this",
-    )
-    arguments = parser.parse_args(argv)
+    status.
+
+    Raises:
+        EdgeError: no mutant's name contains `only`; mutmut would try all.
+    """
     generate()
-    names = [name for name in statuses() if arguments.only in name]
-    if not names:  # mutmut would try all
-        parser.error(f"no mutant's name contains {arguments.only!r}")
-    names = Random(arguments.seed).sample(names, min(arguments.count, len(names)))
-    run(names, arguments.minutes)
+    names = [name for name in statuses() if only in name]
+    if not names:
+        raise EdgeError(f"no mutant's name contains {only!r}")
+    names = Random(2012).sample(names, min(count, len(names)))
+    run(names, minutes)
     results = statuses()
     for name in sorted(names):
         if results[name] in UNNOTICED:
             print(f"{results[name]}: {name}\n{output('show', name)}")
     counts = Counter(results[name] for name in names)
-    print(", ".join(f"{status}: {count}" for status, count in counts.most_common()))
+    print(", ".join(f"{status}: {n}" for status, n in counts.most_common()))
 
 
 if __name__ == "__main__":
-    main()
+    start(
+        measure,
+        __doc__,
+        ("--count", 200, "mutants to draw"),
+        ("--minutes", 15.0, "at most"),
+        ("--only", "", "draw from mutants whose name contains this"),
+    )

@@ -58,7 +58,6 @@ OLDER = {
     "accuracy",
     "kills",
     "risk",
-    "shear_transfer",
     "shifts",
     "tradeoff",
     "transfer",

@@ -3,8 +3,10 @@ a table names the command that made it."""
 
 import pytest
 
-from tests import faults, kills, mutants
+from edge.errors import EdgeError
+from tests import mutants
 from tests.bench import tables
+from tests.bench.program import start
 from tests.hard_cases import __main__ as hard_cases
 from tests.hard_cases import elsewhere
 
@@ -12,23 +14,30 @@ from tests.hard_cases import elsewhere
 @pytest.mark.parametrize(
     ("main", "words", "sentence"),
     [
-        (kills.main, ["--only", "tech"], "no command's name holds 'tech'"),
         (hard_cases.main, ["--only", "tyes"], "no case's name holds 'tyes'"),
-        # Without a name mutmut would try all of them.
-        (mutants.main, ["--only", "train"], "no mutant's name contains 'train'"),
-        (faults.main, ["--every", "0"], "--every: must be a whole number from 1"),
         (elsewhere.main, ["--golden", "none", "python"], "no golden files are in none"),
     ],
 )
-def test_options_that_would_measure_nothing_are_refused(
-    main, words, sentence, capsys, monkeypatch
-):
-    monkeypatch.setattr(mutants, "generate", lambda: None)
-    monkeypatch.setattr(mutants, "statuses", lambda: {"edge.x": "not checked"})
+def test_options_that_would_measure_nothing_are_refused(main, words, sentence, capsys):
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_a_number_of_nothing_is_refused(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["faults", "--every", "0"])
+    with pytest.raises(SystemExit):
+        start(print, "", ("--every", 1, "every so many positions"))
+    assert "--every: must be a whole number from 1" in capsys.readouterr().err
+
+
+def test_mutants_without_a_name_are_refused(monkeypatch):
+    """mutmut would try all of them."""
+    monkeypatch.setattr(mutants, "generate", lambda: None)
+    monkeypatch.setattr(mutants, "statuses", lambda: {"edge.x": "not checked"})
+    with pytest.raises(EdgeError, match="no mutant's name contains 'train'"):
+        mutants.measure(200, 15.0, "train")
 
 
 def test_a_table_has_its_command_as_it_can_be_run_and_no_empty_part(

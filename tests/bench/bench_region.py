@@ -81,22 +81,12 @@ def opencv_areas(frame):
 
 
 @pytest.mark.parametrize("density", [0.1, 0.5])
-@pytest.mark.parametrize(
-    "shape",
-    [(16, 24), (64, 64), (128, 128), (256, 256)],
-    ids=lambda s: f"{s[0]}x{s[1]}",
-)
-def bench_region_in_noise(shape, density, against):
+@pytest.mark.parametrize("width", [24, 256])
+def bench_region_in_noise(width, density, against):
     rng = np.random.default_rng(0)
+    shape = (width, width)
     counts = (rng.random(shape) < density) * rng.integers(60, 60000, shape)
     frame = counts.astype(np.uint16)
     assert loudest(frame) == opencv_areas(frame)
     rivals = {"OpenCV": (partial(opencv_areas, frame), 10.0)}
     against(partial(loudest, frame), rivals)
-
-
-def bench_region_of_lone_taxels(against):
-    counts = np.zeros((16, 24), dtype=np.uint16)
-    counts[[1, 4, 7, 10, 13], [2, 20, 11, 5, 16]] = [90, 80, 70, 60, 55]
-    rivals = {"OpenCV": (partial(opencv_areas, counts), 4.0)}
-    against(partial(loudest, counts), rivals)

@@ -106,8 +106,6 @@ class Rub:
         self.pads = pads
         self.friction = friction
         self.stretch = 0.0
-        self.pull = 0.0
-        """Newtons on the arm from elbow to wrist in the last step."""
         self.arm = model.body_parentid[pads[0]]
         self.thing = model.body("thing").id
 
@@ -116,18 +114,17 @@ class Rub:
         data.qfrc_applied[:] = 0.0
         most = self.friction * float(loads.sum())
         if most == 0.0:
-            self.stretch = self.pull = 0.0
+            self.stretch = 0.0
             return
         point = loads @ data.xpos[self.pads] / loads.sum()
         along = data.xmat[self.arm].reshape(3, 3)[:, 2]
         arm, thing = (self._speed(data, i, point) for i in (self.arm, self.thing))
         slips = along @ (arm - thing)
         pull = SHEAR_N_M * self.stretch + SHEAR_NS_M * slips
-        self.pull = np.clip(pull, -most, most)
         longest = most / SHEAR_N_M
         stretch = self.stretch + slips * self.model.opt.timestep
         self.stretch = np.clip(stretch, -longest, longest)
-        force = self.pull * along
+        force = np.clip(pull, -most, most) * along
         applied = data.qfrc_applied
         zero = np.zeros(3)
         for body, push in ((self.arm, -force), (self.thing, force)):

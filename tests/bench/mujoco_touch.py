@@ -21,7 +21,6 @@ from edge.recording import Recording
 from edge.touch.arm import Chain
 from tests.bench import mujoco_layer
 from tests.bench.mujoco_layer import ABOVE_FLOOR_M
-from tests.bench.mujoco_shear import tangents
 from train.simulate.scene import CODY_DAMPING, CODY_SKIN, CODY_STIFFNESS
 
 MODEL = Template(Path(__file__).with_name("touch.xml").read_text())
@@ -53,7 +52,7 @@ PAD_LOSS_S = 0.0015
 RIGID = "-1e6 -2e3"
 """Where solimp is s, a contact is s / (1 - s) times as stiff as solref times the
 mass."""
-RIGID_KINDS = ("box", "drum", "drawer", "door")
+RIGID_KINDS = ("box", "drum")
 HALF_M = 0.08
 """Half the length of a thing's foot along the push, and at least half its breadth."""
 
@@ -63,16 +62,13 @@ class Thing:
     """The thing that is touched.
 
     Attributes:
-        kind: box, drum, drawer, door, foam, cushion, bale, cloth, limb or plant.
+        kind: box, drum, foam, cushion, bale or plant.
         mass_kg, floor, skin: its mass, and its friction on the floor and on the skin.
         height_m, breadth_m: of its face, along the forearm (which hangs) and across it.
-        below_m: how far a rigid face reaches below the middle of the contact (default:
-            the floor).
         modulus_pa, thick_m: of a soft layer.
         stems, stem_n_m: a plant's stems, and the stiffness of each at the height of the
             contact.
         seed: of a plant's shape.
-        joint: MuJoCo's joint between a movable thing and the room.
     """
 
     kind: str
@@ -81,13 +77,11 @@ class Thing:
     skin: float = 0.4
     height_m: float = 0.2
     breadth_m: float = 0.1
-    below_m: float = ABOVE_FLOOR_M
     modulus_pa: float = 8e3
     thick_m: float = 0.1
     stems: int = 8
     stem_n_m: float = 10.0
     seed: int = 0
-    joint: str = "<freejoint/>"
 
     @property
     def soft(self):
@@ -225,7 +219,7 @@ def upper_xml(thing):
         return mujoco_layer.layer_xml(thing)
     if thing.soft:
         return stems_xml(thing), ""
-    half = (thing.below_m + thing.height_m / 2) / 2
+    half = (ABOVE_FLOOR_M + thing.height_m / 2) / 2
     across = thing.breadth_m / 2
     deep = HALF_M
     shape = f'type="box" size="{HALF_M} {across} {half}"'
@@ -285,9 +279,8 @@ def model_of(touch):
         "arm": arm,
         "upper": upper,
         "layer": layer,
+        "joint": "" if touch.fixed else "<freejoint/>",
     }
-    if touch.fixed:
-        words["joint"] = ""
     if thing.layered:
         words |= {"contact": mujoco_layer.CONTACT, "dimensions": 1, "foot_x": 0.2}
         words["pad_loss"] = 2.0 * math.sqrt(k * PAD_KG)
@@ -298,8 +291,8 @@ def simulate(touch):
     """One touch, as the board would have recorded it.
 
     Returns:
-        The recording; (n,) newtons that the pads bear; (n,) metres that the thing has
-        moved at the height of the contact. The skin cannot see the last two.
+        The recording, and (n,) metres that the thing has moved at the height of the
+        contact, which the skin cannot see.
     """
     model, where = model_of(touch)
     row, column = np.array(where).T
@@ -323,42 +316,30 @@ def simulate(touch):
     lasts_s = LEAD_S + TOUCH_S + 0.6 * max(1.0 / touch.speed - 1.0, 0.0)
     t = np.arange(round(lasts_s * RATE_HZ) + 1) / RATE_HZ
     loads = np.zeros((len(t), ROWS, CODY_SKIN["cols"]))
-    pulls = np.zeros((*loads.shape, 2))
     joints = np.zeros((len(t), ARM.dof))
     places = np.zeros((len(t), 3))
     body = data.body("thing")
     for i in range(len(t)):
         loads[i, row, column] = felt()
-        pulls[i, row, column] = tangents(model, data, pads, column, felt(), rub.pull)
         joints[i] = data.qpos[: ARM.dof]
         places[i] = body.xpos + ABOVE_FLOOR_M * body.xmat[2::3]
         for _ in range(round(1.0 / (RATE_HZ * model.opt.timestep))):
             data.ctrl[:] = touch.equilibrium_rad + touch.rate_rad_s * data.time
             rub.hold(data, felt())
             mujoco.mj_step(model, data)
-    frames, shear = readings(touch, loads, pulls)
     skin = {**CODY_SKIN, "counts_per_newton": COUNTS_PER_NEWTON}
     skin |= {"threshold_counts": THRESHOLD_COUNTS, "onset_counts": ONSET_COUNTS}
     meta = {"labels": touch.labels, "skin": skin, "arm": ARM.to_dict()}
     meta["source"] = "MuJoCo, tests/bench/mujoco_touch.py"
     moved_m = np.hypot(*(places - places[0])[:, :2].T)
-    recording = Recording(t, frames, joints=joints, meta=meta, shear=shear)
-    return recording, loads.sum(axis=(1, 2)), moved_m
+    return Recording(t, readings(touch, loads), joints=joints, meta=meta), moved_m
 
 
-def readings(touch, loads, pulls):
-    """The counts (n, rows, cols) and shear (n, rows, cols, 2) that an electronics of
-    these newtons gives, with noise."""
+def readings(touch, loads):
+    """The counts (n, rows, cols) that an electronics of these newtons gives, with
+    noise."""
     counts = loads * COUNTS_PER_NEWTON
-    shear = pulls * COUNTS_PER_NEWTON
     if touch.noise is not None:
         counts += touch.noise.normal(0.0, NOISE_COUNTS, counts.shape)
-        shear += touch.noise.spawn(1)[0].normal(0.0, NOISE_COUNTS, shear.shape)
-    counts = limited(counts.clip(0.0)).astype(np.uint16)
-    return counts, np.rint(limited(shear)).astype(np.int16)
-
-
-def limited(counts):
-    """Counts as the electronics shows them."""
-    within = counts.clip(-MOST_COUNTS, MOST_COUNTS)
-    return np.where(np.abs(counts) < LEAST_COUNTS, 0.0, within)
+    shown = np.where(counts < LEAST_COUNTS, 0.0, counts.clip(0.0, MOST_COUNTS))
+    return shown.astype(np.uint16)

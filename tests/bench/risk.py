@@ -29,6 +29,7 @@ from itertools import chain
 
 import numpy as np
 import pandas as pd
+from joblib import cpu_count
 from numpy.typing import NDArray
 from scipy.stats import binom
 
@@ -61,8 +62,9 @@ BINS = 10
 SEEDS = 5
 COUNT = 20
 FRESH = 10
+TRIALS = 140
 """Batches, each of a seed of its own; trials of each object and condition in a
-batch, and of the touches that judge full exports."""
+batch, and of the touches that judge full exports; trials of a data set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,11 +216,11 @@ def exported(seed):
     return judged_rows
 
 
-def measure(sets, exports, trials, seed, jobs):
+def measure(sets, exports):
     """Simulate, fit, count; 1 where a promise is broken more often than chance
     explains."""
-    workers = Workers(jobs)
-    seeds = np.random.SeedSequence(seed).generate_state(SEEDS).tolist()
+    workers = Workers(cpu_count())
+    seeds = np.random.SeedSequence(0).generate_state(SEEDS).tolist()
     batches = workers.map("batches of trials", simulated, [(s,) for s in seeds])
     pool = np.array([t for batch, _ in batches for t in batch.trials], dtype=object)
     X = np.concatenate([vectors for _, vectors in batches], axis=1)
@@ -227,16 +229,16 @@ def measure(sets, exports, trials, seed, jobs):
     ends = np.cumsum(first.widths())
     columns = np.split(np.arange(ends[-1]), ends[:-1])
     shared = {"pool": X, "columns": dict(zip(first.names, columns, strict=True))}
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     cases = []
     for _ in range(sets):
-        rows = np.sort(rng.permutation(len(pool))[:trials])
+        rows = np.sort(rng.permutation(len(pool))[:TRIALS])
         fields = {**vars(first), "trials": tuple(pool[rows])}
         cases.append((DrawnSet(**fields, rows=rows, **shared), y))
     results = workers.map("data sets", judged, cases)
     certified, fronts, trusted = map(chain.from_iterable, zip(*results, strict=True))
-    seeds = [(seed + number,) for number in range(1, exports + 1)]
-    full = workers.map("full exports", exported, seeds)
+    seeds = range(1, exports + 1)
+    full = workers.map("full exports", exported, [(seed,) for seed in seeds])
     trusted = [*trusted, *chain.from_iterable(full)]
     certified = summed_up(certified, ["task", "asked"], certificate)
     fronts = summed_up(fronts, ["task", "front"], interval)
@@ -294,7 +296,4 @@ if __name__ == "__main__":
         __doc__,
         ("--sets", 140, "data sets drawn"),
         ("--exports", 4, "further data sets, exported in full"),
-        ("--trials", 140, "trials of each"),
-        ("--seed", 0, "of the trials and the sets"),
-        ("--jobs", 2, "processes"),
     )

@@ -93,7 +93,6 @@ SHIFTS = {
     "two of three frames lost": lambda r: part(r, slice(None, None, 3)),
     "half of the taxels dead": counts(half_dead),
     "counts doubled": counts(lambda frames: 2.0 * frames),
-    "counts tenfold": counts(lambda frames: 10.0 * frames),
     "a tenth of the counts": counts(lambda frames: 0.1 * frames),
     "60 counts on all taxels": counts(lambda frames: frames + 60.0),
     "a sleeve: 100 counts less": counts(lambda frames: frames - 100.0),
@@ -105,7 +104,6 @@ SHIFTS = {
     "frozen frames": frozen,
     "joint angles constant": joints(lambda q: np.repeat(q[:1], len(q), axis=0)),
     "joint angles of the other sign": joints(lambda q: -q),
-    "joints in reversed order": joints(lambda q: q[:, ::-1].copy()),
 }
 
 

@@ -1,31 +1,23 @@
-"""`make stopping`: deciding when sure beside fixed windows and beside others' early
-decisions.
+"""`make stopping`: deciding when sure beside fixed windows and beside extra trees.
 
 All decide on the same five folds; ours has the settings of an export. Extra trees
 decide at the first point at which their highest class probability passes a threshold.
-CALIMERA (Bilski and Jastrzebska, CALIMERA: a new early time series classification
-method, 2023) decides with calibrated ridge classifiers, at several prices of waiting.
-Each of these has four sets of features, joint angles among them, and the set that errs
-least at the time is shown, which favours it. "set chosen" shows extra trees as a user
-could have them: their set is chosen for the trials of each fold by those of the other
-folds, as ours is. Columns are compared at the same mean time, between two thresholds or
-prices by interpolation, as means over the data sets. The gain is by how much deciding
-when sure errs less than the fixed window. The other differences are by how much it errs
-less than the peer with the lowest mean, and than the trees whose set is chosen. Standard
-errors are those of the paired differences over the data sets.
+They have four sets of features, joint angles among them, and the set that errs least at
+the time is shown, which favours them. "set chosen" shows extra trees as a user could
+have them: their set is chosen for the trials of each fold by those of the other folds,
+as ours is. Columns are compared at the same mean time, between two thresholds by
+interpolation, as means over the data sets. The gain is by how much deciding when sure
+errs less than the fixed window. The other differences are by how much it errs less than
+the trees, and than the trees whose set is chosen. Standard errors are those of the
+paired differences over the data sets.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import sem
-from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import ExtraTreesClassifier
-from sklearn.kernel_ridge import KernelRidge
-from sklearn.linear_model import RidgeClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from edge.model.info import StoppingRule
 from edge.touch.features import SAMPLES
@@ -41,49 +33,31 @@ from train.tradeoff.choices import followed
 from train.tradeoff.early import FOLDS, compare_stopping
 
 SECONDS = np.array(DECISION_POINTS_S)
-WAITING = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
-"""Prices of waiting for the full window, in wrong decisions."""
 SETS = (
     "paper contact",
     "contact joints",
     "contact sqrt_joints",
     "contact moments joints",
 )
-"""The features of the extra trees and of CALIMERA."""
+"""The features of the extra trees."""
 NAMES = tuple(dict.fromkeys(" ".join(SETS).split()))
 FIXED = "fixed window, % wrong"
 SURE = "when sure"
 TREES_FIXED = "extra trees, fixed window"
-PEERS = ("extra trees", "CALIMERA")
+TREES = "extra trees"
 CHOSEN = "extra trees, set chosen"
 
 
-# A curve is [(mean seconds, share wrong)] at each threshold or price.
-
-
-def decided(stops, right):
-    """(mean seconds, share wrong) of trials that are decided at the points `stops`
-    (n,)."""
-    hits = right[stops, np.arange(len(stops))]
-    return SECONDS[stops].mean(), 1.0 - hits.mean()
-
-
-def first_certain(certainty, limits):
-    """(limits, n) the points at which trials are decided."""
-    passed = np.stack([certainty >= limit for limit in limits])
-    passed[:, -1] = True
-    return passed.argmax(axis=1)
+# A curve is [(mean seconds, share wrong)] at each threshold.
 
 
 class Trees(NamedTuple):
-    """What extra trees of one set of features cost.
+    """What extra trees of one set of features cost when sure.
 
     Attributes:
-        fixed: their curve at fixed windows.
-        seconds, wrong: (thresholds, n) for each trial, when sure.
+        seconds, wrong: (thresholds, n) for each trial.
     """
 
-    fixed: Any
     seconds: Any
     wrong: Any
 
@@ -94,16 +68,19 @@ class Trees(NamedTuple):
 
 
 def extra_trees(X, labels, folds):
-    """The extra trees of a set of features at each decision point, X (points, n, p)."""
+    """Extra trees of a set of features, X (points, n, p): their curve at fixed windows,
+    and what they cost when sure."""
     model = ExtraTreesClassifier(random_state=0)
     options = {"cv": PredefinedSplit(folds), "method": "predict_proba"}
     shares = np.stack([cross_val_predict(model, x, labels, **options) for x in X])
     classes = np.unique(labels)
     right = classes[shares.argmax(axis=2)] == labels
     fixed = list(zip(SECONDS, 1.0 - right.mean(axis=1), strict=True))
-    stops = first_certain(shares.max(axis=2), THRESHOLDS)
+    passed = shares.max(axis=2) >= THRESHOLDS[:, None, None]
+    passed[:, -1] = True
+    stops = passed.argmax(axis=1)
     wrong = ~right[stops, np.arange(len(labels))]
-    return Trees(fixed, SECONDS[stops], wrong)
+    return fixed, Trees(SECONDS[stops], wrong)
 
 
 def of_chosen_set(by_set, folds):
@@ -119,67 +96,18 @@ def of_chosen_set(by_set, folds):
             best = by_set[np.nan_to_num(percentages, nan=np.inf).argmin()]
             taken_s[:, test] = best.seconds[:, test]
             wrong[:, test] = best.wrong[:, test]
-        chosen = Trees(None, taken_s, wrong)
+        chosen = Trees(taken_s, wrong)
         curve.append((seconds, at([chosen.curve()], seconds) / 100))
     return curve
 
 
-def halts(calibrating, new, waiting):
-    """(m,) the point at which CALIMERA decides: the first at which no later one is
-    cheaper.
-
-    At each point but the last a kernel ridge regression on the two highest
-    probabilities predicts how much cheaper it is to go on, from the last point to the
-    first.
-
-    Args:
-        calibrating: (points, n, classes) probabilities of trials that no part of their
-            model has seen.
-        new: (points, m, classes) probabilities of the trials to decide.
-        waiting: (points,) price of waiting, in wrong decisions.
-    """
-    calibrating, new = (np.sort(shares)[..., -2:] for shares in (calibrating, new))
-    prices = 1.0 - calibrating[..., -1] + waiting[:, None]
-    best = prices[-1]
-    at = np.full(new.shape[1], len(waiting) - 1)
-    for point in range(len(waiting) - 2, -1, -1):
-        shares = calibrating[point]
-        model = KernelRidge(kernel="rbf").fit(shares, prices[point] - best)
-        best = np.where(model.predict(shares) <= 0.0, prices[point], best)
-        at[model.predict(new[point]) <= 0.0] = point
-    return at
-
-
-def calimera(X, labels, folds):
-    """CALIMERA at each decision point, X (points, n, p), a row for each of
-    `WAITING`."""
-    stops = np.empty((len(WAITING), len(labels)), dtype=np.int64)
-    right = np.empty(X.shape[:2], dtype=bool)
-    ridge = make_pipeline(StandardScaler(), RidgeClassifier(alpha=10.0))
-    model = CalibratedClassifierCV(ridge, cv=2)
-    for fold in range(FOLDS):
-        test = folds == fold
-        calibrating = []
-        new = []
-        for point, vectors in enumerate(X):
-            train = vectors[~test], labels[~test]
-            options = {"cv": 3, "method": "predict_proba"}
-            calibrating.append(cross_val_predict(model, *train, **options))
-            new.append(model.fit(*train).predict_proba(vectors[test]))
-            right[point, test] = model.classes_[new[-1].argmax(axis=1)] == labels[test]
-        for i, price in enumerate(WAITING):
-            waiting = price * SECONDS / SECONDS[-1]
-            stops[i, test] = halts(calibrating, new, waiting)
-    return [decided(at, right) for at in stops]
-
-
 def peers(by_set, labels, folds):
     """{peer: its curves on a task, one for each set of features}."""
-    trees = [extra_trees(X, labels, folds) for X in by_set]
+    rivals = [extra_trees(X, labels, folds) for X in by_set]
+    fixed, trees = zip(*rivals, strict=True)
     return {
-        TREES_FIXED: [of_set.fixed for of_set in trees],
-        "extra trees": [of_set.curve() for of_set in trees],
-        "CALIMERA": [calimera(X, labels, folds) for X in by_set],
+        TREES_FIXED: fixed,
+        TREES: [of_set.curve() for of_set in trees],
         CHOSEN: [of_chosen_set(trees, folds)],
     }
 
@@ -247,16 +175,14 @@ def compare(curves, seconds):
     sure, and the peers; and differences with their standard errors."""
     wrong = {
         name: np.array([at(of_set[name], seconds) for of_set in curves])
-        for name in (FIXED, TREES_FIXED, SURE, *PEERS, CHOSEN)
+        for name in (FIXED, TREES_FIXED, SURE, TREES, CHOSEN)
     }
     means = {name: of_sets.mean() for name, of_sets in wrong.items()}
-    best = min(PEERS, key=lambda name: np.nan_to_num(means[name], nan=np.inf))
     row = {name: cell(means[name]) for name in (FIXED, TREES_FIXED, SURE)}
     row["gain"] = difference(wrong[FIXED] - wrong[SURE])
-    row |= {name: cell(means[name]) for name in PEERS}
-    row["best of these less when sure"] = difference(wrong[best] - wrong[SURE])
-    row[CHOSEN] = cell(means[CHOSEN])
-    row["these less when sure"] = difference(wrong[CHOSEN] - wrong[SURE])
+    for name in (TREES, CHOSEN):
+        row[name] = cell(means[name])
+        row[f"{name}, less when sure"] = difference(wrong[name] - wrong[SURE])
     return row
 
 

@@ -9,11 +9,9 @@ import errno
 import json
 import math
 import os
-import re
 import shutil
 import signal
 import subprocess
-import time
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -71,7 +69,7 @@ class Adapter(UsbAdapter):
             self.bus.now() + self._playback.ends if interrupt else math.inf
         )
 
-    def control(self, setup, data=b""):
+    def control(self, setup, data):
         """Answer a request; the last chip's reading of a frame is followed by the next
         frame."""
         answer = super().control(setup, data)
@@ -145,8 +143,6 @@ def edge(capsys):
 
 def outcome(rig, text):
     """What a command printed and wrote, without times and names of files."""
-    if "\x1b[H" in text:
-        return re.sub(r" *[0-9.]+ s ", "", text.split("\x1b[H")[-1])
     lines = [json.loads(line) for line in text.splitlines()]
     keys = ("event", "state", "invalid", "noise_median", "task", "label", "complete")
     printed = [[line.get(key) for key in keys] for line in lines]
@@ -162,11 +158,9 @@ RECORD = "--label object=box --trials 1 --length 60"
 @pytest.mark.parametrize(
     ("skin", "command", "options", "expected", "times"),
     [
-        ("pad", "scan", "", '"state": "running"', 2),
         ("pad", "calibrate", "--frames 20 --force", '"noise_median": 1.', 1),
         ("pad", "record", RECORD, '"complete": true', 1),
         ("pad", "run", "--without-joints skin", '"event": "decision"', 3),
-        ("pad", "view", "", "9 taxels", 1),
         ("cody", "scan", "", '"state": "running"', 8),
         ("cody", "run", "--without-joints skin", '"event": "decision"', 3),
     ],
@@ -182,7 +176,7 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
 ):
     rig = Rig(skin, tmp_path)
     frames = rig.touch
-    interrupt = command in ("run", "view")
+    interrupt = command == "run"
     if command == "calibrate":
         # Any 20 frames in a row have the same values, wherever the reading begins.
         noise = np.random.default_rng(5).integers(0, 4, frames[:20].shape, np.uint16)
@@ -206,12 +200,12 @@ def test_a_command_does_over_the_kernel_what_it_does_over_the_fake_bus(
 
 # The driver of this adapter has a timeout of its own, 2 s, and ignores I2C_TIMEOUT.
 @pytest.mark.parametrize(
-    ("fault", "address", "error", "lasts_s"),
+    ("fault", "address", "error"),
     [
-        ("absent", ABSENT, BusNack, (0.0, 2.0)),
-        ("short", CHIP, BusFault, (0.0, 2.0)),
-        (errno.EIO, CHIP, BusFault, (0.0, 2.0)),
-        (errno.ETIMEDOUT, CHIP, BusFault, (2.0, 10.0)),
+        ("absent", ABSENT, BusNack),
+        ("short", CHIP, BusFault),
+        (errno.EIO, CHIP, BusFault),
+        (errno.ETIMEDOUT, CHIP, BusFault),
     ],
     ids=["absent chip", "shortened transfer", "stalled transfer", "hung transfer"],
 )
@@ -221,15 +215,12 @@ def test_a_transfer_fails_with_its_error_and_the_next_is_carried(
     fault,
     address,
     error,
-    lasts_s,
 ):
     pad.adapter.short = fault == "short"
     if isinstance(fault, int):
         pad.adapter.bus.inject([Fault(code=fault, at=[0])])
-    began = time.monotonic()
     with pytest.raises(error):
         fetch(bus, address, b"\x04", CHIP_BYTES)
-    assert lasts_s[0] <= time.monotonic() - began < lasts_s[1]
     pad.adapter.short = False
     assert fetch(bus, CHIP, CONFIGURATION, 1) == EXPECTED
 
@@ -285,7 +276,7 @@ def test_a_skin_whose_adapter_comes_back_with_another_number_is_read_again(pad):
     with Skin.open(pad.path) as skin:
 
         def read_until(happened):
-            for frame in Loop(skin, lasts_s=60.0).frames():
+            for frame in Loop(skin, lasts_s=600.0).frames():
                 heard.extend(skin.bus_changes())
                 if happened(frame):
                     return frame

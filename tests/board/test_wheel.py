@@ -87,14 +87,6 @@ def test_the_demo_decides_rightly_and_meets_its_golden_outputs(command):
     assert result.returncode == 0, result.stderr
 
 
-def test_a_command_without_hardware_says_so_in_one_sentence(command):
-    result = command("run", "--model", "model.onnx", "--skin", "skin.toml")
-    assert result.returncode == 2
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.startswith("edge-classify: ")
-
-
 def test_numpy_runs_the_models_where_onnxruntime_is_missing(bare_command, exported):
     assert bare_command("-c", "import onnxruntime", program="python").returncode != 0
     result = bare_command("demo")
@@ -106,14 +98,3 @@ def test_numpy_runs_the_models_where_onnxruntime_is_missing(bare_command, export
     passed = [json.loads(line)["passed"] for line in result.stdout.splitlines()]
     assert passed
     assert all(passed)
-
-
-def test_both_engines_print_the_same_decisions(bare_command, command):
-    def decisions(run):
-        result = run("demo", "--json")
-        lines = map(json.loads, result.stdout.splitlines())
-        return [{**line, "latency_ms": 0} for line in lines]
-
-    expected = decisions(command)
-    assert expected
-    assert decisions(bare_command) == expected
