@@ -204,7 +204,6 @@ def reading(
     *,
     model: Model | None = None,
     arm: Chain | None = None,
-    dof: int | None = None,
     needs_joints: bool = True,
     real_time: bool = False,
     **page: Any,
@@ -215,7 +214,6 @@ def reading(
         arguments: with the options of `options.add_reading`.
         model: decides on the contacts; its arm and its angles are wanted, if no others.
         arm: whose angles are wanted.
-        dof: how many angles are wanted.
         needs_joints: refuse a source without the angles that the model needs.
         real_time: play a recording at its original speed, whatever the options say, as
             a page always does.
@@ -225,7 +223,8 @@ def reading(
         InputError: the options cannot be used.
         EdgeError: the skin cannot be read.
     """
-    if model is not None and dof is None:
+    dof = None if arm is None else arm.dof
+    if model is not None and arm is None:
         arm = model.info.chain
         dof = model.info.dof
     if arguments.fake is not None:

@@ -32,8 +32,6 @@ REST = tuple(range(233, 242))
 """256-colour greys by force, for taxels outside every region."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 """Dark red to white by force, for the taxels of a region."""
-INK = 16
-"""Black, for arrows."""
 LOST = 18
 """Dark blue, for a taxel that cannot be read."""
 LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be read   q quits"
@@ -75,34 +73,21 @@ def _shades(palette: Sequence[int], share: Floats) -> Colours:
     return shades
 
 
-def picture(
-    colour: Colours,
-    *,
-    wide: int = 2,
-    arrows: Sequence[Sequence[str]] | None = None,
-) -> str:
+def picture(colour: Colours, *, wide: int = 2) -> str:
     """Lines of half-blocks, with an escape sequence wherever the colour changes.
 
     Args:
         colour: (rows, cols) numbers in the 256-colour palette.
         wide: characters per taxel.
-        arrows: for each column of each line, an arrow that stands on the upper taxel's
-            colour in place of its half-blocks, or an empty text.
     """
     lines = []
-    for number, top in enumerate(range(0, len(colour), 2)):
+    for top in range(0, len(colour), 2):
         line = ""
         cells = zip(*colour[top : top + 2].tolist(), strict=True)
-        signs = [""] * colour.shape[1] if arrows is None else arrows[number]
-        pairs = zip(cells, signs, strict=False)
-        for ((upper, *lower), sign), taxels in groupby(pairs):
+        for (upper, *lower), taxels in groupby(cells):
             background = f"48;5;{lower[0]}" if lower else "49"
-            escape = f"\x1b[38;5;{upper};{background}m"
-            text = "▀" * wide
-            if sign:
-                escape = f"\x1b[38;5;{INK};48;5;{upper}m"
-                text = sign.ljust(wide)
-            line += escape + text * len(list(taxels))
+            blocks = "▀" * wide * len(list(taxels))
+            line += f"\x1b[38;5;{upper};{background}m{blocks}"
         lines.append(line + PLAIN)
     return "\n".join(lines)
 

@@ -19,7 +19,7 @@ from edge.commands.source import reading
 from edge.errors import printable
 from edge.events import Decided, Event, Onset
 from edge.model.model import Model
-from edge.tools import arrows, terminal
+from edge.tools import terminal
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -48,9 +48,7 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
     texts = [terminal.caption(frame, regions, layout)]
     texts += [f"{printable(task)}: {text}" for task, text in decisions.items()]
     lines = [line for text in texts for line in textwrap.wrap(text, columns)]
-    shear = arrows.region_shear(frame, regions)
-    signs = None if shear is None else arrows.characters(shear)
-    picture = terminal.picture(colour[:, :columns], wide=wide, arrows=signs)
+    picture = terminal.picture(colour[:, :columns], wide=wide)
     return "\n".join([picture, *lines, *terminal.legend(columns)])
 
 
