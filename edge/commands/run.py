@@ -21,9 +21,9 @@ from edge.commands.options import (
     check_error,
     within,
 )
-from edge.commands.output import LOG, counted
+from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
-from edge.events import MOST_PLACES, Aside, Event
+from edge.events import Event
 from edge.model.model import Model
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
@@ -74,18 +74,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def warn_of_still_taxels(events: Sequence[Event]) -> None:
-    """Say on stderr which taxels are set aside."""
-    for event in events:
-        if isinstance(event, Aside) and event.taxels:
-            places = ", ".join(map(str, event.taxels[:MOST_PLACES]))
-            LOG.warning(
-                f"{counted(len(event.taxels), 'taxel')} above the threshold without a "
-                f"touch, at (row, column) {places}: set aside until they fall or change. "
-                "Take away what leans on the skin, or calibrate it again"
-            )
-
-
 def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
     """The last event: the loop's periods and the number of lines that were lost."""
     periods = {}
@@ -134,7 +122,6 @@ def run(arguments: argparse.Namespace) -> int:
             for frame, faults in live.frames():
                 frames += 1
                 decided = classifier.push(frame)
-                warn_of_still_taxels(decided)
                 for listen in listeners:
                     listen(frame, decided)
                 lines.write([*faults, *(event.to_dict() for event in decided)])

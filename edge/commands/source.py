@@ -115,14 +115,9 @@ def open_skin(
 
 def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) -> Opened:
     """The recording of --fake, played onto fake chips."""
-    from edge.fake.player import carried_hz, play_file  # a robot has a skin
+    from edge.fake.player import play_file  # a robot has a skin
 
     file = None if arguments.skin is None else skinfile.load(arguments.skin)
-    if file is not None and carried_hz(file) < file.reading.rate_hz:
-        LOG.warning(
-            f"{arguments.skin}: the wires carry {carried_hz(file):.1f} frames a second, "
-            f"not the {file.reading.rate_hz:g} that are played; see `edge-classify check`"
-        )
     skin, playback = play_file(
         arguments.fake,
         file,

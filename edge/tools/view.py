@@ -2,7 +2,7 @@
 
 Draws the skin and, with --model, the latest decisions. Taxels in contact are red to
 white by force, those below the contact threshold grey, and those that cannot be read
-blue. Each line shows two rows of taxels, with row 0 at the top. q or Ctrl-C quits. With
+blue. Each line shows two rows of taxels, with row 0 at the top. Ctrl-C quits. With
 --web, a page for a browser shows the same, with the features of each contact over time.
 """
 
@@ -73,14 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
             real_time=sys.stdout.isatty(),
             decides=model is not None,
         ) as live,
-        terminal.keys(live.stop) as typed,
         terminal.drawing() if live.page is None else nullcontext(),
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
         layout = live.skin.layout if classifier is None else classifier.layout
         interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
-            typed()  # q ends the loop
             events = [] if classifier is None else classifier.push(frame)
             live.show(frame, faults, events)
             _follow(events, decisions)

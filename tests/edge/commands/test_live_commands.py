@@ -46,15 +46,6 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     assert "no contact was saved; taxels without a valid value: 100" in err
 
 
-def test_a_rehearsal_says_that_the_wires_carry_fewer_frames(edge, tmp_path):
-    skin = tmp_path / "skin.toml"
-    text = skinfile.shipped("matrix").read_text()
-    skin.write_text(text.replace("baud = 2_000_000", "baud = 9_600"))
-    saving.save(tmp_path / "rest.npz", still(skinfile.load(skin), 0.5))
-    _, _, err = edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")
-    assert f"{skin}: the wires carry 5.7 frames a second, not the 100 that" in err
-
-
 def answered(event):
     """What an event says of the touch, but for its times.
 
