@@ -206,9 +206,9 @@ def trial_path(folder: Path, labels: dict[str, str]) -> Path:
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
     labels = _labels(arguments)
-    check_writable(arguments.out)
     model = None if arguments.model is None else Model(arguments.model)
     arm = _arm(arguments, model)
+    check_writable(arguments.out)
     with (
         # Angles go by the real clock.
         reading(

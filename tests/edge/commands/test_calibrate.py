@@ -125,11 +125,10 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
 ):
     spoil, sentence = unusable_taxel
     spoil()
-    for options in ((), ("--force",)):
-        status, _, err = measured(quiet, *options)
-        assert status == 2
-        assert skinfile.load(skin).calibration is None
-        assert sentence in err
+    status, _, err = measured(quiet, "--force")
+    assert status == 2
+    assert skinfile.load(skin).calibration is None
+    assert sentence in err
 
 
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(

@@ -90,22 +90,6 @@ def test_without_a_manager_no_socket_is_opened(notifier, address, monkeypatch):
     assert opened == []
 
 
-def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
-    tmp_path,
-    clock,
-    notifier,
-):
-    address = str(tmp_path / "later")
-    service = notifier(NOTIFY_SOCKET=address, WATCHDOG_USEC="2000000")
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-        service.ready()
-        service.alive()
-        listener.bind(address)
-        clock.sleep_until(101.0)
-        service.alive()
-        assert messages(listener) == ["WATCHDOG=1"]
-
-
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, notifier):
     service = notifier()
     for _ in range(10_000):  # far more than a socket's queue takes

@@ -70,11 +70,3 @@ def test_a_model_of_a_skin_that_no_touch_reaches_is_refused(model):
     info = replace(model.info, layout=deaf)
     with pytest.raises(InputError, match="begins above 65535 counts, which no taxel"):
         bench.time_stages(SimpleNamespace(info=info, path="model.onnx"), 4)
-
-
-def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, refused):
-    out = tmp_path / "board.json"
-    err = refused("bench", "--model", "missing.onnx", "--out", out)
-    assert "missing.onnx: no such model" in err
-    assert err.count("\n") == 1
-    assert not out.exists()
