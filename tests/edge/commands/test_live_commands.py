@@ -146,10 +146,6 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     ("arguments", "sentence"),
     [
         (["--loop"], "--loop and --real-time work only with --fake"),
-        (
-            ["--real-time", "--skin", "PAD"],
-            "--loop and --real-time work only with --fake",
-        ),
         ([], "give --skin skin.toml, or --fake REC.npz to use no hardware"),
         (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),

@@ -227,13 +227,6 @@ def test_record_says_what_it_needs(options, sentence, refused):
     assert sentence in refused("record", "--fake", demo.recordings()[0], *options)
 
 
-def test_a_contact_cut_off_by_the_end_is_saved_as_incomplete(record):
-    status, (event,), _ = record("--seconds", 0.5)
-    assert status == 0
-    assert not event["complete"]
-    assert event["seconds"] == 0.49
-
-
 @pytest.fixture
 def record_with_page(edge, brief, trials, monkeypatch):
     """Record with a page, as fast as the machine can; returns status and events."""

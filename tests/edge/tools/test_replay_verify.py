@@ -5,7 +5,6 @@ import sys
 import numpy as np
 import pytest
 
-from edge.cli import main
 from edge.tools.replay import Summary, compared
 from tests.conftest import decided, ended, python
 
@@ -51,14 +50,6 @@ def test_a_recording_without_contact_says_so(replay, quiet):
     assert status == 0
     assert [e["event"] for e in events] == ["no_contact"]
     assert "0 of 1 right" in err
-
-
-def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, capsys):
-    assert replay(tmp_path)[0] == 2
-    assert main(["replay", "--model", str(tmp_path / "no.onnx"), str(tmp_path)]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("edge-classify: ")
-    assert err.count("\n") == 1
 
 
 @pytest.fixture
