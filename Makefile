@@ -297,10 +297,11 @@ requirements-board.txt: $(VENV)/.upkeep pyproject.toml constraints.txt
 	$(COMPILE) --universal --generate-hashes --custom-compile-command "make $@" -o $@
 
 # setuptools would pack modules that an earlier build left behind.
-wheel: $(READY)
+wheel: $(VENV)/.upkeep
 	rm -rf build/lib build/bdist.* dist
 	PIP_CONSTRAINT=$(CURDIR)/constraints.txt SOURCE_DATE_EPOCH=1577836800 \
 	  $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w dist .
+	$(BIN)/python tests/board/recompress.py dist/*.whl
 
 wheel-test: $(DEV) wheel
 	$(BIN)/python -m pytest tests/board/test_wheel.py

@@ -201,8 +201,7 @@ def standing_out(file: SkinFile, baseline: Counts) -> Integers:
     """Counts (rows, cols) by which working taxels rest beyond the usual differences to
     others of their kind, in the direction of a touch.
 
-    A skin that is covered as a whole is not noticed; of chips that can rest at 0, a
-    warning says that they do not.
+    A skin that is covered as a whole is not noticed.
     """
     change = np.zeros(baseline.size, dtype=np.int64)
     for kind in {chip.kind for chip in file.chips}:
@@ -211,11 +210,6 @@ def standing_out(file: SkinFile, baseline: Counts) -> Integers:
         signs = np.concatenate([[chip.sign] * len(chip.served) for chip in chips])
         rest = baseline.ravel()[taxels].astype(np.int64)
         middle = int(np.median(rest))
-        if kind.rests_at_zero and signs.min() > 0 and middle > file.layout.onset:
-            LOG.warning(
-                f"the skin rests at about {middle} counts, not at 0; that is wrong if "
-                "something covers it"
-            )
         above = (rest - middle) * signs
         usual = int(SPREADS * np.median(np.abs(above)))
         change[taxels] = np.maximum(above - usual, 0)

@@ -21,19 +21,14 @@ from edge.commands.options import (
     check_error,
     within,
 )
-from edge.commands.output import LOG, counted
+from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
-from edge.events import MOST_PLACES, Aside, Decided, Event
-from edge.model.info import UNKNOWN
+from edge.events import Event
 from edge.model.model import Model
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
 from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
-
-LAST_TOUCHES = 20
-FEWEST_TOUCHES = 8
-"""Touches by which a model is judged to know the things that it meets."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -77,48 +72,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="MB",
         help="most megabytes of kept touches; the oldest go first (default: %(default)g)",
     )
-
-
-class UnknownTouches:
-    """Notices once that most of the last touches are unlike everything in training."""
-
-    def __init__(self) -> None:
-        self._touches: dict[tuple[float, int | None], bool] = {}
-        """Whether each of the last touches was unknown, by onset and number."""
-        self._noticed = False
-
-    def push(self, events: Sequence[Event]) -> dict[str, Any] | None:
-        """Take in events; the event of the notice, once, which is also logged."""
-        for event in events:
-            if isinstance(event, Decided):
-                touch = event.onset_s, event.contact
-                former = self._touches.get(touch, False)
-                self._touches[touch] = former or UNKNOWN in event.flags
-        for touch in list(self._touches)[:-LAST_TOUCHES]:
-            del self._touches[touch]
-        count = sum(self._touches.values())
-        touches = len(self._touches)
-        if self._noticed or touches < FEWEST_TOUCHES or 2 * count <= touches:
-            return None
-        self._noticed = True
-        LOG.warning(
-            f"{count} of the last {touches} touches are unlike all training trials: "
-            "the model does not know these things. Record some touches of them, label "
-            "them, and export a model with them"
-        )
-        return {"event": "unknown_touches", "unknown": count, "touches": touches}
-
-
-def warn_of_still_taxels(events: Sequence[Event]) -> None:
-    """Say on stderr which taxels are set aside."""
-    for event in events:
-        if isinstance(event, Aside) and event.taxels:
-            places = ", ".join(map(str, event.taxels[:MOST_PLACES]))
-            LOG.warning(
-                f"{counted(len(event.taxels), 'taxel')} above the threshold without a "
-                f"touch, at (row, column) {places}: set aside until they fall or change. "
-                "Take away what leans on the skin, or calibrate it again"
-            )
 
 
 def end_event(schedule: Schedule, frames: int, lost: int) -> dict[str, Any]:
@@ -165,17 +118,12 @@ def run(arguments: argparse.Namespace) -> int:
             closing(live.lines()) as lines,
             _listeners(arguments, model, live.opened) as listeners,
         ):
-            unknown_touches = UnknownTouches()
             frames = 0
             for frame, faults in live.frames():
                 frames += 1
                 decided = classifier.push(frame)
-                warn_of_still_taxels(decided)
                 for listen in listeners:
                     listen(frame, decided)
-                notice = unknown_touches.push(decided)
-                if notice is not None:
-                    faults.append(notice)
                 lines.write([*faults, *(event.to_dict() for event in decided)])
                 live.show(frame, faults, decided)
                 if lines.gone:

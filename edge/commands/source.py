@@ -115,14 +115,9 @@ def open_skin(
 
 def _played(arguments: argparse.Namespace, joint_names: Sequence[str] | None) -> Opened:
     """The recording of --fake, played onto fake chips."""
-    from edge.fake.player import carried_hz, play_file  # a robot has a skin
+    from edge.fake.player import play_file  # a robot has a skin
 
     file = None if arguments.skin is None else skinfile.load(arguments.skin)
-    if file is not None and carried_hz(file) < file.reading.rate_hz:
-        LOG.warning(
-            f"{arguments.skin}: the wires carry {carried_hz(file):.1f} frames a second, "
-            f"not the {file.reading.rate_hz:g} that are played; see `edge-classify check`"
-        )
     skin, playback = play_file(
         arguments.fake,
         file,
@@ -204,7 +199,6 @@ def reading(
     *,
     model: Model | None = None,
     arm: Chain | None = None,
-    dof: int | None = None,
     needs_joints: bool = True,
     real_time: bool = False,
     **page: Any,
@@ -215,7 +209,6 @@ def reading(
         arguments: with the options of `options.add_reading`.
         model: decides on the contacts; its arm and its angles are wanted, if no others.
         arm: whose angles are wanted.
-        dof: how many angles are wanted.
         needs_joints: refuse a source without the angles that the model needs.
         real_time: play a recording at its original speed, whatever the options say, as
             a page always does.
@@ -225,7 +218,8 @@ def reading(
         InputError: the options cannot be used.
         EdgeError: the skin cannot be read.
     """
-    if model is not None and dof is None:
+    dof = None if arm is None else arm.dof
+    if model is not None and arm is None:
         arm = model.info.chain
         dof = model.info.dof
     if arguments.fake is not None:

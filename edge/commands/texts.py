@@ -129,11 +129,6 @@ def _saved(line: Line) -> str:
     return f"{line['file']}: {text}"
 
 
-def _unknown_touches(line: Line) -> str:
-    touches = f"{line['unknown']} of the last {line['touches']} touches"
-    return f"{touches} are unknown to the model"
-
-
 TEXTS: dict[str, Callable[[Line], str]] = {
     "onset": _onset,
     "decision": _decision,
@@ -144,8 +139,6 @@ TEXTS: dict[str, Callable[[Line], str]] = {
     "aside": _aside,
     "end": _end,
     "saved": _saved,
-    "unknown_touches": _unknown_touches,
-    "deleted": "{file} is deleted".format_map,
     "no_contact": "no contact".format_map,
 }
 """The text of each event; that of any other is its JSON."""

@@ -3,8 +3,7 @@
 Times each stage with a touch that grows over the model's skin, and writes medians, 99th
 percentiles, memory and start-up time as JSON, for `make tradeoff BOARD=board.json` on
 the workstation. Each figure is that of the fastest of five rounds, as other programs
-only ever make one slower; if they took part of the processor's time, a warning says how
-much.
+only ever make one slower.
 """
 
 import argparse
@@ -18,7 +17,6 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +24,12 @@ import numpy as np
 
 from edge import __version__
 from edge.classifier import Classifier
-from edge.commands.output import LOG, Output
+from edge.commands.output import Output
 from edge.errors import InputError
 from edge.model.model import Model
 from edge.recording import Recording
 from edge.touch.first_contact import first_contact
 from edge.touch.frame import Frame
-from edge.touch.region import largest_region
 from edge.writing import write_whole
 
 RATE_HZ = 100.0
@@ -42,9 +39,6 @@ decided."""
 REPEATS = 5
 ROUNDS = 400
 """How often each stage is timed in each repeat."""
-BUSY_SHARE = 0.05
-"""Share of the time in which this process had to wait, from which a machine counts as
-busy."""
 COLD = "import edge, sys; edge.Classifier(edge.Model(sys.argv[1]))"
 Timings = dict[str, float | int]
 
@@ -84,20 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def measure(model: Model) -> dict[str, Any]:
     """The contents of board.json."""
-    real_s = time.perf_counter()
-    own_s = time.process_time()
     repeats = [time_stages(model, ROUNDS) for _ in range(REPEATS)]
-    real_s = time.perf_counter() - real_s
-    own_s = time.process_time() - own_s
-    waited = round(max(0.0, 1.0 - own_s / real_s), 3)
-    load = round(os.getloadavg()[0], 2)
-    if waited > BUSY_SHARE:
-        LOG.warning(
-            f"this machine is busy: bench waited {waited:.0%} of the time, at a load "
-            f"of {load:g} on {os.cpu_count()} cores. Its figures are the fastest of "
-            f"{REPEATS} rounds, and may still be too high; end other programs and run "
-            "it again"
-        )
     import resource  # only Linux and macOS have it
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -114,7 +95,6 @@ def measure(model: Model) -> dict[str, Any]:
             "system": platform.platform(),
             "edge-classify": __version__,
         },
-        "load": {"mean_of_a_minute": load, "waited": waited},
         "model": {
             "sha256": hashlib.sha256(model.contents.data).hexdigest(),
             "data_digest": model.info.data_digest,
@@ -154,11 +134,10 @@ def touch(model: Model, seconds: float) -> list[Frame]:
 def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
     """Median and 99th percentile of each stage in microseconds.
 
-    `region`: finding the largest region of a frame. `track`: that, the arm's pose and
-    the measures of the features. `features`: from a contact's series to its vector.
-    `decision`: ONNX Runtime and the answers of all tasks. `answer`: features and
-    decision together. `frame`: a frame within a contact, from counts to events. `last`:
-    the frame at which a decision is due, likewise.
+    `track`: the region of a frame, the arm's pose and the measures of the features.
+    `features`: from a contact's series to its vector. `decision`: ONNX Runtime and the
+    answers of all tasks. `frame`: a frame within a contact, from counts to events.
+    `last`: the frame at which a decision is due, likewise.
     """
     info = model.info
     layout = info.layout
@@ -170,23 +149,15 @@ def time_stages(model: Model, rounds: int) -> dict[str, Timings]:
             "taxel reaches"
         )
     series = contact[1]
-    counts = [frame.counts for frame in frames[INSIDE]]
     due = next(i for i, frame in enumerate(frames) if frame.t >= info.window_s)
-
-    limit = layout.threshold_counts
     vector = info.vector(series)
     calls = range(rounds)
     model.decide(vector)
     few = max(rounds // 10, 4)
     stages = {
-        "region": timed(
-            lambda image: largest_region(image, limit, wraps=layout.wraps),
-            islice(cycle(counts), rounds),
-        ),
         "track": pushed(lambda: info.tracker(layout), frames, INSIDE, rounds),
         "features": timed(lambda _: info.vector(series), calls),
         "decision": timed(lambda _: model.decide(vector), calls),
-        "answer": timed(lambda _: model.decide(info.vector(series)), calls),
         "frame": pushed(lambda: Classifier(model), frames, INSIDE, rounds),
         "last": pushed(lambda: Classifier(model), frames, slice(due, due + 1), few),
     }

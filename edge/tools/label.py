@@ -1,6 +1,6 @@
 """List the labels of recordings, or change them.
 
-Without --set, --unset, --rename, --accept and --delete, prints each recording's course
+Without --set, --unset, --accept and --delete, prints each recording's course
 of force, labels and decisions, how many recordings have each label, and which are
 probably slips. With them, shows what would change, and with --yes writes the changed
 recordings anew, each whole or not at all, if all of them can be read. --undo takes the
@@ -54,12 +54,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             "give every recording named this label; repeat it for more tasks",
         ),
         (
-            "--rename",
-            "OLD=NEW",
-            task_label,
-            "rename a task where a recording has it; repeat it for more",
-        ),
-        (
             "--unset",
             "TASK",
             str,
@@ -102,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     if arguments.delete:
         return _delete(arguments, output, [path for path, _ in recordings])
-    if arguments.accept or arguments.rename or arguments.set or arguments.unset:
+    if arguments.accept or arguments.set or arguments.unset:
         return _relabel(arguments, output, recordings)
     _print(output, recordings)
     return 0
@@ -136,8 +130,7 @@ def _relabel(
             str(path),
             recording.meta,
             labels,
-            names=dict(arguments.rename),
-            without=arguments.unset,
+            arguments.unset,
         )
         if recording.labels != after:
             changes[path] = after
@@ -343,34 +336,10 @@ def _print(output: Output, recordings: Sequence[tuple[Path, Recording]]) -> None
         output.text(f"probably a slip: {sentence}")
 
 
-def _check_names(
-    name: str,
-    labels: Mapping[str, str],
-    names: Mapping[str, str],
-) -> None:
-    """Refuse a task's new name that another label of the recording has or takes."""
-    former: dict[str, str] = {}
-    for old, new in names.items():
-        if old not in labels:
-            continue
-        if new in labels:
-            raise InputError(
-                f"{name}: has a label for {new} already; {old} cannot take its name"
-            )
-        if new in former:
-            raise InputError(
-                f"{name}: has labels for both {former[new]} and {old}; only one of "
-                f"them can become {new}"
-            )
-        former[new] = old
-
-
 def changed(
     name: str,
     meta: Mapping[str, Any],
     labels: Mapping[str, str],
-    *,
-    names: Mapping[str, str] = {},
     without: Sequence[str] = (),
 ) -> dict[str, str]:
     """A recording's labels after a change.
@@ -379,20 +348,15 @@ def changed(
         name: of the recording.
         meta: its metadata.
         labels: {task: its new label}.
-        names: {task: its new name}.
         without: tasks whose label is taken away.
 
     Raises:
-        InputError: another task of the recording has or takes the new name, or its
-            contacts have their own labels.
+        InputError: its contacts have their own labels.
     """
-    current = meta.get("labels", {})
-    _check_names(name, current, names)
-    if meta.get("contacts") and (names or labels or without):
+    if meta.get("contacts") and (labels or without):
         raise InputError(
             f"{name}: its contacts have labels of their own; `python -m train split` "
             "makes a recording of each"
         )
-    renamed = {names.get(task, task): label for task, label in current.items()}
-    after = {**renamed, **labels}
+    after = {**meta.get("labels", {}), **labels}
     return {task: after[task] for task in after if task not in without}

@@ -27,7 +27,6 @@ from edge.classifier import Classifier
 from edge.commands.options import add_reading, within
 from edge.commands.output import LOG
 from edge.commands.source import Opened, reading
-from edge.commands.texts import labels_text
 from edge.errors import InputError
 from edge.events import Decided, Event
 from edge.files import refusing
@@ -38,8 +37,7 @@ from edge.saving import save
 from edge.skin import file as skinfile
 from edge.skin.file import SkinFile
 from edge.skin.skin import Skin
-from edge.tools import terminal
-from edge.tools.label import DELETED, delete
+from edge.tools.label import DELETED
 from edge.tools.review import decisions_of
 from edge.tools.trial_options import add_arm, open_arm, task_label
 from edge.touch.arm import Chain
@@ -59,8 +57,6 @@ LEAD_S = 0.2
 """Time that a trial keeps from before its onset."""
 LENGTH_S = 2.0
 """The paper decides 1.2 s after onset; the rest leaves room for longer windows."""
-KEYS = "; a number chooses the label, d deletes the last trial, q ends:"
-DIGITS = "123456789"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -73,16 +69,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=task_label,
         metavar="TASK=LABEL",
         help="what the skin touches, such as object=box; repeat it for several tasks, "
-        "or in a terminal for several labels, which are then chosen by key; not needed "
-        "with --web",
+        "and with --web for several labels of a task, which the page then offers",
     )
     parser.add_argument(
         "--out",
         type=Path,
         default="recordings",
-        metavar="FOLDER|FILE.npz",
-        help="a folder for numbered trials (default: %(default)s), or a file for one "
-        "trial",
+        metavar="FOLDER",
+        help="a folder for numbered trials (default: %(default)s)",
     )
     parser.add_argument(
         "--model",
@@ -100,11 +94,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=LENGTH_S,
         metavar="SECONDS",
         help="longest time to keep after onset (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--dof",
-        type=int,
-        help="the number of angles in each line of --joints, without --arm",
     )
     add_arm(parser, "to be stored in each trial (without it, training assumes Cody's)")
 
@@ -194,38 +183,32 @@ def shared_meta(opened: Opened, arm: Chain | None) -> dict[str, Any]:
     return meta if arm is None else {**meta, "arm": arm.to_dict()}
 
 
-def trial_path(out: Path, labels: dict[str, str]) -> Path:
-    """The file for the next trial: `out`, or the first free number in that folder.
+def trial_path(folder: Path, labels: dict[str, str]) -> Path:
+    """The file for the next trial: the first free number in a folder.
 
     Raises:
-        InputError: `out` names a file that exists, or that no folder can hold.
+        InputError: the folder's name is impossible.
     """
     # Searches of a folder omit names that begin with a dot.
     plain = re.sub(r"[^\w.-]+", "_", "-".join(labels.values())).lstrip(".")
     stem = plain[:LONGEST_STEM] or "trial"
-    with refusing(f"{out}: cannot be written"):  # a name of 300 characters, for one
-        if out.suffix != ".npz":
-            # A deleted trial may come back under its name.
-            folders = (out, out / DELETED)
-            for number in count(1):
-                name = f"{stem}-{number:03}.npz"
-                if not any(os.path.lexists(folder / name) for folder in folders):
-                    return out / name
-        with suppress(FileNotFoundError):
-            out.lstat()
-            raise InputError(f"{out}: exists already; choose another name or remove it")
-    return out
+    # A deleted trial may come back under its name.
+    folders = (folder, folder / DELETED)
+    names = (f"{stem}-{number:03}.npz" for number in count(1))
+    with refusing(f"{folder}: cannot be written"):  # a name of 300 characters, for one
+        return next(
+            folder / name
+            for name in names
+            if not any(os.path.lexists(place / name) for place in folders)
+        )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Wait for contacts and save them; 1 if there was none."""
-    by_key = terminal.is_interactive() and arguments.web is None
-    folder = None if arguments.out.suffix == ".npz" else arguments.out
-    labels = _labels(arguments, folder, by_key)
-    check_writable(trial_path(arguments.out, labels).parent)
-    model = _model(arguments.model)
+    labels = _labels(arguments)
+    model = None if arguments.model is None else Model(arguments.model)
     arm = _arm(arguments, model)
-    dof = _dof(arguments, arm)
+    check_writable(arguments.out)
     with (
         # Angles go by the real clock.
         reading(
@@ -233,14 +216,12 @@ def run(arguments: argparse.Namespace) -> int:
             model=model,
             needs_joints=False,
             arm=arm,
-            dof=dof,
             real_time=arguments.joints is not None,
-            folder=folder,
+            folder=arguments.out,
             labels=labels,
             choices=_choices(arguments, model),
         ) as live,
         closing(live.lines()) as lines,
-        terminal.keys(live.stop) as typed,
     ):
         recorder = Recorder(
             arguments.out,
@@ -249,68 +230,41 @@ def run(arguments: argparse.Namespace) -> int:
             _joint_names(arguments, live.opened, arm),
             lines,
             live.page,
-            arguments.label if by_key else [],
         )
-        _announce(recorder.choices)
+        LOG.info("waiting for a contact")
         trials = Trials(live.skin, arguments.length)
         classifier = None if model is None else Classifier(model, live.skin.layout)
-        most = arguments.trials if folder else 1
         for frame, faults in live.frames():
             events = [] if classifier is None else classifier.push(frame)
             lines.write([*faults, *(event.to_dict() for event in events)])
-            recorder.press(typed())
             live.show(frame, faults, events)
             recorder.follow(trials, events)
             recorder.save(trials.push(frame), complete=True)
-            if recorder.count == most:
+            if recorder.count == arguments.trials:
                 break
         recorder.save(trials.rest(), complete=False)
     return _status(arguments, recorder, live.skin)
-
-
-def _model(path: str | None) -> Model | None:
-    return None if path is None else Model(path)
-
-
-def _announce(choices: Sequence[tuple[str, str]]) -> None:
-    LOG.info("waiting for a contact" + (KEYS if choices else ""))
-    for digit, (task, label) in zip(DIGITS, choices, strict=False):
-        LOG.info(f"  {digit}  {task}={label}")
 
 
 def _arm(arguments: argparse.Namespace, model: Model | None) -> Chain | None:
     """The arm that the options name, or that of the model.
 
     Raises:
-        InputError: both are given.
+        InputError: both are given, or --joints without either.
     """
     arm = open_arm(arguments)
-    if model is None or model.info.chain is None:
-        return arm
-    if arm is not None:
-        raise InputError(f"{model.path} brings the arm that it needs: leave --arm out")
-    return model.info.chain
+    if model is not None and model.info.chain is not None:
+        if arm is not None:
+            raise InputError(
+                f"{model.path} brings the arm that it needs: leave --arm out"
+            )
+        return model.info.chain
+    if arm is None and model is None and arguments.joints is not None:
+        raise InputError("--joints needs --arm, the arm whose angles they are")
+    return arm
 
 
-def _dof(arguments: argparse.Namespace, arm: Chain | None) -> int | None:
-    """How many joint angles are wanted; None where it does not matter.
-
-    Raises:
-        InputError: --joints gives angles, and nothing says how many.
-    """
-    dof: int | None = arguments.dof if arm is None else arm.dof
-    if arguments.joints is not None and dof is None:
-        raise InputError(
-            "--joints needs --arm, or --dof, the number of angles in each line"
-        )
-    return dof
-
-
-def _labels(
-    arguments: argparse.Namespace,
-    folder: Path | None,
-    by_key: bool,
-) -> dict[str, str]:
+def _labels(arguments: argparse.Namespace) -> dict[str, str]:
     """{task: label} of the first trial.
 
     Raises:
@@ -319,15 +273,14 @@ def _labels(
     labels: dict[str, str] = {}
     for task, label in arguments.label:
         labels.setdefault(task, label)
-    # Only the page of a folder takes labels.
-    if not labels and (arguments.web is None or folder is None):
+    if arguments.web is None and not labels:
         raise InputError(
             "give --label TASK=LABEL; a trial without a label teaches nothing"
         )
-    if len(labels) < len(arguments.label) and not by_key and arguments.web is None:
+    if arguments.web is None and len(labels) < len(arguments.label):
         raise InputError(
-            "--label names a task twice; only in a terminal or on the page does a "
-            "person choose the label"
+            "--label names a task twice; only on the page, with --web, does a person "
+            "choose the label"
         )
     return labels
 
@@ -396,28 +349,26 @@ class Recorder:
     """Saves trials under the next free names, with their shared metadata.
 
     Attributes:
-        out: the folder, or the file for a single trial.
+        folder: of the trials.
         labels: {task: label} of the next trial.
         meta: further metadata of every trial.
         names: the joints' names, or None if they are unknown.
-        lines: where the `saved` and `deleted` events go.
+        lines: where the `saved` events go.
         page: the live page, which then gives the labels and says whether to save; or
             None.
-        choices: the labels that keys choose, with their tasks.
-        paths: the trials saved so far and not deleted.
+        paths: the trials saved so far.
         recording: whether the touch under way, or the next one, is to be saved.
         held: the labels of the touch under way, which are those of its beginning.
         decided: the model's decisions about it.
         any_joints: whether a saved frame had joint angles.
     """
 
-    out: Path
+    folder: Path
     labels: dict[str, str]
     meta: dict[str, Any]
     names: Sequence[str] | None
     lines: Lines
     page: Page | None = None
-    choices: Sequence[tuple[str, str]] = ()
     paths: list[Path] = field(default_factory=list)
     recording: bool = True
     held: dict[str, str] = field(default_factory=dict)
@@ -426,20 +377,6 @@ class Recorder:
 
     def __post_init__(self) -> None:
         self.held = self.labels
-
-    def press(self, keys: str) -> None:
-        """Take keys: a number chooses its label; d deletes the last trial, unless a
-        page does so."""
-        choices = dict(zip(DIGITS, self.choices, strict=False))
-        for key in keys:
-            if key in choices:
-                task, label = choices[key]
-                self.labels = {**self.labels, task: label}
-                LOG.info(f"next: {labels_text(self.labels)}")
-            elif key in "dD" and self.paths and self.page is None:
-                path = self.paths.pop()
-                delete([path])
-                self.lines.write([{"event": "deleted", "file": str(path)}])
 
     @property
     def count(self) -> int:
@@ -485,7 +422,7 @@ class Recorder:
         if posed and self.names is not None:
             meta["joint_names"] = list(self.names)
         while True:
-            path = trial_path(self.out, self.held)
+            path = trial_path(self.folder, self.held)
             meta["trial"] = path.stem
             with suppress(NameTaken):  # another recorder in this folder was faster
                 save(path, trial, overwrite=False)
@@ -506,7 +443,6 @@ class Recorder:
             LOG.warning(
                 f"{path}: {unposed} of {len(frames)} frames have no joint angles"
             )
-            event["frames_without_joints"] = unposed
         self.lines.write([event])
         if self.page is not None:
             self.page.saved(path, trial)

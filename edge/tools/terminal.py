@@ -1,21 +1,16 @@
-"""A terminal: keys, and the skin in ANSI half-blocks, two rows of taxels in each
-line."""
+"""The skin on a terminal in ANSI half-blocks, two rows of taxels in each line."""
 
 import math
-import os
 import re
-import select
-import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import groupby
 
 import numpy as np
 
 from edge.arrays import Bytes, Floats
 from edge.commands.output import counted
-from edge.skin.loop import Stop
 from edge.touch.active import Region
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
@@ -32,11 +27,11 @@ REST = tuple(range(233, 242))
 """256-colour greys by force, for taxels outside every region."""
 TOUCH = (88, 124, 160, 196, 202, 208, 214, 220, 226, 228, 231)
 """Dark red to white by force, for the taxels of a region."""
-INK = 16
-"""Black, for arrows."""
 LOST = 18
 """Dark blue, for a taxel that cannot be read."""
-LEGEND = "■■■ touched, by force   ■ below the threshold   ■ cannot be read   q quits"
+LEGEND = (
+    "■■■ touched, by force   ■ below the threshold   ■ cannot be read   Ctrl-C quits"
+)
 
 
 def skin_colours(
@@ -75,34 +70,21 @@ def _shades(palette: Sequence[int], share: Floats) -> Colours:
     return shades
 
 
-def picture(
-    colour: Colours,
-    *,
-    wide: int = 2,
-    arrows: Sequence[Sequence[str]] | None = None,
-) -> str:
+def picture(colour: Colours, *, wide: int = 2) -> str:
     """Lines of half-blocks, with an escape sequence wherever the colour changes.
 
     Args:
         colour: (rows, cols) numbers in the 256-colour palette.
         wide: characters per taxel.
-        arrows: for each column of each line, an arrow that stands on the upper taxel's
-            colour in place of its half-blocks, or an empty text.
     """
     lines = []
-    for number, top in enumerate(range(0, len(colour), 2)):
+    for top in range(0, len(colour), 2):
         line = ""
         cells = zip(*colour[top : top + 2].tolist(), strict=True)
-        signs = [""] * colour.shape[1] if arrows is None else arrows[number]
-        pairs = zip(cells, signs, strict=False)
-        for ((upper, *lower), sign), taxels in groupby(pairs):
+        for (upper, *lower), taxels in groupby(cells):
             background = f"48;5;{lower[0]}" if lower else "49"
-            escape = f"\x1b[38;5;{upper};{background}m"
-            text = "▀" * wide
-            if sign:
-                escape = f"\x1b[38;5;{INK};48;5;{upper}m"
-                text = sign.ljust(wide)
-            line += escape + text * len(list(taxels))
+            blocks = "▀" * wide * len(list(taxels))
+            line += f"\x1b[38;5;{upper};{background}m{blocks}"
         lines.append(line + PLAIN)
     return "\n".join(lines)
 
@@ -149,36 +131,3 @@ def drawing() -> Iterator[None]:
         yield
     finally:
         print(PLAIN + SHOW, end="", flush=True)
-
-
-def is_interactive() -> bool:
-    """Whether a person at a terminal reads stdout and can press keys."""
-    return sys.stdin.isatty() and sys.stdout.isatty()
-
-
-@contextmanager
-def keys(stop: Stop) -> Iterator[Callable[[], str]]:
-    """A function that gives the keys pressed since its last call; q asks to stop."""
-    if not is_interactive():
-        yield lambda: ""
-        return
-    import termios
-    import tty
-
-    fd = sys.stdin.fileno()
-    former = termios.tcgetattr(fd)
-
-    def typed() -> str:
-        pressed = ""
-        while select.select([fd], [], [], 0.0)[0] and not stop.asked:
-            key = os.read(fd, 1).decode(errors="replace")
-            stop.asked = key in ("q", "Q", "")
-            pressed += key
-        return pressed
-
-    try:
-        tty.setcbreak(fd)
-        yield typed
-    finally:
-        with suppress(termios.error):  # the terminal has gone
-            termios.tcsetattr(fd, termios.TCSANOW, former)

@@ -2,7 +2,7 @@
 
 Draws the skin and, with --model, the latest decisions. Taxels in contact are red to
 white by force, those below the contact threshold grey, and those that cannot be read
-blue. Each line shows two rows of taxels, with row 0 at the top. q or Ctrl-C quits. With
+blue. Each line shows two rows of taxels, with row 0 at the top. Ctrl-C quits. With
 --web, a page for a browser shows the same, with the features of each contact over time.
 """
 
@@ -19,7 +19,7 @@ from edge.commands.source import reading
 from edge.errors import printable
 from edge.events import Decided, Event, Onset
 from edge.model.model import Model
-from edge.tools import arrows, terminal
+from edge.tools import terminal
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
 
@@ -48,9 +48,7 @@ def draw(frame: Frame, layout: SkinLayout, decisions: dict[str, str]) -> str:
     texts = [terminal.caption(frame, regions, layout)]
     texts += [f"{printable(task)}: {text}" for task, text in decisions.items()]
     lines = [line for text in texts for line in textwrap.wrap(text, columns)]
-    shear = arrows.region_shear(frame, regions)
-    signs = None if shear is None else arrows.characters(shear)
-    picture = terminal.picture(colour[:, :columns], wide=wide, arrows=signs)
+    picture = terminal.picture(colour[:, :columns], wide=wide)
     return "\n".join([picture, *lines, *terminal.legend(columns)])
 
 
@@ -75,14 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
             real_time=sys.stdout.isatty(),
             decides=model is not None,
         ) as live,
-        terminal.keys(live.stop) as typed,
         terminal.drawing() if live.page is None else nullcontext(),
     ):
         classifier = None if model is None else Classifier(model, live.skin.layout)
         layout = live.skin.layout if classifier is None else classifier.layout
         interval_s = 1.0 / RATE_HZ - 0.5 * live.skin.period_s
         for frame, faults in live.frames():
-            typed()  # q ends the loop
             events = [] if classifier is None else classifier.push(frame)
             live.show(frame, faults, events)
             _follow(events, decisions)

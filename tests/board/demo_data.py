@@ -56,7 +56,7 @@ def main(folder):
             "joints": np.rint(short.joints[fourths] * ENCODER_STEPS) / ENCODER_STEPS,
         }
         meta = {key: short.meta[key] for key in META}
-        save_arrays(demo / f"{touch}.npz", arrays, meta, compress=True)
+        save_arrays(demo / f"{touch}.npz", arrays, meta)
     features = model.info.features
     X = load_trials([folder / "known"], Measurement(features)).features(
         model.info.window_s, model.info.samples

@@ -103,9 +103,7 @@ def test_a_table_in_a_list_is_called_by_its_number():
     [
         ("{", "Expecting property name"),
         ("[NaN]", "the number NaN is not finite"),
-        ("[-Infinity]", "-Infinity is not"),
         ("[1e400]", "the number 1e400 is not finite"),
-        (f"[{'9' * 400}]", "a whole number of 400 digits"),
         (f"[{'9' * 5000}]", "a whole number of 5000 digits"),
         ("[" * 100_000, "nested too deeply"),
         (b'"\xff"', "not UTF-8"),

@@ -64,7 +64,6 @@ WRONG = [
         {"frames": FLAT, "meta": '{"skin": {"rows": -16, "cols": -24}}'},
         'give their "rows" and "cols"',
     ),
-    ({"frames": FLAT}, 'give their "rows" and "cols"'),
     ({"frames": lambda frames: frames[:0], "t": np.ones(0)}, "frames are empty"),
     ({"t": lambda t: t[1:]}, r"t must be float64 \(180,\)"),
     ({"t": lambda t: t.astype(int)}, "t must be float64"),
@@ -230,20 +229,10 @@ def test_shear_is_saved_and_each_frame_has_its_own(make_touch, tmp_path):
     assert list(back)[5].shear.tobytes() == touch.shear[5].tobytes()
 
 
-def test_a_recording_without_shear_has_no_array_for_it(make_touch, tmp_path):
-    save(tmp_path / "a.npz", make_touch())
-    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
-        assert "shear.npy" not in archive.namelist()
-    back = load(tmp_path / "a.npz")
-    assert back.layout.axes is None
-    assert next(iter(back)).shear is None
-
-
 @pytest.mark.parametrize(
     "change",
     [
         lambda shear: shear.astype(np.float64),
-        lambda shear: shear[..., 0],
         lambda shear: shear[1:],
     ],
 )

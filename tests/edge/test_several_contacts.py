@@ -236,7 +236,6 @@ def two_touches():
 
 def test_each_contact_is_decided_and_placed_on_its_own(two_touches, tmp_path, edge):
     save(tmp_path / "both.npz", two_touches)
-    place = tmp_path / "touches.jsonl"
     options = ("--model", demo.MODEL, "--fake", tmp_path / "both.npz")
     status, lines, _ = edge("run", *options, "--contacts", 2)
     assert status == 0

@@ -49,11 +49,6 @@ def test_a_young_file_stays_as_it_may_not_be_locked_yet(tmp_path):
     assert leftover.exists()
 
 
-def test_a_folder_that_is_missing_is_not_made(tmp_path):
-    remove_leftovers(tmp_path / "none")
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "a"

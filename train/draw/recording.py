@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from edge.errors import InputError
 from edge.files import parsing
 from edge.recording import Recording
-from edge.tools.arrows import region_shear
 from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
 from edge.touch.features import FEATURES, WINDOW_S
@@ -125,10 +124,9 @@ def curves(series: FeatureSeries) -> dict[str, NDArray[Any]]:
 
 def _shear(axis: Any, frame: Frame, region: Region, counts: float) -> None:
     """Draw the shear of a region's taxels as arrows; one of `counts` spans a taxel."""
-    shear = region_shear(frame, [region])
-    assert shear is not None
+    assert frame.shear is not None
     rows, cols = np.nonzero(region.mask)
-    along, around = shear[rows, cols].T / counts
+    along, around = frame.shear[rows, cols].T / counts
     style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.012}
     axis.quiver(cols, rows, around, along, color="white", **style)
 

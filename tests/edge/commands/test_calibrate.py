@@ -1,7 +1,6 @@
 """`edge-classify calibrate`: exact means and deviations, and a skin that must be at
 rest."""
 
-import shutil
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +19,6 @@ from edge.commands.calibrate import (
     unusable,
 )
 from edge.commands.options import NOISE_COUNTS
-from edge.fake.touches import still
 from edge.skin import file as skinfile
 from edge.skin.decoder import dead_band
 
@@ -127,11 +125,10 @@ def test_taxels_that_are_not_read_or_saturated_are_refused_without_former_values
 ):
     spoil, sentence = unusable_taxel
     spoil()
-    for options in ((), ("--force",)):
-        status, _, err = measured(quiet, *options)
-        assert status == 2
-        assert skinfile.load(skin).calibration is None
-        assert sentence in err
+    status, _, err = measured(quiet, "--force")
+    assert status == 2
+    assert skinfile.load(skin).calibration is None
+    assert sentence in err
 
 
 def test_taxels_that_are_not_read_or_saturated_keep_their_former_values_by_force(
@@ -236,14 +233,8 @@ def test_a_single_taxel_or_a_small_drift_is_calibrated(
     assert named == (len(taxels) == 1)
 
 
-def test_a_microcontrollers_skin_may_rest_above_0_which_is_said(edge, tmp_path):
-    skin = shutil.copy(skinfile.shipped("matrix"), tmp_path)
-    file = skinfile.load(skin)
-    saving.save(tmp_path / "still.npz", still(file, 1.0))
-    words = ("calibrate", "--skin", skin, "--fake", tmp_path / "still.npz")
-    status, _, err = edge(*words, "--frames", 50)
-    assert status == 0
-    assert "the skin rests at about 2048 counts, not at 0" in err
+def test_taxels_side_by_side_stand_out_of_a_skin_that_rests_at_0():
+    file = skinfile.load(skinfile.shipped("matrix"))
     zero = np.zeros(file.layout.shape, np.uint16)
     zero[3:6, 3:6] = 300
     assert np.count_nonzero(standing_out(file, zero)) == 9

@@ -138,10 +138,6 @@ def test_a_service_that_was_started_again_has_not_run_on(looks):
     assert not looks("ActiveState=active\nNRestarts=1\n")
 
 
-def test_a_service_that_waits_for_its_next_start_does_not_run(looks):
-    assert not looks("ActiveState=activating\nNRestarts=0\n")
-
-
 def test_a_service_is_watched_for_a_minute():
     looks = iter([True] * 29 + [False])
     slept = []

@@ -46,15 +46,6 @@ def test_a_microcontroller_that_hangs_with_an_intact_frame_is_heard_of(
     assert "no contact was saved; taxels without a valid value: 100" in err
 
 
-def test_a_rehearsal_says_that_the_wires_carry_fewer_frames(edge, tmp_path):
-    skin = tmp_path / "skin.toml"
-    text = skinfile.shipped("matrix").read_text()
-    skin.write_text(text.replace("baud = 2_000_000", "baud = 9_600"))
-    saving.save(tmp_path / "rest.npz", still(skinfile.load(skin), 0.5))
-    _, _, err = edge("scan", "--skin", skin, "--fake", tmp_path / "rest.npz")
-    assert f"{skin}: the wires carry 5.7 frames a second, not the 100 that" in err
-
-
 def answered(event):
     """What an event says of the touch, but for its times.
 
@@ -155,10 +146,6 @@ def test_run_takes_joints_from_stdin(exported, recordings):
     ("arguments", "sentence"),
     [
         (["--loop"], "--loop and --real-time work only with --fake"),
-        (
-            ["--real-time", "--skin", "PAD"],
-            "--loop and --real-time work only with --fake",
-        ),
         ([], "give --skin skin.toml, or --fake REC.npz to use no hardware"),
         (["--fake", "no.npz"], "no.npz: cannot be read: No such file"),
         (["--skin", "no.toml"], "no.toml: cannot be read"),
@@ -201,14 +188,8 @@ def test_a_bad_option_is_one_sentence(
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("command", ["record", "run", "view"])
 def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
-    edge,
-    exported,
-    recordings,
-    tmp_path,
-    monkeypatch,
-    command,
+    run, recordings, monkeypatch
 ):
     """A silent serial port may take seconds, and there is nothing to lose yet."""
     handled = []
@@ -219,12 +200,7 @@ def test_a_signal_ends_a_command_at_once_until_the_skin_is_set_up(
         return open_skin(*arguments, **options)
 
     monkeypatch.setattr(source, "open_skin", opened)
-    options = ["--model", exported / "model.onnx"]
-    if command == "record":
-        options = ["--label", "object=foam", "--out", tmp_path]
-    assert (
-        edge(command, "--fake", recordings / "soft_1.npz", *options, text=True)[0] == 0
-    )
+    assert run("--fake", recordings / "soft_1.npz")[0] == 0
     assert handled == [signal.SIG_DFL]
 
 

@@ -100,7 +100,6 @@ def test_the_demo_ends_with_what_the_skin_felt(terminal, capsys):
             "foam)",
         ),
         ({"event": "no_contact"}, "no contact"),
-        ({"event": "deleted", "file": "a/box-001.npz"}, "a/box-001.npz is deleted"),
         (
             {"event": "taxels", "t": 1.5, "invalid": 12, "frames": 50},
             "   1.500 s  taxels without a valid value for 50 frames: 12",

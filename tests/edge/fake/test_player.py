@@ -7,8 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import edge
-from edge import demo
 from edge.errors import InputError
 from edge.fake.clock import PacedClock
 from edge.fake.player import Playback, play, skin_file
@@ -55,17 +53,6 @@ def test_a_playback_holds_each_frame_until_the_next_and_can_start_again():
     # The last frame, a pause of 0.6 s without a touch, the first two frames again.
     times = [0.05, 0.061, 0.659, 0.661, 0.671]
     assert [int(looped(t)[0, 0]) for t in times] == [2, 0, 0, 0, 1]
-
-
-def test_each_round_of_a_looped_touch_is_a_contact_of_its_own():
-    """Its last frame is touched, and 0.2 s before the touch are less than a release."""
-    recording = edge.load(demo.recordings()[0])
-    assert recording.frames[-1].any()
-    looped = Playback(recording, loop=True)
-    times = 0.01 * np.arange(1000)
-    touched = [looped(t).max() > recording.layout.onset for t in times]
-    pauses = np.diff(times[touched])
-    assert (pauses > recording.layout.release_s).sum() == 4
 
 
 @pytest.fixture

@@ -66,7 +66,6 @@ def test_a_name_in_the_abstract_namespace(clock):
     "environment",
     [
         {},
-        {"WATCHDOG_USEC": "0"},
         {"WATCHDOG_USEC": "soon"},
         {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"},
     ],
@@ -88,22 +87,6 @@ def test_without_a_manager_no_socket_is_opened(notifier, address, monkeypatch):
     service.alive()
     service.stopping()
     assert opened == []
-
-
-def test_a_manager_that_is_away_at_the_start_is_heard_from_once_it_listens(
-    tmp_path,
-    clock,
-    notifier,
-):
-    address = str(tmp_path / "later")
-    service = notifier(NOTIFY_SOCKET=address, WATCHDOG_USEC="2000000")
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-        service.ready()
-        service.alive()
-        listener.bind(address)
-        clock.sleep_until(101.0)
-        service.alive()
-        assert messages(listener) == ["WATCHDOG=1"]
 
 
 def test_a_manager_that_does_not_listen_does_not_hold_up_the_loop(manager, notifier):

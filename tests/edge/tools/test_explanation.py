@@ -39,28 +39,8 @@ def test_distance_and_pulls_are_those_worked_out_by_hand():
     assert why.pulls == {"force": 12.0, "area": 0.0}
 
 
-def unscaled(features, **more):
-    """A space of features with a sample each, which stand as they are."""
-    columns = np.arange(features)
-    return Space(columns, np.zeros(features), np.ones(features), **more)
-
-
-VOTES = unscaled(
-    1,
-    weights=np.ones((1, 1)),
-    rows=np.array([[-1.0], [1.5], [2.0], [-3.0], [5.0], [np.inf]]),
-    labels=np.array([1, 0, 0, 1, 0, -1]),
-)
-"""The first three trials vote at 0, one for label 1 and two for label 0. The last has
-no label."""
-
-
-def votes(space, voters=(0, 1, 2), label=0):
-    return explain(space, np.zeros(1), voters, label, ["force"], [1])
-
-
 def test_a_trial_without_a_label_is_no_rival():
-    assert votes(VOTES._replace(labels=np.array([0, 0, 0, 0, 0, -1]))).rival is None
+    assert by_hand(BY_HAND._replace(labels=np.array([0, -1]))).rival is None
 
 
 def why_of(info, space, vector, rows, label):

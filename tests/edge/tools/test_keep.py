@@ -17,7 +17,6 @@ def decision(confidence, *flags):
 @pytest.mark.parametrize(
     ("doubted", "expected"),
     [
-        (decision(0.95), {"all"}),
         (decision(0.8), {"all"}),
         (decision(0.79), {"all", "unsure"}),
         (decision(None), {"all", "unsure"}),

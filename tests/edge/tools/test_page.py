@@ -151,7 +151,6 @@ def test_labels_and_recording_are_set_from_the_page(page):
         {"do": "fly"},
         {"do": "labels"},
         {"do": "labels", "labels": {"object": 3}},
-        {"do": "labels", "labels": {"object": ""}},
         {"do": "labels", "labels": {"object": "a\nb"}},
         {"do": "labels", "labels": {f"task {number}": "a" for number in range(17)}},
         {"do": "relabel", "file": "../model.onnx", "labels": {"object": "box"}},
@@ -339,7 +338,7 @@ def until(condition, page, stream, browser):
 class TestInABrowser:
     """The page in headless Chromium."""
 
-    def test_the_picture_moves_and_a_label_reaches_the_program(self, page):
+    def test_the_picture_moves_and_has_a_scale(self, page):
         images = set()
         stream = frames()
         with chromium(390, page.server.link) as browser:
@@ -347,21 +346,13 @@ class TestInABrowser:
             def moved():
                 image = "return document.getElementById('skin').toDataURL()"
                 images.add(browser.execute_script(image))
-                recording = browser.find_element("id", "record-part")
-                return len(images) > 1 and recording.is_displayed()
+                return len(images) > 1
 
             until(moved, page, stream, browser)
-            label = browser.find_element(
-                "css selector", ".label-row input[aria-label=label]"
-            )
-            label.send_keys("box")
-            browser.find_element("id", "record").click()
-            until(lambda: page.recording, page, stream, browser)
             canvases = browser.find_elements("css selector", "canvas")
             assert all(canvas.get_attribute("aria-label") for canvas in canvases)
             assert {canvas.get_attribute("role") for canvas in canvases} == {"img"}
             assert "0.1 to 17 newtons" in browser.find_element("id", "scale").text
-        assert page.labels == {"object": "box"}
 
     def test_a_label_applies_when_it_is_chosen_and_every_browser_shows_it(self, page):
         stream = frames()
@@ -440,12 +431,6 @@ class TestInABrowser:
             version = browser.execute_script("return latest.t")
             comes(f"return latest.t > {version}")
             assert browser.execute_script(marked)
-
-    def test_a_wrong_token_shows_nothing(self, serve):
-        page = serve(folder=None)
-        address = f"http://127.0.0.1:{page.server.server_port}/?token=wrong"
-        with chromium(390, address) as browser:
-            assert browser.find_elements("id", "skin") == []
 
     def test_a_kept_touch_is_filtered_corrected_and_undone(self, kept_page, kept):
         stream = frames()

@@ -5,7 +5,6 @@ import sys
 import numpy as np
 import pytest
 
-from edge.cli import main
 from edge.tools.replay import Summary, compared
 from tests.conftest import decided, ended, python
 
@@ -53,14 +52,6 @@ def test_a_recording_without_contact_says_so(replay, quiet):
     assert "0 of 1 right" in err
 
 
-def test_an_empty_folder_and_a_missing_model_are_one_sentence(replay, tmp_path, capsys):
-    assert replay(tmp_path)[0] == 2
-    assert main(["replay", "--model", str(tmp_path / "no.onnx"), str(tmp_path)]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("edge-classify: ")
-    assert err.count("\n") == 1
-
-
 @pytest.fixture
 def verify(exported, edge):
     command = ("verify", "--model", exported / "model.onnx", "--golden")
@@ -100,9 +91,7 @@ def verify_changed(verify, arrays, tmp_path):
     ("key", "row", "change"),
     [
         ("object_label", 5, 1),
-        ("object_neighbours", 7, 1),
         ("object_distances", 30, 1e-9),
-        ("category_scores", 2, 1e-12),
         ("series_counts", 11, 1),
         ("onset_s", 1, 1e-6),
     ],
@@ -119,9 +108,7 @@ def test_a_difference_names_the_worst_row(verify_changed, arrays, key, row, chan
     assert ("may run the model in float32" in err) == name.endswith("distances")
 
 
-@pytest.mark.parametrize(
-    "key", ["start", "vectors", "meta", "object_label", "series_counts"]
-)
+@pytest.mark.parametrize("key", ["vectors", "meta", "series_counts"])
 def test_a_golden_file_that_lacks_a_key_is_one_sentence(verify_changed, arrays, key):
     del arrays[key]
     status, _, err = verify_changed()

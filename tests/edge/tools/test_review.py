@@ -13,18 +13,15 @@ from tests.edge.tools.kept import kept_meta
 @pytest.mark.parametrize(
     ("meta", "kinds"),
     [
-        (kept_meta({"a": "x"}, a=("x", 0.9)), []),
         (kept_meta({"a": "x"}, a=("x", 0.8)), []),
         (kept_meta({"a": "x"}, a=("x", 0.79)), ["unsure"]),
         (kept_meta({"a": "x"}, a=("x", None)), ["unsure"]),
         (kept_meta({"a": "x"}, a=("x", 0.9, "unknown")), ["unsure"]),
         (kept_meta({"a": "y"}, a=("x", 0.9)), ["wrong"]),
-        (kept_meta({}, a=("x", 0.9)), ["unlabelled"]),
         (kept_meta({"b": "z"}, a=("x", 0.9)), ["unlabelled"]),
         ({"labels": {}}, ["unlabelled"]),
         ({"labels": {"a": "x"}}, []),
         ({"labels": {"a": "x"}, "decided": 5}, []),
-        ({"labels": {"a": "x"}, "decided": {"a": 5}}, []),
     ],
 )
 def test_a_touch_is_unsure_wrong_or_unlabelled(meta, kinds):

@@ -14,12 +14,10 @@ def trials(counts):
     ("meant", "label", "counts"),
     [
         ("box", "Box", (8, 1)),
-        ("box", "box ", (8, 1)),
         ("card board", "card-board", (8, 1)),
         ("pillow", "pilow", (8, 1)),
         # A short label is a slip of a far more frequent one.
         ("pen", "pem", (20, 2)),
-        ("box", "bx", (20, 2)),
         ("tin", "Tin", (20, 2)),
         # Labels that differ in case alone are one, however frequent.
         ("box", "Box", (4, 4)),
@@ -44,12 +42,7 @@ def test_a_rare_label_that_is_spelled_like_a_frequent_one_is_named(
         {"cap": 8, "cup": 2},  # short labels
         {"a": 30, "b": 2},  # letters
         {"hard": 8, "soft": 2},
-        {"table": 8, "chair": 2},
-        {
-            "box": 1,
-            "tree": 1,
-            "sofa": 1,
-        },  # where every label has one trial, none is odd
+        {"box": 1, "tree": 1},  # where every label has one trial, none is odd
     ],
 )
 def test_labels_that_are_meant_are_no_slips(counts):

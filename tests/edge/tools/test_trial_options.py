@@ -25,12 +25,12 @@ def record(edge, files, monkeypatch):
     """Record the fake touch as a user does; returns status, stdout's lines and
     stderr."""
     monkeypatch.chdir(files)
-    words = "--label object=a --fake two.npz --out out.npz".split()
+    words = "--label object=a --fake two.npz --out out".split()
     return lambda options: edge("record", *words, *options.split())
 
 
 def recorded_arm():
-    return Chain.from_dict(recording.load("out.npz").meta["arm"])
+    return Chain.from_dict(recording.load("out/a-001.npz").meta["arm"])
 
 
 def test_a_trial_keeps_the_chain_of_a_urdf(record):
@@ -64,4 +64,4 @@ def test_an_arm_that_cannot_be_used_is_refused(files, record, options, sentence)
     status, _, err = record(options)
     assert status == 2
     assert sentence in err
-    assert not (files / "out.npz").exists()
+    assert list(files.glob("out/*")) == []

@@ -124,15 +124,6 @@ def stream(server):
         yield client
 
 
-def test_every_browser_gets_the_latest_picture(server):
-    for t in (1.5, 2.5):
-        server.show({"t": t})
-    for _ in range(3):
-        with stream(server) as client, client.makefile("rb") as lines:
-            pictures = (line for line in lines if line.startswith(b"data: "))
-            assert next(pictures) == b'data: {"t":2.5}\n'
-
-
 def test_it_is_watched_as_long_as_a_browser_asks_for_pictures(server, monkeypatch):
     assert not server.watched
     server.show({"t": 1.5})

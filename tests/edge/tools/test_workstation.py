@@ -45,11 +45,6 @@ def test_a_folder_of_the_users_does_not_run_in_the_checkouts_place(
     assert capfd.readouterr().out == ""
 
 
-def test_the_exit_status_is_that_of_the_command(capfd):
-    assert workstation.run(["simulate", "none.toml", "--explain"]) == 2
-    assert "none.toml" in capfd.readouterr().err
-
-
 def test_where_there_is_no_checkout_it_says_where_the_command_runs(root, capsys):
     assert workstation.run(["export"]) == 2
     assert "runs on the workstation, in a checkout" in capsys.readouterr().err
