@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from edge.skin.loop import JointSource
     from edge.skin.skin import Skin
 
-ASKED_A_SECOND = 200.0
-"""Questions to the model about several contacts. Each takes one to two milliseconds on
-a workstation; 16 contacts with a decision point every tenth of a second need 160."""
-FEWEST_ASKED = 2
-"""Questions that a frame may ask, however soon it follows the last one."""
 ASIDE_S = 0.5
 """Taxels are named as set aside after so long, as a touch under way soon shows."""
 
@@ -68,9 +63,7 @@ class Classifier:
 
     `push` and `finish` return events in the order of time: an `Onset` when a contact
     begins, a `Decided` for each task at the end of its window, and a `Release` when the
-    contact ends. Of several contacts that are due at once, a frame asks about a few, in
-    proportion to the time since the last frame, so that no frame takes long; the
-    answers are the same.
+    contact ends.
 
     With an error rate, each task follows the fastest stopping rule that the model holds
     certified for that rate: it is decided at the first decision point that is sure
@@ -158,19 +151,12 @@ class Classifier:
             InputError: the frame's shape is not the skin's, or its time goes back.
         """
         began = time.perf_counter()
-        most = self._most_asked(frame.t)
         self._end_s = frame.t
         if self._untouched is not None and self._begun == 0:
             self._untouched.push(frame)
         contacts = self.tracker.push(frame)
         events = self._set_aside(frame.t) + self._follow(contacts, frame.t)
-        return events + self._decide_due(frame.t, began, most)
-
-    def _most_asked(self, t: float) -> float:
-        """How many questions the frame at a time may ask."""
-        if self._max_contacts == 1 or self._end_s is None:
-            return math.inf
-        return max(FEWEST_ASKED, round(ASKED_A_SECOND * (t - self._end_s)))
+        return events + self._decide_due(frame.t, began)
 
     def _follow(self, contacts: Iterable[Contact], t: float) -> list[Event]:
         """The events of contacts up to a time."""
@@ -183,24 +169,17 @@ class Classifier:
                 events.append(Release(contact.onset_s, t, number))
         return events
 
-    def _decide_due(self, t: float, began: float, most: float) -> list[Event]:
-        """Ask about the contacts whose next decision point has come, the longest due
-        first, and at most so many times."""
+    def _decide_due(self, t: float, began: float) -> list[Event]:
+        """Ask about the contacts whose next decision point has come."""
         events: list[Event] = []
-        questions = 0
-        for pending in sorted(self._pending, key=self._due_s):
-            while pending.tasks and questions < most:
+        for pending in self._pending:
+            while pending.tasks:
                 point_s = self._points_s[pending.decision_point]
                 if t - pending.contact.onset_s < point_s:
                     break
                 events += self._decide(pending, began)
-                questions += 1
         self._pending = [pending for pending in self._pending if pending.tasks]
         return events
-
-    def _due_s(self, pending: Pending) -> float:
-        """When the contact's next decision point comes."""
-        return pending.contact.onset_s + self._points_s[pending.decision_point]
 
     def _set_aside(self, t: float) -> list[Event]:
         """The event of taxels that have been set aside or taken back for a while."""
@@ -239,7 +218,7 @@ class Classifier:
             if self._untouched is not None and not contacts:
                 events += self._untouched.decisions(self._end_s, began)
             events += self._follow(contacts, self._end_s)
-        events += self._decide_due(self._end_s, began, math.inf)
+        events += self._decide_due(self._end_s, began)
         for pending in self._pending:
             pending.decision_point = self._last
             events += self._decide(pending, began, short=True)

@@ -71,26 +71,4 @@ def factors_fit(
     if len(ranges) != 2 or lengths != {len(labels[task])}:
         return False
     pairs = list(zip(*factors.values(), strict=True))
-    if sorted(pairs) != list(product(*ranges)):
-        return False
-    first, second = (labels[factor] for factor in factors)
-    return _named_after(pairs, first, second, labels[task])
-
-
-def _named_after(
-    pairs: Sequence[tuple[int, int]],
-    first: Sequence[str],
-    second: Sequence[str],
-    names: tuple[str, ...],
-) -> bool:
-    """Whether names stand for their pairs of labels, where they are made of these, as
-    `rigid-fixed` is. Other names stand for any pair."""
-    forward = []
-    backward = []
-    for a, b in pairs:
-        forward.append(f"{first[a]}-{second[b]}")
-        backward.append(f"{second[b]}-{first[a]}")
-    return all(
-        tuple(pair_names) == names or set(pair_names) != set(names)
-        for pair_names in (forward, backward)
-    )
+    return sorted(pairs) == list(product(*ranges))

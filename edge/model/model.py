@@ -137,12 +137,6 @@ class Model:
                     f"{self.path}: its graph has no {kind} {name} of shape {shape}, "
                     "which its metadata describes; export it again"
                 )
-        for name in self._engine.inputs:
-            if name not in expected:
-                raise InputError(
-                    f"{self.path}: has an input {name}, which no exported model has; "
-                    "export it again"
-                )
 
     @property
     def named(self) -> str | None:

@@ -138,17 +138,12 @@ class Joints:
         if len(self._rest) > LONGEST_LINE:
             self._rest = b""
             self._bad(f"a line is longer than {LONGEST_LINE} bytes")
-        if len(lines) > MOST_LINES:
-            self._bad(
-                f"more than {MOST_LINES} lines came in one frame",
-                len(lines) - MOST_LINES,
-            )
         for line in lines[-MOST_LINES:]:
             if line.strip():
                 self._line(line, arrived)
 
-    def _bad(self, problem: str, lines: int = 1) -> None:
-        self.malformed += lines
+    def _bad(self, problem: str) -> None:
+        self.malformed += 1
         self.problem = problem
 
     def _line(self, line: bytes, arrived: float) -> None:
