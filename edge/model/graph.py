@@ -71,8 +71,8 @@ def _reduction(combine: Callable[..., Array]) -> Callable[..., Array]:
     return operator
 
 
-def _squeeze(x: Array, axes: Array) -> Array:
-    return x.squeeze(tuple(axes.tolist()))
+def _squeeze(x: Array, axes: Array | None = None) -> Array:
+    return x.squeeze(None if axes is None else tuple(axes.tolist()))
 
 
 def _top_k(x: Array, k: Array, attributes: Attributes) -> tuple[Array, Array]:
