@@ -83,13 +83,6 @@ def test_what_is_wrong_in_a_urdf_is_named(urdf, old, new, sentence):
     assert sentence in str(caught.value)
 
 
-def test_a_xacro_macro_is_called_one_with_the_command_that_expands_it(tmp_path):
-    path = tmp_path / "ARM.XACRO"
-    path.write_text(ARM)
-    with pytest.raises(InputError, match="`xacro ARM.XACRO > expanded.urdf`"):
-        Chain.from_urdf(path, "base", "tool")
-
-
 def test_joints_of_one_child_are_refused(urdf):
     extra = (
         '<joint name="other" type="fixed"><parent link="base"/>'
