@@ -9,16 +9,13 @@ from edge.model.model import Decision, Model
 from edge.touch.contact import Contact, FeatureSeries
 from edge.touch.doubts import frame_doubts
 
-Answers = dict[str, Decided]
-"""{task: its answer}."""
-
 
 def answers_about(
     model: Model,
     contact: Contact,
     number: int | None,
     point: int,
-) -> Answers:
+) -> dict[str, Decided]:
     """Ask the model about a contact.
 
     Args:
@@ -28,8 +25,8 @@ def answers_about(
         point: index of the decision point.
 
     Returns:
-        The answers of all tasks, with their confidence rounded to millionths and
-        without latency. Features that cannot be scaled give no label.
+        {task: its answer}, with the confidence rounded to millionths and without
+        latency. Features that cannot be scaled give no label.
     """
     info = model.info
     window_s = model.decision_points_s[point]

@@ -333,7 +333,7 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
     >>> recording.labels["object"], recording.frames.shape[1:]
     ('pillow', (16, 24))
 
-    A warning names the likely unit of times that do not seem to be in seconds.
+    Times that do not seem to be in seconds give a warning.
 
     Args:
         path: of the `.npz`, which sentences name.
@@ -357,17 +357,10 @@ def load(path: str | os.PathLike[str], file: BinaryIO | None = None) -> Recordin
 
 
 def warn_of_another_unit(name: str, t: Floats) -> None:
-    """Name the likely unit of times that do not seem to be in seconds."""
+    """Warn of times that do not seem to be in seconds."""
     steps = np.diff(t)
     rate_hz = 1.0 / max(float(np.median(steps)), 1e-12) if steps.size else SLOWEST_HZ
     if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-        units = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-        guess = ""
-        for unit, factor in units.items():
-            if SLOWEST_HZ <= factor * rate_hz <= FASTEST_HZ:
-                guess = f", and these may be in {unit}"
-                break
         LOG.warning(
-            f"{name}: has a median of {rate_hz:g} frames a second; t is in "
-            f"seconds{guess}"
+            f"{name}: has a median of {rate_hz:g} frames a second; t is in seconds"
         )

@@ -44,8 +44,8 @@ def save(
             `meta.scale`. Give all recordings of a data set the same.
         overwrite, lasting: see `write_whole`.
 
-    A warning names the likely unit of times that do not seem to be in seconds, and
-    thresholds for a recording that has none, or whose first frame is above its onset.
+    A warning comes for times that do not seem to be in seconds, and names thresholds
+    for a recording that has none, or whose first frame is above its onset.
 
     Raises:
         InputError: the recording breaks the contract, `path` cannot be written, or it

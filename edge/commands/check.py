@@ -18,7 +18,7 @@ from edge.model.model import Model
 from edge.skin.calibration import deaf_taxels
 from edge.skin.decoder import NEVER_STUCK, stuck_limits
 from edge.skin.file import SkinFile, load
-from edge.touch.layout import differences
+from edge.touch.differences import differences
 
 FRAMES = 100
 """Counted together, since some transactions are not needed in every frame."""

@@ -19,7 +19,7 @@ from edge.files import read_bytes, refusing
 from edge.model.model import LARGEST_BYTES, Model
 from edge.model.verify import verify
 from edge.skin.file import load
-from edge.touch.layout import differences
+from edge.touch.differences import differences
 from edge.writing import write_whole
 
 FORMER = ".former"

@@ -27,7 +27,6 @@ from edge.events import Event
 from edge.model.model import Model
 from edge.skin.loop import Schedule
 from edge.touch.frame import Frame
-from edge.touch.layout import differences
 from edge.touch.track import MAX_CONTACTS
 
 
@@ -105,8 +104,13 @@ def run(arguments: argparse.Namespace) -> int:
         # Angles that another program writes go by the real clock.
         real_time=arguments.joints is not None,
     ) as live:
-        for sentence in differences(model.info.layout, live.skin.layout):
-            LOG.warning(f"{arguments.model}: {sentence}")
+        if live.skin.layout != model.info.layout:
+            from edge.touch.differences import (
+                differences,
+            )  # a skin often is the model's
+
+            for sentence in differences(model.info.layout, live.skin.layout):
+                LOG.warning(f"{arguments.model}: {sentence}")
         classifier = Classifier(
             model,
             live.skin.layout,

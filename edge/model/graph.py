@@ -71,7 +71,7 @@ def _reduction(combine: Callable[..., Array]) -> Callable[..., Array]:
     return operator
 
 
-def _squeeze(x: Array, axes: Array | None = None, *, attributes: Attributes) -> Array:
+def _squeeze(x: Array, axes: Array | None = None) -> Array:
     return x.squeeze(None if axes is None else tuple(axes.tolist()))
 
 
@@ -114,7 +114,7 @@ OPERATORS: dict[str, Callable[..., Any]] = {
     "ReduceSumSquare": _reduction(lambda x, **axes: np.square(x).sum(**axes)),
     "Round": _plain(np.rint),
     "Sqrt": _plain(np.sqrt),
-    "Squeeze": _squeeze,
+    "Squeeze": _plain(_squeeze),
     "Sub": _plain(np.subtract),
     "TopK": _top_k,
     "Where": _plain(np.where),

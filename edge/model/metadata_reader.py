@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from edge.config import ConfigTable, parse_json, short_text
-from edge.errors import InputError
+from edge.errors import InputError, about
 from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, Task
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
@@ -31,21 +31,11 @@ def from_json(text: str, name: str) -> ModelInfo:
                 f"{where} is of format {short_text(meta.raw['format'])}, but this "
                 f"edge-classify reads {FORMAT}"
             )
-        if meta.has("taught"):
-            raise InputError(
-                f"{where} counts trials that were added on a board, which voids its "
-                "accuracies and error rates"
-            )
         info = _read(meta)
+        with about(where):
+            feature_types(info.features)
     except InputError as error:
         raise InputError(f"{error}; export it again") from None
-    try:
-        feature_types(info.features)
-    except InputError as error:
-        raise InputError(
-            f"{name}: was made for the features {', '.join(info.features)}; {error}; "
-            "export it with this version of edge-classify"
-        ) from None
     for contradiction in _contradictions(info):
         raise InputError(f"{name}: {contradiction}; export it again")
     return info
@@ -227,11 +217,9 @@ def _contradictions_of_joints(info: ModelInfo) -> Iterator[str]:
 
 
 def _unprintable(info: ModelInfo) -> Iterator[str]:
-    without_contact = [task.no_contact or "" for task in info.tasks.values()]
-    if not "".join([info.name, *info.tasks, *without_contact]).isprintable():
-        yield "its name, its tasks' names and its answers must be printable"
-    if not "".join(info.trials).isprintable():
-        yield "its trials' names must be printable"
+    answers = [task.no_contact or "" for task in info.tasks.values()]
+    if not "".join([info.name, *info.tasks, *answers, *info.trials]).isprintable():
+        yield "its name, tasks, answers and trials must be printable"
 
 
 def _contradictions_of_tasks(info: ModelInfo) -> Iterator[str]:

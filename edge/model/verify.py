@@ -13,7 +13,7 @@ by.
 | `<task>_label`, `_scores`, `_distances`, `_neighbours` | | the graph's outputs for `vectors` |
 | `<task>_label_distances` | float64 (v, labels) | likewise, where the model gives them |
 | `novelty` | float64 (v,) | likewise |
-| `out_of_range` | float64 (v,) | the graph's output; older files lack it |
+| `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
 | `meta` | JSON text | `skin`, `bounds` {`features`, `time_s`} |
@@ -42,8 +42,7 @@ from edge.touch.layout import SkinLayout
 
 OUTPUTS = ("label", "neighbours", "scores", "distances")
 """Ends of the names of a task's outputs."""
-OUT_OF_RANGE = "out_of_range"
-OF_ALL_TASKS = ("novelty", OUT_OF_RANGE)
+OF_ALL_TASKS = ("novelty", "out_of_range")
 """Outputs that belong to no task."""
 
 Line = tuple[str, Array, Array, float]
@@ -131,7 +130,7 @@ def second_opinion(model: Model, arrays: Mapping[str, Array]) -> Check | None:
     name = "the same in numpy"
     rows = len(arrays["vectors"])
     in_numpy = answers(Model(model.path, "numpy"), arrays)
-    for key, answer in _comparable(model, arrays).items():
+    for key, answer in answers(model, arrays).items():
         answered = arrays[_answered_key(key)] >= 0
         check = compared(key, answer[answered], in_numpy[key][answered], 0.0)
         if not check.passed:
@@ -206,7 +205,7 @@ def _graph(
                 f"{name}: {key} has the shape {arrays[key].shape}, but {model.path} "
                 f"takes {model.info.width} features; export both together"
             )
-    for key, answer in _comparable(model, arrays).items():
+    for key, answer in answers(model, arrays).items():
         bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
         label = _answered_key(key)
         if key != label:
@@ -214,19 +213,6 @@ def _graph(
             answer = answer.copy()
             answer[refused] = arrays[key][refused]
         yield key, answer, arrays[key], bound
-
-
-def _comparable(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
-    """`answers` without `out_of_range` where the golden file, an older one, lacks it.
-
-    Models of that time gave the size of the excess, which not every engine rounds
-    alike.
-    """
-    return {
-        key: answer
-        for key, answer in answers(model, arrays).items()
-        if key in arrays or not key.endswith(OUT_OF_RANGE)
-    }
 
 
 def answers(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
@@ -301,8 +287,5 @@ def compared(
     worst = float(share[row, column])
     if worst == 0.0:
         return Check(name, rows, 0.0, None)
-    texts = []
-    for side in (values, expected):
-        at_row = side.reshape(share.shape)[row]
-        texts.append(str(at_row) if bound == 0.0 else repr(float(at_row[column])))
+    texts = [str(side.reshape(share.shape)[row, column]) for side in (values, expected)]
     return Check(name, rows, worst, row, *texts)

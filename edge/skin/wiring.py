@@ -1,6 +1,5 @@
 """A skin's buses and chips: the `[[bus]]` tables of its file."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +11,6 @@ from edge.errors import InputError
 from edge.touch.layout import SkinLayout
 
 FASTEST_MUX_HZ = 400_000
-SERIAL_PORT = re.compile(r"(/dev/(tty|serial/|cu\.).*|COM\d+)")
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,6 @@ def read_buses(
 def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
     serial = table.has("serial")
     device, clock_hz = _port(table) if serial else _adapter(table)
-    if table.has("kind"):
-        _kind(table)
     chips = table.tables("chips", f"{table.prefix.rstrip(': ')} chip")
     if serial and len(chips) > 1:
         raise InputError(
@@ -64,7 +60,7 @@ def _bus(table: ConfigTable, layout: SkinLayout, sign: int | None) -> BusSpec:
         )
     specs = tuple(_chip(chip, table, layout, sign, serial) for chip in chips)
     options = {name for spec in specs for name in spec.kind.options}
-    for key in ("mux", "block", *options):
+    for key in ("kind", "mux", "block", *options):
         table.has(key)
     table.refuse_unknown()
     return BusSpec(device, specs, clock_hz, serial)
@@ -93,12 +89,6 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
     if not number and not (isinstance(device, str) and device and "\0" not in device):
         form = 'the number of a bus or its path or adapter, like 1, "/dev/i2c-1" or "CP2112"'
         raise table.fail("device", form)
-    if isinstance(device, str) and SERIAL_PORT.fullmatch(device):
-        raise InputError(
-            f"{table.key_name('device')} {device} is a serial port, not an I2C bus; "
-            "write serial = "
-            f'"{device}" instead, with kind = "block"'
-        )
     path = f"/dev/i2c-{device}" if number else str(device)
     return path, table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 

@@ -48,10 +48,6 @@ class Region:
         region."""
         return bool((self.bits | self._grid.neighbours(self.bits)) & region.bits)
 
-    def __repr__(self) -> str:
-        row, col = self.centroid
-        return f"Region(area={self.area}, peak={self.peak}, centroid=({row:.2f}, {col:.2f}))"
-
 
 class ActiveTaxels:
     """The taxels of one frame above the threshold, and the regions that they form.

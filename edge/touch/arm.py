@@ -117,11 +117,10 @@ class Chain:
             angles = np.asarray(q, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError(f"joint angles must be numbers, not {q!r}") from None
-        if angles.ndim == 0 or angles.shape[-1] != self.dof:
-            count = angles.shape[-1] if angles.ndim else "a single number"
+        if angles.shape[-1:] != (self.dof,):
             raise InputError(
                 f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
-                f"({', '.join(self.names)}), not {count}"
+                f"({', '.join(self.names)}), not an array {angles.shape}"
             )
         if not np.isfinite(angles).all():
             bad = np.argwhere(~np.isfinite(angles))[0][-1]

@@ -22,9 +22,6 @@ LONGEST_M = 1000.0
 MOST_LINES = 1024
 """Most rows, and most columns."""
 
-THRESHOLD_SHARE = 0.2
-"""Part by which a skin's thresholds may differ from the model's without a word."""
-
 
 @dataclass(frozen=True)
 class SkinLayout:
@@ -234,47 +231,3 @@ def for_device(model: SkinLayout, device: SkinLayout) -> SkinLayout:
         onset_counts=min(round(model.onset * ratio), 65535),
         dead=model.dead,
     )
-
-
-def differences(model: SkinLayout, device: SkinLayout) -> list[str]:
-    """Sentences that say in what a device's skin differs from the model's, where they
-    can still be used together.
-
-    Raises:
-        InputError: they cannot, see `for_device`.
-    """
-    matched = for_device(model, device)
-    sentences = []
-    dead = set(device.dead) - set(model.dead)
-    if dead:
-        sentences.append(f"{len(dead)} taxels are dead that were alive in training")
-    if device.counts_per_newton != model.counts_per_newton:
-        sentences.append(
-            f"a newton is {device.counts_per_newton:g} counts, and "
-            f"{model.counts_per_newton:g} in training; forces are converted"
-        )
-    for name, device_value, trained in (
-        ("threshold", device.threshold_counts, matched.threshold_counts),
-        ("onset", device.onset, matched.onset),
-    ):
-        if (
-            device_value
-            and abs(device_value - trained) > THRESHOLD_SHARE * device_value
-        ):
-            sentences.append(
-                f"the skin's {name} is {device_value} counts, but the model's of {trained} is "
-                "used"
-            )
-    if device.axes and not model.axes:
-        sentences.append("the skin gives shear, which the model does not use")
-    steps = zip(device.pitch, model.pitch, strict=True)
-    if not all(math.isclose(*pair, rel_tol=0.02) for pair in steps):
-        sentences.append(
-            f"taxels are {_millimetres(device.pitch)} apart, and "
-            f"{_millimetres(model.pitch)} in training"
-        )
-    return sentences
-
-
-def _millimetres(pitch: tuple[float, float]) -> str:
-    return " x ".join(f"{1e3 * step:g}" for step in pitch) + " mm"

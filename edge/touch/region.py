@@ -52,8 +52,9 @@ def largest_region(
     >>> import edge, numpy as np
     >>> counts = np.zeros((4, 6), np.uint16)
     >>> counts[1, 2:5] = 120, 300, 120
-    >>> edge.largest_region(counts, 100)
-    Region(area=3, peak=300, centroid=(1.00, 3.00))
+    >>> region = edge.largest_region(counts, 100)
+    >>> region.area, region.peak, region.centroid
+    (3, 300, (1.0, 3.0))
 
     Equal areas go to the larger overlap with `previous` (the region followed so far),
     then to the higher peak, then to the lower index. The other arguments are those of

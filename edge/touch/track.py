@@ -132,10 +132,7 @@ class ContactTracker:
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)
         self.contacts = [contact for contact in contacts if not contact.ended]
-        return self._confirmed(contacts)
-
-    def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
-        """The contacts that have lasted long enough to count."""
+        # Those that have lasted long enough to count.
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _regions(

@@ -1,14 +1,11 @@
 """Joints of a URDF file (wiki.ros.org/urdf/XML) between two of its links."""
 
-import logging
 import os
 import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 from edge.errors import InputError
 from edge.files import parsing, read_bytes
-
-LOG = logging.getLogger(__name__)
 
 
 def joints_between(
@@ -53,7 +50,7 @@ def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
     with parsing(os.fspath(path), "a URDF file"):
         root = ElementTree.fromstring(read_bytes(path))
     name = os.path.basename(path)
-    if str(name).lower().endswith(".xacro") or any(map(_is_macro, root.iter())):
+    if str(name).lower().endswith(".xacro"):
         raise InputError(
             f"{path}: is a xacro macro, not a URDF file; expand it by "
             f"`xacro {name} > expanded.urdf`"
@@ -65,29 +62,19 @@ def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
     return root
 
 
-def _is_macro(element: ElementTree.Element) -> bool:
-    """Whether xacro has yet to expand an element."""
-    texts = [element.tag, *element.attrib.values()]
-    return any(mark in text for text in texts for mark in ("/xacro}", "${", "$(arg"))
-
-
 def _parents(
     path: str | os.PathLike[str], root: ElementTree.Element
 ) -> dict[str, ElementTree.Element]:
     """{link: the joint that leads to it}."""
     parents: dict[str, ElementTree.Element] = {}
-    names: set[str] = set()
     for element in root.findall("joint"):
         child = _link(path, element, "child")
-        name = str(element.get("name"))
         if child in parents:
+            names = [parents[child].get("name"), element.get("name")]
             raise InputError(
-                f"{path}: joints {parents[child].get('name')!r} and {name!r} both lead "
+                f"{path}: joints {names[0]!r} and {names[1]!r} both lead "
                 f"to link {child!r}; remove one of them"
             )
-        if name in names:
-            raise InputError(f"{path}: two joints are named {name!r}; rename one")
-        names.add(name)
         parents[child] = element
     return parents
 
@@ -123,25 +110,8 @@ def _joint(
             child = element.find(tag)
             if child is not None and attribute in child.attrib:
                 joint[key] = list(map(float, child.attrib[attribute].split()))
-        limits = _limits(path, element)
-    if limits is not None and kind in ("revolute", "prismatic"):
-        joint["limits"] = limits
+        limit = element.find("limit")
+        if limit is not None and kind in ("revolute", "prismatic"):
+            ends = [limit.get("lower", "0"), limit.get("upper", "0")]
+            joint["limits"] = list(map(float, ends))
     return joint
-
-
-def _limits(
-    path: str | os.PathLike[str], element: ElementTree.Element
-) -> list[float] | None:
-    """Lower and upper limit of a joint; None where it has none, or they are reversed."""
-    limit = element.find("limit")
-    if limit is None:
-        return None
-    low = float(limit.get("lower", "0"))
-    high = float(limit.get("upper", "0"))
-    if low <= high:
-        return [low, high]
-    LOG.warning(
-        f"{path}: joint {element.get('name')!r} has its lower limit {low:g} above its "
-        f"upper limit {high:g}; both are left out"
-    )
-    return None

@@ -36,7 +36,7 @@ class Entry:
     """A case in the two tables of the page, and for the terminal.
 
     Attributes:
-        answer: how far the case holds, and at what cost.
+        answer: how far the case holds.
         judge: the oracle, and what the usual tools answer.
     """
 
@@ -45,13 +45,12 @@ class Entry:
 
     @classmethod
     def of(cls, case, worst):
-        """The entry of a case; measures its margin, its price and the usual tools."""
+        """The entry of a case; measures its margin and the usual tools."""
         answer = {
             "hard case": case.key,
             "holds to": margins.margin(case),
             "bound": number(case.bound),
             "largest error": place(worst),
-            "cost": margins.price(case),
         }
         judge = {
             "hard case": case.key,

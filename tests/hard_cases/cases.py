@@ -74,7 +74,6 @@ class Case:
         around: strategies of parameters near them, which the search draws from.
         ladder: the search for the margin; None if all values are tried.
         usual: measures what the usual tools give on the same hazard, in words.
-        guard: whose price the table shows, if not that of the group.
         examples: how many the search draws.
         bound: the largest error that is allowed.
     """
@@ -87,7 +86,6 @@ class Case:
     around: Mapping[str, Any] = field(default_factory=dict)
     ladder: Ladder | None = None
     usual: Callable[[], str] | None = None
-    guard: str = ""
     examples: int = EXAMPLES
     bound: float = 0.0
 

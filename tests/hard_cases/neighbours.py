@@ -45,11 +45,6 @@ def offset_data(offset, sd, seed, n=160):
     )
 
 
-def scaled_data(scale, seed, n=160):
-    """Vectors of another size."""
-    return features(n, seed) * scale, features(24, seed + 1) * scale
-
-
 def far_data(factor, seed, n=160):
     """Queries outside the training set."""
     return features(n), features(8, seed) * factor
@@ -298,7 +293,6 @@ CASES = [
         {"factor": powers_of_ten(0.0, 8.0), "seed": SEEDS},
         Ladder("times as far out", decades(0, 12, 0.5), "factor", "1"),
         outlier_price,
-        guard="PCA",
         examples=4,
         bound=0.02,
     ),
@@ -314,14 +308,6 @@ CASES = [
             "0.036 and 0.014",
         ),
         lambda: usual_neighbours(*offset_data(1e6, 0.01, 0)),
-    ),
-    answers(
-        "scales 1e-24 to 1e+20",
-        wrong(scaled_data, USUAL),
-        [{"scale": scale, "seed": 0} for scale in (1e-24, 1e20)],
-        {"scale": powers_of_ten(-24, 20)},
-        Ladder("scale", decades(20, 170, 0.1), "scale", "0.01 to 920 and 0.02 to 25"),
-        lambda: usual_neighbours(*scaled_data(1e20, 0)),
     ),
     answers("exact duplicates", wrong(duplicates, Choice("IV", 20, 4)), **BY_ROWS),
     answers(

@@ -14,7 +14,7 @@ SPEC = ChipSpec(Block, 0x28, tuple(range(12)))
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
-@pytest.mark.parametrize("taxels", [1, 2, 7, 384])
+@pytest.mark.parametrize("taxels", [1, 7])
 def test_packed_taxels_are_unpacked(bits, taxels):
     values = (
         np.random.default_rng(bits).integers(0, 1 << bits, taxels).astype(np.uint16)

@@ -48,11 +48,9 @@ def test_a_constructor_checks_that_its_chip_is_there(pair):
     ("driver", "model", "options"),
     [
         (AD7147, FakeMPR121(sense), {}),
-        (AD7147, FakeBlock(sense, taxels=12), {}),
         (MPR121, FakeAD7147(sense), {}),
         (Block, FakeMPR121(sense), {"taxels": 12}),
         (Block, FakeBlock(sense, taxels=24), {"taxels": 12}),
-        (Block, FakeBlock(sense, taxels=12, bits=8), {"taxels": 12, "bits": 16}),
     ],
 )
 def test_a_constructor_refuses_another_chip(driver, model, options):

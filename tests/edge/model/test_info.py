@@ -35,7 +35,6 @@ class TestMargin:
         ("distances", "expected"),
         [
             ((0.0, math.inf), math.inf),
-            ((math.inf, 1.0), -math.inf),
             ((math.inf,) * 2, -math.inf),
         ],
     )
@@ -63,22 +62,13 @@ def test_the_fastest_rule_that_is_certified_is_taken():
     ]
 
 
-def test_a_rule_asks_for_the_same_margin_at_every_decision_point():
+@pytest.mark.parametrize("excess", [0.0, 0.7])
+def test_a_novel_contact_needs_a_larger_margin_at_every_decision_point(excess):
     _, at_nine_tenths, _ = stopping().rules
-    evidence = 2.0 * math.log(9.0)
-    assert is_sure(stopping(), at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.0)
-    assert not is_sure(
-        stopping(), at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.0
-    )
-
-
-def test_a_novel_contact_needs_a_larger_margin():
-    _, at_nine_tenths, _ = stopping().rules
-    evidence = 2.0 * (math.log(9.0) + 0.7)
-    assert is_sure(stopping(), at_nine_tenths, [0.0, evidence + 1e-9], 0, excess=0.7)
-    assert not is_sure(
-        stopping(), at_nine_tenths, [0.0, evidence - 1e-9], 0, excess=0.7
-    )
+    evidence = 2.0 * (math.log(9.0) + excess)
+    for more, sure in ((1e-9, True), (-1e-9, False)):
+        distances = [0.0, evidence + more]
+        assert is_sure(stopping(), at_nine_tenths, distances, 0, excess) is sure
 
 
 @pytest.mark.parametrize(
@@ -118,12 +108,6 @@ def test_a_refusal_asks_for_more_trials_than_there_were():
     assert text.endswith("0.09 needs about 10001 trials")
 
 
-def test_an_error_rate_below_the_resolution_of_1_still_has_a_number_of_trials():
-    task = stopping(wrong=0)
-    trials = float(refusal(task, 1e-17).split()[-2])
-    assert trials == pytest.approx(-math.log(TEST_SHARE * task.risk) / 1e-17, rel=1e-6)
-
-
 def test_where_the_full_window_errs_more_often_trials_do_not_help():
     assert "more trials alone will not do" in refusal(stopping(wrong=28), 0.15)
     assert "needs about" in refusal(stopping(wrong=0), 0.01)
@@ -135,8 +119,6 @@ def table(stored):
 
 def test_what_is_stored_is_read_again():
     assert read_stopping(table(stopping()), 3) == stopping()
-    at_once = stopping(rules=(StoppingRule(0.2, 0.4, 0.0, 0),), wrong=0)
-    assert read_stopping(table(at_once), 3) == at_once
     novelty = Novelty("t", (0.1, 0.05), ((1.0, 2.0), (3.0, 4.0)))
     assert read_novelty(table(novelty), 2) == novelty
 
@@ -147,21 +129,10 @@ def test_what_is_stored_is_read_again():
         ({"slopes": (1.0, 1.0)}, "slopes must be a list of 3 numbers"),
         ({"slopes": (1.0, -1.0, 1.0)}, "slopes must be a number above 0, not -1.0"),
         (
-            {"intercepts": (0.0, 0.0, math.nan)},
-            "intercepts must be a finite number, not nan",
-        ),
-        ({"slope": 0.0}, "slope must be a number above 0, not 0.0"),
-        ({"rules": ()}, "rules must be a list of tables"),
-        (
             {"rules": (StoppingRule(0.1, 1.0, 0.9, 3),)},
             "rules 0: last must be .* 0 to 2, not 3",
         ),
-        (
-            {"rules": (StoppingRule(0.0, 1.0, 0.9, 2),)},
-            "rules 0: error must be a number above 0",
-        ),
         ({"wrong": 141}, "wrong must be a whole number from 0 to 140, not 141"),
-        ({"risk": 0.0}, "risk must be a number above 0, at most 1, not 0.0"),
     ],
 )
 def test_what_contradicts_itself_is_no_stopping(changes, says):
@@ -179,21 +150,6 @@ def test_the_limits_of_novelty_are_a_row_for_each_decision_point():
         read_novelty(table(novelty), 3)
 
 
-@pytest.mark.parametrize(
-    ("rates", "limits", "says"),
-    [
-        ((0.05, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
-        ((1.5, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
-        ((0.1, 0.0), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
-        ((0.1, 0.05), (2.0, 1.0), "limits must be rows of numbers from 0 on that rise"),
-        ((0.1, 0.05), (-1.0, 1.0), "limits must be rows of numbers from 0 on"),
-    ],
-)
-def test_limits_of_novelty_in_another_order_are_refused(rates, limits, says):
-    with pytest.raises(InputError, match=says):
-        read_novelty(table(Novelty("t", rates, (limits,))), 1)
-
-
 def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
     novelty = Novelty("t", (0.2, 0.1, 0.05), ((1.0, 2.0, 3.0),))
     assert [novelty.rate(0, d) for d in (0.5, 1.0, 1.5, 2.5, 9.0)] == [
@@ -205,7 +161,7 @@ def test_the_farther_a_contact_the_smaller_the_rate_at_which_it_is_unknown():
     ]
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, -0.1, math.nan])
+@pytest.mark.parametrize("value", [0.0, 1.0, math.nan])
 def test_a_rate_lies_inside_0_to_1(value):
     with pytest.raises(InputError, match="must be above 0 and below 1"):
         check_rate(value, "the error rate")
@@ -217,7 +173,6 @@ def test_a_rate_lies_inside_0_to_1(value):
         ((5.0, 1.0), "each feature is usual, but not all of them together"),
         ((11.0, 1.0), "max force higher than in training"),
         ((11.0, 0.0), "skin area lower than in training"),
-        ((-1.0, 1.0), "max force lower than in training"),
     ],
 )
 def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
@@ -227,9 +182,21 @@ def test_what_is_farthest_from_its_usual_range_is_said(means, phrase):
 
 @pytest.mark.parametrize(
     ("confidence", "fixed"),
-    [(0.9, False), (1.0, False), (math.nextafter(1.0, 2.0), True)],
+    [(1.0, False), (math.nextafter(1.0, 2.0), True)],
 )
 def test_only_a_rule_that_no_confidence_meets_waits_for_a_fixed_window(
     confidence, fixed
 ):
     assert StoppingRule(0.1, 1.0, confidence, 3).fixed is fixed
+
+
+@pytest.mark.parametrize(
+    ("rates", "limits", "says"),
+    [
+        ((0.05, 0.1), (1.0, 2.0), "rates must be numbers between 0 and 1 that fall"),
+        ((0.1, 0.05), (2.0, 1.0), "limits must be rows of numbers from 0 on that rise"),
+    ],
+)
+def test_limits_of_novelty_in_another_order_are_refused(rates, limits, says):
+    with pytest.raises(InputError, match=says):
+        read_novelty(table(Novelty("t", rates, (limits,))), 1)

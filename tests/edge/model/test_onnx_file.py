@@ -68,28 +68,21 @@ def weights_elsewhere(**fields):
 TENSOR = numpy_helper.from_array(np.ones(2), "w")
 PARTS = "functions, inner graphs or sparse tensors, as no exported model has"
 REFUSED = {
+    "many nodes": (model([add()] * (onnx_file.MOST_NODES + 1)), "1001 nodes"),
     "a loop": (model([add("Loop")]), "operator Loop, as no"),
     "a foreign domain": (
         model([add(domain="com.evil")]),
         "operator com.evil.Add, as no",
     ),
-    "a known domain": (
-        model([add("CDist", domain="com.microsoft")]),
-        "operator com.microsoft.CDist, as no",
-    ),
     "a function": (a_function(), PARTS),
     "an inner graph": (model([add(then_branch=model([add()]).graph, times=2)]), PARTS),
     "a tensor in an attribute": (model([add(value=TENSOR)]), PARTS),
     "a sparse constant": (a_sparse_constant(), PARTS),
-    "many nodes": (model([add()] * (onnx_file.MOST_NODES + 1)), "1001 nodes"),
     "weights elsewhere": (
         weights_elsewhere(data_location=TensorProto.EXTERNAL),
-        "weights in another file, as no exported model has",
+        "weights in another file, as no",
     ),
-    "a path alone": (
-        weights_elsewhere(),
-        "weights in another file, as no exported model has",
-    ),
+    "a path alone": (weights_elsewhere(), "weights in another file, as no"),
 }
 
 
@@ -99,7 +92,7 @@ def test_what_no_exported_model_has_is_refused(proto, sentence):
         check(proto.SerializeToString(), "m.onnx")
 
 
-@pytest.mark.parametrize("value", [0.5, 3, "text", [0.5, 1.5], [1, 2]], ids=str)
+@pytest.mark.parametrize("value", [0.5, "text", [1, 2]], ids=str)
 def test_an_attribute_may_be_numbers_or_a_text(value):
     contents = check(model([add(own=value)]).SerializeToString(), "m.onnx")
     assert contents.foreign == []
@@ -107,9 +100,7 @@ def test_an_attribute_may_be_numbers_or_a_text(value):
 
 
 OTHER_ATTRIBUTES = {
-    "texts": ["a", "b"],
     "tensors": [TENSOR, TENSOR],
-    "graphs": [model([add()]).graph] * 2,
     "a sparse tensor": a_sparse_constant().graph.sparse_initializer[0],
     "a type": helper.make_tensor_type_proto(TensorProto.DOUBLE, [1]),
 }
@@ -121,7 +112,7 @@ def test_an_attribute_of_another_kind_is_refused(value):
         check(model([add(own=value)]).SerializeToString(), "m.onnx")
 
 
-@pytest.mark.parametrize("data", ["38 05", "3a 02 08 05", "3a 04 0a 02 20 05"])
+@pytest.mark.parametrize("data", ["38 05", "3a 04 0a 02 20 05"])
 def test_a_number_where_bytes_belong_is_no_model(data):
     """A graph, a node and the name of an operator that are the number 5."""
     with pytest.raises(

@@ -15,9 +15,7 @@ INF = float("inf")
     ("value", "expected", "share"),
     [
         (0.5, 0.25, 0.5),  # below 1 the bound is absolute
-        (150.0, 100.0, 1.0),  # above, a share of the expected
-        (151.0, 100.0, 1.02),
-        (-150.0, -100.0, 1.0),
+        (-151.0, -100.0, 1.02),  # above, a share of the expected
         (NAN, NAN, 0.0),
         (INF, INF, 0.0),
         (NAN, 1.0, INF),
@@ -38,15 +36,15 @@ def test_a_bound_of_zero_allows_nothing():
     assert not compared("it", np.nextafter(golden, 2.0), golden, 0.0).passed
 
 
-def test_a_row_of_whole_numbers_that_differs_is_shown():
+def test_the_value_that_differs_is_shown():
     golden = np.array([[1, 2], [3, 4], [5, 6]])
     values = golden.copy()
     values[1, 0] = 7
     check = compared("it", values, golden, 0.0)
     assert not check.passed
     assert check.row == 1
-    assert check.seen == "[7 4]"
-    assert check.expected == "[3 4]"
+    assert check.seen == "7"
+    assert check.expected == "3"
 
 
 @pytest.mark.parametrize("bound", [0.0, 1.0])

@@ -10,7 +10,7 @@ from edge.recording import Recording
 from edge.skin.calibration import with_calibration
 from edge.skin.file import Signal, parse
 from edge.skin.shear import SignedBaseline
-from edge.touch.layout import SkinLayout, differences, for_device
+from edge.touch.layout import SkinLayout, for_device
 
 LAYOUT = SkinLayout(3, 4, threshold_counts=40, onset_counts=60, axes=3)
 PAD = """
@@ -56,17 +56,6 @@ def test_an_axis_keeps_its_sign_its_dead_band_and_its_limits():
     assert baseline.away(raw).tolist() == [0, -5, 32767, -32767]
 
 
-def test_an_axis_follows_its_drift_in_both_directions():
-    signal = Signal(6.0, 3, drift_counts_per_s=100.0, drift_limit_counts=10)
-    baseline = SignedBaseline(signal, 100.0, [1000, 1000])
-    raw = np.array([1008, 992], dtype=np.uint16)
-    valid = np.ones(2, dtype=bool)
-    for _ in range(40):
-        baseline.follow(raw, valid)
-    assert baseline.counts.tolist() == [1008, 992]
-    assert baseline.away(raw).tolist() == [0, 0]
-
-
 def test_a_taxel_that_is_not_valid_has_no_shear():
     skin, _ = play(skin_file(LAYOUT), touch())
     with skin:
@@ -99,11 +88,3 @@ def test_a_model_that_needs_shear_is_refused_on_a_skin_without_it():
     plain = SkinLayout(3, 4, threshold_counts=40)
     with pytest.raises(InputError, match="needs shear, which this skin does not give"):
         for_device(LAYOUT, plain)
-
-
-def test_a_skin_with_shear_that_the_model_does_not_use_is_said():
-    plain = SkinLayout(3, 4, threshold_counts=40, onset_counts=60)
-    assert differences(plain, LAYOUT) == [
-        "the skin gives shear, which the model does not use"
-    ]
-    assert differences(LAYOUT, LAYOUT) == []

