@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, or explain."""
     from edge.errors import InputError
     from train.simulate import scene as scenes
-    from train.simulate.account import duration, explain
+    from train.simulate.account import explain
     from train.simulate.plan import summary
 
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
@@ -48,8 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.explain:
         print(explain(scene))
     if arguments.out:
-        lines = [*summary(scene), *filter(None, [duration(scene)])]
-        print(*lines, sep="\n", file=sys.stderr)
+        print(*summary(scene), sep="\n", file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 

@@ -181,7 +181,7 @@ class TestCommand:
         )
         assert main(["simulate", str(path), "--explain"]) == 0
         out = capsys.readouterr().out
-        line = next(x for x in out.splitlines() if "relaxation" in x)
+        line = next(x for x in out.splitlines() if "lateral" in x)
         assert "family foam" in line
         assert float(line.split()[1]) > 0.0
         assert "order" in out

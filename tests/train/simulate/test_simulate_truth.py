@@ -75,28 +75,7 @@ class TestLabels:
     def test_a_motion_that_never_touches_is_refused(self):
         trial_scene = scene({**BOX, "conditions": ["fixed"]})
         still = replace(trial_scene, damping=(0.0,) * 5, travel_s=1e-6)
-        refused(still, "was never touched, as the arm's stroke.*motion")
-
-    @pytest.mark.parametrize(
-        ("change", "says"),
-        [
-            (
-                {"motion": {"travel_s": 0.2}},
-                r"as the arm's stroke ended 0\.\d\d s.*travel_s",
-            ),
-            (
-                {"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}},
-                "stroke ended.*start_deg",
-            ),
-            (
-                {"trials": {"count": 1, "after_s": 0.1}},
-                r"and the trial ended 0\.\d\d s.*after_s",
-            ),
-        ],
-    )
-    def test_the_error_names_the_reason_why_a_trial_ended_early(self, change, says):
-        light = scene({**BOX, "mass_kg": 1.0}, **change)
-        refused(light, r"the last moved \d+ mm, less than 20, .*" + says)
+        refused(still, "was never touched.*motion")
 
     @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
     def test_an_object_inside_the_arm_is_refused_at_once(
