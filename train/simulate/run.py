@@ -48,16 +48,14 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 def recordings(
     physics: PhysicsRun,
     which: Places | None = None,
-    scene: Scene | None = None,
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a run, or of some; arguments as of
     `readings`."""
-    scene = scene or physics.trials.scene
-    for reading in readings(physics, which, scene):
+    for reading in readings(physics, which):
         arrived = slice(None) if reading.kept is None else reading.kept
         t = reading.t if reading.times is None else reading.times
         shear = reading.shear()
-        file = file_name(scene, reading.trial)
+        file = file_name(reading.scene, reading.trial)
         yield (
             file,
             Recording(
@@ -138,7 +136,6 @@ def write(
     scene: Scene,
     folder: str | Path,
     *,
-    batch: int | None = None,
     jobs: int = 1,
     address: str | None = None,
     progress: Callable[[int], Any] = lambda count: None,
@@ -148,7 +145,6 @@ def write(
     The files' bytes depend on the scene and its seed alone.
 
     Args:
-        batch: most trials simulated side by side; see `batches_of`.
         jobs: processes on this machine (joblib).
         address: of a Dask scheduler that runs the batches and sends the recordings
             back.
@@ -162,7 +158,7 @@ def write(
     convergences = measured(scene)
     first = {kind: specs[0] for kind, specs in kinds(scene).items()}
     processes = jobs if jobs > 0 else cpu_count() or 1
-    work = batches_of(scene, batch, convergences, processes)
+    work = batches_of(scene, convergences=convergences, jobs=processes)
     paths = []
     redrawn = 0
     unfelt = 0

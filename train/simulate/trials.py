@@ -49,10 +49,10 @@ class Column:
     def __set__(self, group: "Group", values: Any) -> None:
         """Set the values of the group's trials."""
         places = group.places
-        if places is None:
-            places = slice(None)
         array = group.arrays[self.name]
-        if array.ndim == 1:
+        if places is None:
+            array[...] = values
+        elif array.ndim == 1:
             array[places] = values
         else:
             array[..., places] = values

@@ -190,22 +190,6 @@ def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
             from_dict({"object": wall, "spread": {key: 1e-3}})
 
 
-@pytest.mark.parametrize("band", [10.0, 30.0])
-def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
-    frames = []
-    for add in ((), ("crosstalk",)):  # which asks for all taxels, and leaks nothing
-        trial_scene = scene("noise", "dead_band", *add)
-        trial_scene.settings.update(
-            noise={"counts": 5.0},
-            dead_band={"counts": band},
-            crosstalk={"part": 0.0},
-        )
-        frames.append(batch_of(trial_scene)[0].counts)
-    assert frames[0].tobytes() == frames[1].tobytes()
-    noisy = (frames[0][:, 0] > 0).any()
-    assert noisy if band < 21.0 else not noisy
-
-
 def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
     counted, unused, *_ = summary(scene("noise"))
     counts = dict(re.findall(r"(\w+) \((\d+)\)", counted))
