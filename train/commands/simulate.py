@@ -38,10 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
     if not arguments.out and not arguments.explain:
         raise InputError("simulate: give --out DIR, --explain or both")
+    print(*summary(scene), sep="\n", file=sys.stderr)
     if arguments.explain:
         print(explain(scene))
     if arguments.out:
-        print(*summary(scene), sep="\n", file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 

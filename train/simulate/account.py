@@ -9,7 +9,7 @@ from train.simulate.convergence import Convergence, Kind, kinds, measure
 from train.simulate.engine import batch_size, readings, run_physics
 from train.simulate.plan import Call, make_plan, required_effects
 from train.simulate.scene_model import Scene, TrialSpec
-from train.simulate.schema import EFFECTS, SHARED
+from train.simulate.schema import SHARED
 
 BASE = "(base)"
 """Names the work of all trials: the arm, the skin, and the loop over the steps."""
@@ -106,8 +106,6 @@ def explain(scene: Scene) -> str:
     ]
     for effects, specs in trials_by_kind.items():
         lines += ["", *_of_kind(scene, effects, specs, by_kind[effects], spent)]
-    unused = [name for name in EFFECTS if not any(name in k for k in trials_by_kind)]
-    lines += ["", "not called for, not loaded: " + (", ".join(unused) or "none")]
     return "\n".join(lines)
 
 

@@ -167,13 +167,13 @@ class TestCommand:
             '[[object]]\nname = "foam"\nfamily = "foam"\nconditions = ["fixed"]\n'
         )
         assert main(["simulate", str(path), "--explain"]) == 0
-        out = capsys.readouterr().out
+        out, err = capsys.readouterr()
         line = next(x for x in out.splitlines() if "lateral" in x)
         assert "family foam" in line
         assert float(line.split()[1]) > 0.0
         assert "order" in out
         assert "1 trials, simulated side by side in" in out
-        assert "not called for, not loaded: cover, pop" in out
+        assert "not called for, and not loaded: cover, pop" in err
 
     @pytest.mark.parametrize(
         ("arguments", "says"),
