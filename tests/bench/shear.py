@@ -27,7 +27,7 @@ SHOWN_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 def compared(seed, folder, jobs):
     """The answers with shear and without on the trials of one seed."""
     data = folder / str(seed)
-    run.write(scene.load(SCENE, seed=seed), data, jobs=jobs)
+    run.write(scene.load(SCENE, seed=seed), data)
     dataset = followed(read([str(data)]))
     workers = Workers(jobs)
     sheared = shear.answers(dataset, WINDOWS_S, workers)

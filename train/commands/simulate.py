@@ -26,41 +26,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option("--seed", type=int, help="seed, instead of the scene's")
     text = "trials of each object in each condition, instead of the scene's"
     option("--trials", type=int, metavar="N", help=text)
-    option("--jobs", type=int, default=1, help="processes; -1 for all cores")
-    text = "run the batches on the cluster of this Dask scheduler, like tcp://127.0.0.1:8786"
-    option("--address", help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, or explain."""
     from edge.errors import InputError
     from train.simulate import scene as scenes
-    from train.simulate.account import duration, explain
+    from train.simulate.account import explain
     from train.simulate.plan import summary
 
     scene = scenes.load(arguments.scene, seed=arguments.seed, count=arguments.trials)
     if not arguments.out and not arguments.explain:
         raise InputError("simulate: give --out DIR, --explain or both")
-    if arguments.jobs == 0 or arguments.jobs < -1:
-        raise InputError(
-            f"simulate: --jobs must be 1 or more, or -1, not {arguments.jobs}"
-        )
+    print(*summary(scene), sep="\n", file=sys.stderr)
     if arguments.explain:
         print(explain(scene))
     if arguments.out:
-        lines = [*summary(scene), *filter(None, [duration(scene)])]
-        print(*lines, sep="\n", file=sys.stderr)
         from train.progress import bar
         from train.simulate.run import total_trials, write
 
         with bar(total=total_trials(scene), unit="trial", desc=scene.name) as progress:
-            written = write(
-                scene,
-                arguments.out,
-                jobs=arguments.jobs,
-                address=arguments.address,
-                progress=progress.update,
-            )
+            written = write(scene, arguments.out, progress=progress.update)
         headline = f"recordings written to {arguments.out}: {len(written.paths)}"
         print(headline, *remarks(scene, written), sep="\n", file=sys.stderr)
     return 0

@@ -9,14 +9,10 @@ from train.simulate.convergence import Convergence, Kind, kinds, measure
 from train.simulate.engine import batch_size, readings, run_physics
 from train.simulate.plan import Call, make_plan, required_effects
 from train.simulate.scene_model import Scene, TrialSpec
-from train.simulate.schema import EFFECTS, SHARED
+from train.simulate.schema import SHARED
 
 BASE = "(base)"
 """Names the work of all trials: the arm, the skin, and the loop over the steps."""
-MANY_STEPS = 100_000
-"""Steps of a trial from which a run says how long it will take."""
-TIMED_FRAMES = 20
-"""Frames that tell the time of a step."""
 
 
 @dataclass
@@ -53,7 +49,7 @@ class Costs:
     Attributes:
         trials: how many there are.
         seconds: of the run, redraws and the writing of files left out.
-        by_effect: {effect, module that effects share, or `BASE`: seconds for each trial
+        by_effect: {`BASE`, module that effects share, or effect: seconds for each trial
             that calls for it}.
     """
 
@@ -62,17 +58,11 @@ class Costs:
     by_effect: Mapping[str, float]
 
     def of(self, effects: Kind) -> dict[str, float]:
-        """{`BASE` or effect: seconds} of a trial that calls for these effects.
-
-        Work that effects share is parted among those of them that the trial calls for.
-        So the parts of all trials add up to the run.
-        """
-        seconds = {name: self.by_effect.get(name, 0.0) for name in (BASE, *effects)}
-        for module, sharing in SHARED.items():
-            callers = [effect for effect in effects if effect in sharing]
-            for effect in callers:
-                seconds[effect] += self.by_effect.get(module, 0.0) / len(callers)
-        return seconds
+        """{name: seconds} of a trial that calls for these effects, in the order of
+        `by_effect`; those of all trials add up to the run."""
+        shared = {name for name, users in SHARED.items() if {*users} & {*effects}}
+        names = {BASE, *shared, *effects}
+        return {name: s for name, s in self.by_effect.items() if name in names}
 
 
 def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
@@ -99,37 +89,9 @@ def costs(scene: Scene, specs: Sequence[TrialSpec]) -> Costs:
             reading.frames()
     seconds = time.perf_counter() - begun
     of_effects = {name: watch.seconds.get(name, 0.0) for name in callers}
-    a_trial = {name: of_effects[name] / callers[name] for name in callers}
-    a_trial[BASE] = (seconds - sum(of_effects.values())) / len(specs)
+    a_trial = {BASE: (seconds - sum(of_effects.values())) / len(specs)}
+    a_trial |= {name: of_effects[name] / callers[name] for name in callers}
     return Costs(len(specs), seconds, a_trial)
-
-
-def duration(scene: Scene) -> str:
-    """About how long the physics will take, for scenes of very many steps; "" for
-    others.
-
-    A few frames tell the time of a step.
-    """
-    if not scene.step_s:
-        return ""
-    trials_by_kind = kinds(scene)
-    specs = [spec for of_kind in trials_by_kind.values() for spec in of_kind]
-    seconds = scene.lead.high + scene.trials["after_s"]
-    steps = round(seconds / min(spec.step_s for spec in specs))
-    if steps <= MANY_STEPS:
-        return ""
-    size = batch_size(scene)
-    frame_s = 1.0 / scene.rate_hz
-    batch = tuple(replace(spec, step_s=frame_s) for spec in specs[:size])
-    brief = replace(scene, trials={**scene.trials, "after_s": TIMED_FRAMES * frame_s})
-    begun = time.perf_counter()
-    run_physics(brief, batch)
-    a_step_s = (time.perf_counter() - begun) / (brief.frame_count - 1)
-    batches = -(-len(specs) // size)
-    hours = batches * steps * a_step_s / 3600.0
-    return (
-        f"{steps:,} steps a trial: this will take about {hours:.2g} hours of one core"
-    )
 
 
 def explain(scene: Scene) -> str:
@@ -144,8 +106,6 @@ def explain(scene: Scene) -> str:
     ]
     for effects, specs in trials_by_kind.items():
         lines += ["", *_of_kind(scene, effects, specs, by_kind[effects], spent)]
-    unused = [name for name in EFFECTS if not any(name in k for k in trials_by_kind)]
-    lines += ["", "not called for, not loaded: " + (", ".join(unused) or "none")]
     return "\n".join(lines)
 
 
@@ -163,15 +123,15 @@ def _of_kind(
         f"{', '.join(sorted(first))}: {len(specs)} trials",
         _step_line(specs[0].step_s, convergence, scene),
         f"  {'effect':<16}{'us/trial':>9}  called for by",
-        f"  {BASE:<16}{micros[BASE]:>9.0f}",
     ]
-    for effect in effects:
-        reasons = {
-            required_effects(scene, spec.object, spec.condition)[effect]
-            for spec in first.values()
-        }
-        why = ", ".join(sorted(reasons))
-        lines.append(f"  {effect:<16}{micros[effect]:>9.0f}  {why}")
+    for name, cost in micros.items():
+        reasons = set(SHARED.get(name, ())) & {*effects}
+        if name in effects:
+            reasons = {
+                required_effects(scene, spec.object, spec.condition)[name]
+                for spec in first.values()
+            }
+        lines.append(f"  {name:<16}{cost:>9.0f}  {', '.join(sorted(reasons))}".rstrip())
     lines.append(f"  {'together':<16}{sum(micros.values()):>9.0f}")
     return lines
 

@@ -113,16 +113,6 @@ class _Kind:
     steps_s: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
 
-    @property
-    def has_run(self) -> bool:
-        """Whether the step that the trials have is among those tried."""
-        return self.specs[0].step_s in self.steps_s
-
-    @property
-    def force_as_given(self) -> Array:
-        """The force at the step that the trials have."""
-        return self.forces[self.steps_s.index(self.specs[0].step_s)]
-
     def changes(self) -> list[float]:
         """How far each step's force lies from that of the next."""
         return list(map(_distance, self.forces, self.forces[1:]))
@@ -166,20 +156,12 @@ def measure(
         for kind, swing_s in zip(kinds, _swing_steps(scene, kinds), strict=True)
     ]
     _run(scene, reference, paced=False)
-    forces = _forces_as_given(scene, kinds)
+    as_given = [_Kind(kind.specs) for kind in kinds]
+    _run(scene, [(kind, kind.specs[0].step_s) for kind in as_given])
     return {
-        effects: _judged(kind, force, tolerance)
-        for effects, kind, force in zip(trials_by_kind, kinds, forces, strict=True)
+        effects: _judged(kind, at_step.forces[0], tolerance)
+        for effects, kind, at_step in zip(trials_by_kind, kinds, as_given, strict=True)
     }
-
-
-def _forces_as_given(scene: Scene, kinds: list[_Kind]) -> list[Array]:
-    """The forces at the steps that the trials have, of which those not tried yet are
-    run."""
-    as_given = [kind if kind.has_run else _Kind(kind.specs) for kind in kinds]
-    untried = [kind for kind in as_given if not kind.has_run]
-    _run(scene, [(kind, kind.specs[0].step_s) for kind in untried])
-    return [kind.force_as_given for kind in as_given]
 
 
 def _spread_out(specs: Sequence[TrialSpec]) -> list[TrialSpec]:

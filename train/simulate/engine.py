@@ -326,18 +326,13 @@ def check_energy(batch: Batch, joints: Array, times: Array) -> None:
 def readings(
     physics: PhysicsRun,
     which: Places | None = None,
-    scene: Scene | None = None,
 ) -> Iterator[Readings]:
-    """The sensor readings of a run's trials, trial by trial.
-
-    Args:
-        which: the trials to read; None for all.
-        scene: a scene with other sensors, to read the run with these instead.
-    """
+    """The sensor readings of a run's trials, trial by trial; `which` chooses some of
+    them."""
     batch = physics.trials
-    scene = scene or batch.scene
+    scene = batch.scene
+    plan = batch.plan
     every = np.arange(batch.n) if which is None else which
-    plan = batch.plan if scene is batch.scene else make_plan(scene, batch.specs)
     for i in every.tolist():
         counts = np.zeros((len(physics.t), *scene.skin.shape), dtype=np.float32)
         counts[:, :, batch.bed.columns[:, i]] = physics.window[i]

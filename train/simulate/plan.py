@@ -276,8 +276,8 @@ def given_steps(scene: Scene) -> str:
 
 
 def summary(scene: Scene) -> list[str]:
-    """Lines on the effects that a scene's trials call for, those that none does, how
-    much of the effects' work that leaves out, and steps that are not measured."""
+    """Lines on the effects that a scene's trials call for, those that none does, and
+    steps that are not measured."""
     counts = dict.fromkeys(EFFECTS, 0)
     trials = scene.count * len(scene.kinds)
     for item, condition in scene.kinds:
@@ -285,13 +285,9 @@ def summary(scene: Scene) -> list[str]:
             counts[effect] += scene.count
     entries = [f"{name} ({n})" for name, n in counts.items() if n]
     unused = [name for name, n in counts.items() if not n]
-    pairs = sum(counts.values())
-    every = trials * len(EFFECTS)
     return [
         f"effects, with the trials of {trials} that call for them: "
         f"{', '.join(entries) or 'none'}",
         f"not called for, and not loaded: {', '.join(unused) or 'none'}",
-        f"so {pairs} effects of trials are computed, and {every - pairs} of {every} "
-        f"({1.0 - pairs / every:.0%}) are not; --explain gives their times",
         *filter(None, [given_steps(scene)]),
     ]

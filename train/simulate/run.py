@@ -1,17 +1,15 @@
-"""Recordings of a scene's trials, made on this machine's cores or on a Dask cluster."""
+"""Recordings of a scene's trials."""
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
-from os import cpu_count
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from edge import saving
 from edge.recording import Recording
 from edge.writing import check_writable
-from train.cluster import on_cluster
 from train.simulate.arm import Array, Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured
 from train.simulate.engine import PhysicsRun, batch_size, readings
@@ -48,16 +46,14 @@ def file_name(scene: Scene, trial: TrialSpec) -> str:
 def recordings(
     physics: PhysicsRun,
     which: Places | None = None,
-    scene: Scene | None = None,
 ) -> Iterator[tuple[str, Recording]]:
     """(file name, recording) of each trial of a run, or of some; arguments as of
     `readings`."""
-    scene = scene or physics.trials.scene
-    for reading in readings(physics, which, scene):
+    for reading in readings(physics, which):
         arrived = slice(None) if reading.kept is None else reading.kept
         t = reading.t if reading.times is None else reading.times
         shear = reading.shear()
-        file = file_name(scene, reading.trial)
+        file = file_name(reading.scene, reading.trial)
         yield (
             file,
             Recording(
@@ -111,20 +107,17 @@ def batches_of(
     scene: Scene,
     batch: int | None = None,
     convergences: dict[Kind, Convergence] | None = None,
-    jobs: int = 1,
 ) -> list[tuple[TrialSpec, ...]]:
     """Batches of the scene's trials, of about equal work.
 
     Args:
         batch: most trials in each; as many as suit the scene where None.
         convergences: the measured steps (`measured`), for a scene that gives no step.
-        jobs: smallest number of batches, if there are so many trials.
     """
     if convergences is None:
         convergences = measured(scene)
     every = [spec for specs in kinds(scene, convergences).values() for spec in specs]
-    size = batch or batch_size(scene)
-    count = min(max(-(-len(every) // size), jobs), len(every))
+    count = math.ceil(len(every) / (batch or batch_size(scene)))
     return [tuple(every[i::count]) for i in range(count)]
 
 
@@ -138,9 +131,6 @@ def write(
     scene: Scene,
     folder: str | Path,
     *,
-    batch: int | None = None,
-    jobs: int = 1,
-    address: str | None = None,
     progress: Callable[[int], Any] = lambda count: None,
 ) -> Written:
     """Write the recordings of a scene into a folder.
@@ -148,25 +138,21 @@ def write(
     The files' bytes depend on the scene and its seed alone.
 
     Args:
-        batch: most trials simulated side by side; see `batches_of`.
-        jobs: processes on this machine (joblib).
-        address: of a Dask scheduler that runs the batches and sends the recordings
-            back.
         progress: called with the number of trials just written.
 
     Raises:
-        InputError: a file cannot be written, or there is no scheduler at `address`.
+        InputError: a file cannot be written.
     """
     target = Path(folder)
     check_writable(target)
     convergences = measured(scene)
     first = {kind: specs[0] for kind, specs in kinds(scene).items()}
-    processes = jobs if jobs > 0 else cpu_count() or 1
-    work = batches_of(scene, batch, convergences, processes)
+    batches = batches_of(scene, convergences=convergences)
     paths = []
     redrawn = 0
     unfelt = 0
-    for name, trial in _simulated(scene, work, jobs, address):
+    simulated = (simulate_trials(scene, specs) for specs in batches)
+    for name, trial in chain.from_iterable(simulated):
         saving.save(target / name, trial, lasting=False)
         paths.append(target / name)
         redrawn += trial.meta["simulation"]["redrawn"] > 0
@@ -178,31 +164,6 @@ def write(
         if not convergence.within
     }
     return Written(sorted(paths), redrawn, int(unfelt), rough)
-
-
-def _simulated(
-    scene: Scene,
-    work: list[tuple[TrialSpec, ...]],
-    jobs: int,
-    address: str | None,
-) -> Iterator[tuple[str, Recording]]:
-    """The trials of each batch as soon as it is simulated, here or on a cluster."""
-    if jobs == 1 and address is None:
-        for specs in work:
-            yield from simulate_trials(scene, specs)
-        return
-    from joblib import Parallel, delayed
-
-    with nullcontext() if address is None else on_cluster(address):
-        run = Parallel(jobs if address is None else -1, return_as="generator_unordered")
-        for batch in run(delayed(_simulate_batch)(scene, specs) for specs in work):
-            yield from batch
-
-
-def _simulate_batch(
-    scene: Scene, specs: tuple[TrialSpec, ...]
-) -> list[tuple[str, Recording]]:
-    return list(simulate_trials(scene, specs))
 
 
 def total_trials(scene: Scene) -> int:

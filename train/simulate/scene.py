@@ -35,7 +35,8 @@ posture the gains above give the lab arm's 115 N/m at mid-forearm."""
 PLACE_M = 0.103
 """The middle of Cody's 16 rows, rounded to a millimetre."""
 
-PART = Field(0.0, 1.0, 1.0, "friction_kinetic as a part of friction_static")
+PART = Field(0.0, 1.0, 1.0)
+"""friction_kinetic as a part of friction_static."""
 DRAWS = 1000
 PRESSED_M = 0.06
 """How deep the forearm presses a soft object early enough to move it within the window

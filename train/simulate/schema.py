@@ -11,17 +11,16 @@ class Field:
 
     low: float
     high: float
-    default: float | None
-    says: str
+    default: float | None = None
     open_low: bool = False
     """Whether the lower limit itself is excluded."""
     integer: bool = False
     """Whether it must be a whole number."""
 
 
-def above_0(high: float, default: float | None, says: str) -> Field:
+def above_0(high: float, default: float | None = None) -> Field:
     """A number above 0, which 0 itself is not."""
-    return Field(0.0, high, default, says, open_low=True)
+    return Field(0.0, high, default, open_low=True)
 
 
 @dataclass(frozen=True)
@@ -48,110 +47,73 @@ class Effect:
 CONDITIONS = ("fixed", "movable")
 
 TRIALS = {
-    "count": Field(
-        1,
-        1_000_000,
-        5,
-        "trials of each object in each condition",
-        integer=True,
-    ),
-    "after_s": Field(0.1, 60.0, 2.2, "time after it"),
-    "rate_hz": Field(1.0, 10_000.0, 100.0, "frames a second"),
-    "tolerance": Field(
-        1e-5,
-        0.5,
-        0.01,
-        "error allowed to the step, as a part of the peak force",
-    ),
+    # trials of each object in each condition
+    "count": Field(1, 1_000_000, 5, integer=True),
+    "after_s": Field(0.1, 60.0, 2.2),  # time after it
+    "rate_hz": Field(1.0, 10_000.0, 100.0),  # frames a second
+    # error allowed to the step, as a part of the peak force
+    "tolerance": Field(1e-5, 0.5, 0.01),
 }
-LEAD = Field(0.02, 10.0, 0.2, "time before the skin reaches the object")
-TAXEL = above_0(1e15, 10_000.0, "stiffness of a taxel in N/m")
+LEAD = Field(0.02, 10.0, 0.2)  # time before the skin reaches the object
+TAXEL = above_0(1e15, 10_000.0)  # stiffness of a taxel in N/m
 """At 1e16 N/m the depth of a touch is below the rounding error of a metre."""
 LABELS = {
-    "window_s": Field(
-        0.01,
-        60.0,
-        1.2,
-        "time after the first touch in which labels are judged",
-    ),
-    "push_n": Field(
-        0.1,
-        1e6,
-        6.0,
-        "push that moves every movable object of a [[family]]",
-    ),
-    "slides_m": Field(
-        0.0,
-        1.0,
-        0.02,
-        "a movable object moves at least this far by then",
-    ),
-    "yields": Field(
-        0.0,
-        1.0,
-        0.01,
-        "a soft object yields by then, as a part of its thickness",
-    ),
+    # time after the first touch in which labels are judged
+    "window_s": Field(0.01, 60.0, 1.2),
+    # push that moves every movable object of a [[family]]
+    "push_n": Field(0.1, 1e6, 6.0),
+    # a movable object moves at least this far by then
+    "slides_m": Field(0.0, 1.0, 0.02),
+    # a soft object yields by then, as a part of its thickness
+    "yields": Field(0.0, 1.0, 0.01),
 }
 SPREAD = {
-    "place_m": Field(0.0, 0.08, 0.0, "place along the forearm where the object is met"),
-    "aside_m": Field(0.0, 0.5, 0.0, "distance of the push from the object's middle"),
-    "slope_deg": Field(0.0, 10.0, 0.0, "of the table, along the push"),
-    "yaw_deg": Field(0.0, 30.0, 0.0, "angle between the object's face and the forearm"),
-    "roll_deg": Field(0.0, 60.0, 0.0, "forearm roll: which columns touch"),
-    "stiffness": Field(0.0, 1.0, 0.0, "of the object, as a part of its value"),
-    "friction": Field(
-        0.0,
-        1.0,
-        0.0,
-        "of both coefficients together, as a part of their value",
-    ),
-    "mass": Field(0.0, 1.0, 0.0, "as a part of its value"),
-    "cover": Field(0.0, 1.0, 0.0, "of the skin's and the cover's stiffness, as a part"),
+    "place_m": Field(0.0, 0.08, 0.0),  # place along the forearm where the object is met
+    "aside_m": Field(0.0, 0.5, 0.0),  # distance of the push from the object's middle
+    "slope_deg": Field(0.0, 10.0, 0.0),  # of the table, along the push
+    "yaw_deg": Field(0.0, 30.0, 0.0),  # angle between the object's face and the forearm
+    "roll_deg": Field(0.0, 60.0, 0.0),  # forearm roll: which columns touch
+    "stiffness": Field(0.0, 1.0, 0.0),  # of the object, as a part of its value
+    # of both coefficients together, as a part of their value
+    "friction": Field(0.0, 1.0, 0.0),
+    "mass": Field(0.0, 1.0, 0.0),  # as a part of its value
+    "cover": Field(0.0, 1.0, 0.0),  # of the skin's and the cover's stiffness, as a part
 }
 SPREAD_OF_MOVABLE = {"slope_deg": "mass_kg", "aside_m": "foot_m"}
 """{spread around 0: the other key that a movable object needs for it}; the object need
 not give a value for the spread itself."""
 OBJECT = {
-    "mass_kg": Field(1e-6, 1e12, None, "kilograms"),
-    "friction_static": Field(0.0, 5.0, None, "mu_s"),
-    "friction_kinetic": Field(0.0, 5.0, None, "mu_k, at most friction_static"),
-    "skin_friction": Field(0.0, 5.0, None, "mu between the skin and the object's face"),
-    "width_m": above_0(10.0, 1.0, "the face along the forearm"),
-    "breadth_m": above_0(10.0, 10.0, "the face across the forearm"),
-    "radius_m": Field(1e-3, 1e6, 1e6, "how the face curves along the forearm"),
-    "height_m": above_0(10.0, None, "of the contact above the floor"),
-    "base_m": above_0(10.0, None, "of the object's foot in the push's direction"),
-    "foot_m": above_0(10.0, None, "diameter of the object's foot"),
-    "aside_m": Field(-1.0, 1.0, None, "distance of the push from the object's middle"),
-    "slope_deg": Field(
-        -20.0,
-        20.0,
-        None,
-        "of the surface under the object, uphill along the push",
-    ),
-    "stribeck_m_s": above_0(10.0, None, "speed at which friction has fallen"),
-    "modulus_pa": above_0(1e18, 12e3, "of the elastic foundation"),
-    "depth_m": Field(1e-4, 10.0, 0.10, "of the elastic foundation"),
-    "relax_ratio": Field(0.0, 100.0, 0.6, "k1 / k_inf of the standard linear solid"),
-    "relax_s": above_0(1e6, 0.5, "its time"),
-    "stem_count": Field(1, 200, 12, "stems the forearm can meet", integer=True),
-    "stem_n_m": above_0(1e12, 15.0, "stiffness of a stem, 3 E I / L^3"),
-    "stem_spread_m": Field(0.0, 1.0, 0.06, "depth over which the stems stand"),
-    "stem_slip_m": above_0(10.0, 0.12, "bend at which a stem slips off"),
-    "stem_damping": Field(0.0, 1.0, 0.15, "damping ratio of a stem"),
-    "stem_deviation": Field(
-        0.0,
-        2.0,
-        0.3,
-        "of the logarithm of the stems' stiffnesses",
-    ),
-    "stem_kg": above_0(10.0, 0.02, "moving mass of a stem"),
-    "bubble_n_m": above_0(1e12, 2000.0, "stiffness of a bubble at rest"),
-    "bubble_m": above_0(0.1, 0.004, "height of a bubble"),
-    "pop_n": above_0(1e6, 10.0, "force at which a bubble bursts"),
-    "cover_n_m": above_0(1e12, None, "stiffness of a sleeve, per taxel"),
-    "cover_spread": Field(0.0, 0.2, 0.1, "part of a taxel's load each neighbour takes"),
+    "mass_kg": Field(1e-6, 1e12),  # kilograms
+    "friction_static": Field(0.0, 5.0),  # mu_s
+    "friction_kinetic": Field(0.0, 5.0),  # mu_k, at most friction_static
+    "skin_friction": Field(0.0, 5.0),  # mu between the skin and the object's face
+    "width_m": above_0(10.0, 1.0),  # the face along the forearm
+    "breadth_m": above_0(10.0, 10.0),  # the face across the forearm
+    "radius_m": Field(1e-3, 1e6, 1e6),  # how the face curves along the forearm
+    "height_m": above_0(10.0),  # of the contact above the floor
+    "base_m": above_0(10.0),  # of the object's foot in the push's direction
+    "foot_m": above_0(10.0),  # diameter of the object's foot
+    "aside_m": Field(-1.0, 1.0),  # distance of the push from the object's middle
+    # of the surface under the object, uphill along the push
+    "slope_deg": Field(-20.0, 20.0),
+    "stribeck_m_s": above_0(10.0),  # speed at which friction has fallen
+    "modulus_pa": above_0(1e18, 12e3),  # of the elastic foundation
+    "depth_m": Field(1e-4, 10.0, 0.10),  # of the elastic foundation
+    "relax_ratio": Field(0.0, 100.0, 0.6),  # k1 / k_inf of the standard linear solid
+    "relax_s": above_0(1e6, 0.5),  # its time
+    "stem_count": Field(1, 200, 12, integer=True),  # stems the forearm can meet
+    "stem_n_m": above_0(1e12, 15.0),  # stiffness of a stem, 3 E I / L^3
+    "stem_spread_m": Field(0.0, 1.0, 0.06),  # depth over which the stems stand
+    "stem_slip_m": above_0(10.0, 0.12),  # bend at which a stem slips off
+    "stem_damping": Field(0.0, 1.0, 0.15),  # damping ratio of a stem
+    # of the logarithm of the stems' stiffnesses
+    "stem_deviation": Field(0.0, 2.0, 0.3),
+    "stem_kg": above_0(10.0, 0.02),  # moving mass of a stem
+    "bubble_n_m": above_0(1e12, 2000.0),  # stiffness of a bubble at rest
+    "bubble_m": above_0(0.1, 0.004),  # height of a bubble
+    "pop_n": above_0(1e6, 10.0),  # force at which a bubble bursts
+    "cover_n_m": above_0(1e12),  # stiffness of a sleeve, per taxel
+    "cover_spread": Field(0.0, 0.2, 0.1),  # part of a taxel's load each neighbour takes
 }
 STIFFNESSES = ("modulus_pa", "stem_n_m", "bubble_n_m")
 
@@ -212,13 +174,11 @@ EFFECTS: dict[str, Effect] = {
     "stems": Effect("contact", families=("foliage",)),
     "tilt": Effect("contact", families=("rigid", "foam", "pillow", "bubbles")),
     "relaxation": Effect("contact", families=ELASTIC),
-    "inertia": Effect(
-        "contact", {"loss_s": Field(0.0, 1.0, 0.0015, "dashpot by stiffness")}
-    ),
+    # loss_s: dashpot by stiffness
+    "inertia": Effect("contact", {"loss_s": Field(0.0, 1.0, 0.0015)}),
+    # shear_n_m: stiffness of the skin along the face
     "friction": Effect(
-        "contact",
-        {"shear_n_m": above_0(1e12, 1e4, "stiffness of the skin along the face")},
-        keys=("skin_friction",),
+        "contact", {"shear_n_m": above_0(1e12, 1e4)}, keys=("skin_friction",)
     ),
     "sliding": Effect("contact", condition="movable"),
     "slope": Effect("contact", needs=("sliding",), keys=("slope_deg",)),
@@ -226,41 +186,29 @@ EFFECTS: dict[str, Effect] = {
     "stribeck": Effect("contact", needs=("sliding",), keys=("stribeck_m_s",)),
     "tipping": Effect("contact", needs=("sliding",), keys=("base_m", "height_m")),
     "shear": Effect("contact", axes=3),
-    "crosstalk": Effect(
-        "sensor", {"part": Field(0.0, 0.2, 0.02, "of each of four neighbours")}
-    ),
-    "hysteresis": Effect(
-        "sensor", {"counts": Field(0.0, 65535, 30.0, "half the loop's width")}
-    ),
-    "drift": Effect(
-        "sensor", {"counts_per_s": Field(0.0, 65535, 5.0, "deviation of slopes")}
-    ),
-    "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0, "standard deviation")}),
-    "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0, "the limit")}),
-    "dead_band": Effect(
-        "sensor", {"counts": Field(0.0, 65535, 50.0, "readings below are zero")}
-    ),
-    "quantisation": Effect(
-        "sensor", {"counts": Field(1.0, 65535, 4.0, "size of a step")}
-    ),
+    # part: of each of four neighbours
+    "crosstalk": Effect("sensor", {"part": Field(0.0, 0.2, 0.02)}),
+    # counts: half the loop's width
+    "hysteresis": Effect("sensor", {"counts": Field(0.0, 65535, 30.0)}),
+    # counts_per_s: deviation of slopes
+    "drift": Effect("sensor", {"counts_per_s": Field(0.0, 65535, 5.0)}),
+    # counts: standard deviation
+    "noise": Effect("sensor", {"counts": Field(0.0, 65535, 8.0)}),
+    "saturation": Effect("sensor", {"newton": above_0(1e6, 17.0)}),  # newton: the limit
+    # counts: readings below are zero
+    "dead_band": Effect("sensor", {"counts": Field(0.0, 65535, 50.0)}),
+    # counts: size of a step
+    "quantisation": Effect("sensor", {"counts": Field(1.0, 65535, 4.0)}),
+    # part: of all taxels; known: 1, they are marked invalid; 0, they read zero
     "dead_taxels": Effect(
         "sensor",
-        {
-            "part": Field(0.0, 1.0, 0.01, "of all taxels"),
-            "known": Field(
-                0,
-                1,
-                1,
-                "1: marked invalid; 0: they read zero",
-                integer=True,
-            ),
-        },
+        {"part": Field(0.0, 1.0, 0.01), "known": Field(0, 1, 1, integer=True)},
     ),
-    "jitter": Effect(
-        "clock", {"s": Field(0.0, 1.0, 0.001, "deviation, cut at 0.45 of a frame")}
-    ),
-    "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02, "of all frames")}),
+    # s: deviation, cut at 0.45 of a frame
+    "jitter": Effect("clock", {"s": Field(0.0, 1.0, 0.001)}),
+    # part: of all frames
+    "dropped_frames": Effect("clock", {"part": Field(0.0, 0.9, 0.02)}),
 }
-STEP = Field(1e-6, 1.0, None, "the physics' step")
+STEP = Field(1e-6, 1.0)  # the physics' step
 SHARED = {"viscous": ("relaxation", "inertia")}
 """{module of `effects`: the effects that share it}."""

@@ -44,17 +44,15 @@ class Column:
         places = group.places
         if places is None:
             return values
-        if type(places) is slice:
-            return values[..., places]
         return values.take(places, -1)
 
     def __set__(self, group: "Group", values: Any) -> None:
         """Set the values of the group's trials."""
         places = group.places
-        if places is None:
-            places = slice(None)
         array = group.arrays[self.name]
-        if array.ndim == 1:
+        if places is None:
+            array[...] = values
+        elif array.ndim == 1:
             array[places] = values
         else:
             array[..., places] = values
@@ -62,7 +60,7 @@ class Column:
 
 class Group:
     """Arrays (..., n), of which the trials at some places are read and assigned; None
-    for all, and a slice for neighbours, which are read without a copy."""
+    for all."""
 
     def __init_subclass__(cls) -> None:
         """Make an array of each attribute that the class names."""
@@ -361,11 +359,7 @@ class Trials:
         self.within = within
         self.scene = batch.scene
         self.joints = batch.joints
-        at: Any = places
-        if len(places) == batch.n:
-            at = None
-        elif len(places) and places[-1] - places[0] + 1 == len(places):
-            at = slice(places[0], places[-1] + 1)
+        at = None if len(places) == batch.n else places
         self.clock = Clock(batch.clock.arrays, at)
         self.arm = Arm(batch.arm.arrays, at)
         self.contact = Contact(batch.contact.arrays, at)

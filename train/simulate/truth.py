@@ -71,36 +71,16 @@ def contradictions(physics: PhysicsRun) -> list[Contradiction | None]:
             course = (
                 f"moved {1e3 * slide[i]:.0f} mm, less than {1e3 * labels['slides_m']:g}"
             )
-            remedy = "lower its mass_kg or its friction, or leave movable out of its conditions"
+            remedy = (
+                "lower its mass_kg or its friction, give motion.travel_s and "
+                "trials.after_s more time, or leave movable out of its conditions"
+            )
         elif depth[i] < labels["yields"] * thickness:
             label = "soft"
             course = f"yielded {100 * depth[i] / thickness:.1f} % of {1e3 * thickness:.0f} mm"
             remedy = "lower its stiffness, or labels.yields"
-        if not course:
-            out.append(None)
-            continue
-        cut, longer = _cut_short(physics, i, physics.t[onset[i]])
-        out.append(Contradiction(label, course + cut, longer + remedy))
+        out.append(Contradiction(label, course, remedy) if course else None)
     return out
-
-
-def _cut_short(physics: PhysicsRun, i: int, onset_s: float) -> tuple[str, str]:
-    """The cause in words, if trial i ended before its window, and the remedy; else
-    empty texts."""
-    trials = physics.trials
-    scene = trials.scene
-    moves = trials.joints.rate[:, 0] != 0.0
-    stroke_s = float(trials.arm.travel_s[moves, i].max())
-    ends_s = min(physics.t[-1], stroke_s)
-    if ends_s - onset_s >= scene.labels["window_s"]:
-        return "", ""
-    ended = f"ended {ends_s - onset_s:.2f} s after the touch"
-    if ends_s < stroke_s:
-        return f", and the trial {ended}", "give trials.after_s more, or "
-    remedy = "travel_s more time"
-    if stroke_s < scene.travel_s:
-        remedy = "start_deg more room before the joint's limit"
-    return f", as the arm's stroke {ended}", f"give motion.{remedy}, or "
 
 
 def true_runs(

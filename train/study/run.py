@@ -181,7 +181,7 @@ def _of_another_seed(context: Context, scene: Scene, i: int) -> paper.Numbers:
     """The accuracies to compare with the paper's, on the scene simulated with another
     seed."""
     with tempfile.TemporaryDirectory() as folder:
-        simulate(replace(scene, seed=scene.seed + i), folder, jobs=context.workers.jobs)
+        simulate(replace(scene, seed=scene.seed + i), folder)
         dataset = load_trials([folder], Measurement(horizon_s=LONGEST_S))
     quiet = replace(
         context,

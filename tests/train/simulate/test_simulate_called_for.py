@@ -1,4 +1,4 @@
-"""An effect that is not called for costs nothing and changes nothing: six proofs."""
+"""An effect that is not called for costs nothing and changes nothing."""
 
 import json
 import re
@@ -7,7 +7,6 @@ import types
 from functools import partial
 from itertools import product
 
-import numpy as np
 import pytest
 
 from edge.errors import InputError
@@ -67,7 +66,7 @@ def batch_of(trial_scene, index=0):
     return run_batch(trial_scene, tuple(specs)), effects
 
 
-def test_1_an_effect_not_called_for_is_not_loaded():
+def test_an_effect_not_called_for_is_not_loaded():
     program = (
         "import json, sys\nfrom train.simulate.scene import from_dict\nfrom "
         "train.simulate.run import simulate\ntable = {'trials': {'count': 1, "
@@ -80,7 +79,7 @@ def test_1_an_effect_not_called_for_is_not_loaded():
 
 
 @pytest.mark.parametrize("add", [(), ("noise", "tilt")])
-def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
+def test_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
     trial_scene = scene(*add)
     before = [batch_of(trial_scene, i)[0] for i in range(2)]
     for i, effects in enumerate(kinds(trial_scene)):
@@ -96,50 +95,13 @@ def test_2_uncalled_effects_may_raise_and_no_bit_changes(monkeypatch, add):
         assert before[i].joints.tobytes() == after.joints.tobytes()
 
 
-STATE = set("stems tilt inertia friction sliding turning tipping viscous".split())
-"""Modules with state of their own."""
-
-
 def modules_of(effects):
     """The modules of a trial's effects, in the order in which their hooks run."""
     shared = ("viscous",) if {"relaxation", "inertia"} & set(effects) else ()
     return ("base", *shared, *effects)
 
 
-@pytest.fixture(scope="module")
-def bare():
-    """A batch without effects, and none."""
-    return batch_of(scene())
-
-
-@pytest.fixture(scope="module")
-def batches(bare):
-    """A batch of each kind of trials, and the effects that it calls for."""
-    effects = ("tilt", "inertia", "noise", "dead_taxels", "jitter", "dropped_frames")
-    trial_scene = scene(*effects, objects=everything())
-    return [bare, *(batch_of(trial_scene, i) for i in range(len(kinds(trial_scene))))]
-
-
-def test_3_only_the_called_effects_state_exists(batches):
-    for batch, effects in batches:
-        assert set(batch.trials.states) == STATE & {*modules_of(effects)}, effects
-
-
-def test_3_only_the_called_effects_leave_traces(batches):
-    traces = {"sliding": "slide_m", "turning": "turn_rad"}
-    for batch, effects in batches:
-        kept = {name for effect, name in traces.items() if effect in effects}
-        assert set(batch.traces) == {"depth_m", *kept}
-
-
-@pytest.mark.parametrize("name", ["times", "kept", "valid"])
-def test_3_only_the_called_sensors_effects_leave_theirs(batches, name):
-    without, *arrays = (getattr(batch.all_readings[0], name) for batch, _ in batches)
-    assert without is None
-    assert all(array is not None for array in arrays)
-
-
-def test_4_adding_an_effect_leaves_the_others_draws():
+def test_adding_an_effect_leaves_the_others_draws():
     trial_scene = scene("noise")
     other_scene = scene("noise", "dead_taxels", "drift", "dropped_frames", "tilt")
     trials = tuple(next(iter(kinds(trial_scene).values())))
@@ -147,14 +109,6 @@ def test_4_adding_an_effect_leaves_the_others_draws():
     b = values_of(other_scene, trials)
     assert a.keys() == b.keys()
     assert all(a[key].tobytes() == b[key].tobytes() for key in a)
-    # Before the contact nothing but the noise's own draws is to be seen.
-    far = {"lead_s": 5.0, "after_s": 0.1}
-    more = ("dropped_frames", "crosstalk", "tilt", "saturation")
-    first, second = (
-        batch_of(scene("noise", *add, **far))[0].counts[:, :499] for add in ((), more)
-    )
-    assert first.any()
-    np.testing.assert_array_equal(first, second)
 
 
 @pytest.fixture(scope="module")
@@ -174,13 +128,13 @@ def owners_of(effects, stage):
     return have[-1:] if stage in INSTEAD else have
 
 
-def test_5_each_trial_runs_its_own_hooks_and_no_other(plan):
+def test_each_trial_runs_its_own_hooks_and_no_other(plan):
     for (i, effects), stage in product(enumerate(plan.effects), STAGES):
         ran = [call.owner for call in plan.stages[stage] if call.which[i]]
         assert ran == owners_of(effects, stage), (effects, stage)
 
 
-def test_5_these_trials_call_for_every_effect(plan):
+def test_these_trials_call_for_every_effect(plan):
     assert set().union(*plan.effects) == set(EFFECTS)
 
 
@@ -192,7 +146,7 @@ def bits(batch, i):
     return {name: a.tobytes() for name, a in arrays.items() if a is not None}
 
 
-def test_6_results_do_not_depend_on_the_batch():
+def test_results_do_not_depend_on_the_batch():
     sensors = [n for n, info in EFFECTS.items() if info.stage in ("sensor", "clock")]
     add = ["tilt", "inertia", *sensors]
     trial_scene = scene(*add, objects=everything(), after_s=0.4, count=2)
@@ -216,9 +170,7 @@ def test_each_required_effect_has_its_reason():
     fixed = required_effects(trial_scene, foam, "fixed")
     assert not {"sliding", "stribeck"} & set(fixed)
     trial_scene = scene(leave_out=["relaxation"], objects=everything())
-    required = required_effects(trial_scene, foam, "fixed")
-    assert "foundation" in required
-    assert "relaxation" not in required
+    assert "relaxation" not in required_effects(trial_scene, foam, "fixed")
 
 
 def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
@@ -238,27 +190,9 @@ def test_a_spread_around_0_calls_for_its_effect_in_movable_objects():
             from_dict({"object": wall, "spread": {key: 1e-3}})
 
 
-@pytest.mark.parametrize("band", [10.0, 30.0])
-def test_a_dead_band_hides_all_noise_that_it_is_wider_than(band):
-    frames = []
-    for add in ((), ("crosstalk",)):  # which asks for all taxels, and leaks nothing
-        trial_scene = scene("noise", "dead_band", *add)
-        trial_scene.settings.update(
-            noise={"counts": 5.0},
-            dead_band={"counts": band},
-            crosstalk={"part": 0.0},
-        )
-        frames.append(batch_of(trial_scene)[0].counts)
-    assert frames[0].tobytes() == frames[1].tobytes()
-    noisy = (frames[0][:, 0] > 0).any()
-    assert noisy if band < 21.0 else not noisy
-
-
 def test_a_summary_names_the_effects_that_run_and_those_that_do_not():
-    counted, unused, saved, *_ = summary(scene("noise"))
+    counted, unused, *_ = summary(scene("noise"))
     counts = dict(re.findall(r"(\w+) \((\d+)\)", counted))
     assert counts
     assert not set(counts) & set(unused.partition(": ")[2].split(", "))
     assert len(counts) + len(unused.partition(": ")[2].split(", ")) == len(EFFECTS)
-    pairs = sum(map(int, counts.values()))
-    assert f"so {pairs} effects of trials are computed" in saved

@@ -173,7 +173,7 @@ def pair_scene(first, second):
     return trial_scene
 
 
-@pytest.mark.parametrize("step_s", [0.01, 0.0025])
+@pytest.mark.parametrize("step_s", [0.01, pytest.param(0.0025, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("first", CONTACT)
 def test_no_effect_and_no_pair_of_them_makes_energy(first, step_s):
     for second in CONTACT[CONTACT.index(first) :]:
@@ -195,17 +195,6 @@ def test_the_ledger_notices_a_contact_that_gives_back_more_than_it_took(monkeypa
     ledger.run()
     with pytest.raises(AssertionError, match="gave back more"):
         ledger.judge("pushed")
-
-
-def test_relaxing_foam_under_a_pivoting_arm_presses_no_harder_than_a_stiff_one():
-    # A lagged lever of the relaxed force gave 4,826 N here, against 56 N without tilt.
-    def most(**keys):
-        foam = one_object(family="foam", relax_s=0.3, **keys)
-        return run(make(foam, "tilt", lead_s=0.1, after_s=4.0)).force.max()
-
-    for ratio in (0.5, 2.0, 10.0):
-        stiff = most(relax_ratio=0.0, modulus_pa=12e3 * (1.0 + ratio))
-        assert most(relax_ratio=ratio) <= 1.02 * stiff
 
 
 def test_a_run_that_makes_energy_is_refused():

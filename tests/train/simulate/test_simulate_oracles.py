@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from edge.touch.arm import Chain
 from tests.train.simulate.scenes import (
     Law,
-    Rig,
     make,
     movable,
     one_object,
@@ -20,14 +19,13 @@ from tests.train.simulate.scenes import (
     run,
     scene,
     slider,
-    specs_of,
 )
 from train.simulate import engine
 from train.simulate.arm import Kinematics
 from train.simulate.contact import GRAVITY
 from train.simulate.effects import friction, sliding
 from train.simulate.effects.inertia import FINER
-from train.simulate.plan import FRAME, make_plan
+from train.simulate.plan import FRAME
 from train.simulate.scene import CODY_START_DEG, CODY_STIFFNESS
 
 ARM_K = 115.0
@@ -46,11 +44,10 @@ SKEW = Chain.from_dict({"joint": SKEW_JOINTS})
 
 
 class TestArm:
-    @pytest.mark.parametrize("chain", [Chain.cody(), SKEW], ids=["cody", "skew"])
-    def test_kinematics_are_the_edges(self, chain):
-        q = np.random.default_rng(0).uniform(-1.0, 1.0, (chain.dof, 50))
-        pose = Kinematics(chain).pose(q)
-        want = chain.pose(q.T)
+    def test_kinematics_are_the_edges(self):
+        q = np.random.default_rng(0).uniform(-1.0, 1.0, (SKEW.dof, 50))
+        pose = Kinematics(SKEW).pose(q)
+        want = SKEW.pose(q.T)
         assert_allclose(pose.origin.T, want[:, :3, 3], atol=1e-15)
         rotation = np.stack(np.broadcast_arrays(*pose.rotation))
         assert_allclose(rotation.T, want[:, :3, :3], atol=2e-15)
@@ -73,20 +70,6 @@ class TestArm:
         assert (batch.force[0, :29] == 0.0).all()
         assert batch.force[0, 31] > 0.0
 
-    def test_a_damped_joint_answers_a_step_as_its_equation_does(self):
-        k = 20.0
-        d = 1.11
-        h = 1e-4
-        rig = Rig(h=h, arm_k=k, arm_d=d, speed=1e6, travel_s=1e-6, law=Law([[0.0]]))
-        trace = rig.run(3000)
-        want = 1.0 - np.exp(-trace.t[:, 0] * k / d)
-        assert_allclose(trace.q[:, 0], want, atol=2e-3)
-
-    def test_a_frame_ends_at_its_own_time_and_not_at_the_sum_of_its_steps(self):
-        batch = press()
-        assert batch.trials.clock.t.tolist() == [batch.t[-1]] * 2
-        assert np.add.accumulate(np.full(len(batch.t) - 1, 0.01))[-1] != batch.t[-1]
-
     def test_contact_holds_the_arm_where_the_object_is(self):
         # A rigid, fixed object: the skin's point at the contact does not go on along
         # the push.
@@ -99,9 +82,6 @@ class TestArm:
         ) + RADIUS
         touched = np.flatnonzero(batch.force[0] > 0.0)
         assert np.abs(along[touched]).max() < 2e-3
-        free = t.scene.kinematics.pose(t.everyone.equilibrium(batch.t[-1]))
-        gone = free.origin[:, 0] + free.rotation[2][:, 0] * t.contact.z[0]
-        assert (gone - t.contact.face[:, 0]) @ t.contact.normal[:, 0] + RADIUS > 0.12
 
 
 class TestSliding:
@@ -109,24 +89,17 @@ class TestSliding:
     MU_S = 0.5
     MU_K = 0.4
 
-    def rig(self, h, speed=0.15):
-        return slider(h, self.MASS, self.MU_S, self.MU_K, speed=speed, law=Law([[1e7]]))
-
-    def test_it_sticks_for_mu_n_over_k_v(self):
-        trace = self.rig(1e-3).run(1200)
-        start = trace.t[np.argmax(trace.slide[:, 0] > 0.0), 0]
-        want = self.MU_S * self.MASS * GRAVITY / (ARM_K * 0.15)
-        assert abs(start - want) <= 2e-3
-
-    @pytest.mark.parametrize("speed", [0.02, 0.05])
-    def test_it_slips_as_far_as_the_oscillator_says(self, speed):
+    def test_it_slips_as_far_as_the_oscillator_says(self):
+        speed = 0.05
+        law = Law([[1e7]])
         normal = self.MASS * GRAVITY
         d = (self.MU_S - self.MU_K) * normal / ARM_K
         omega = math.sqrt(ARM_K / self.MASS)
         tau = 2.0 * (math.pi - math.atan(omega * d / speed)) / omega
         errors = []
         for h in (2e-3, 1e-3):
-            trace = self.rig(h, speed).run(round((9.0 - 60.0 * speed) / h))
+            rig = slider(h, self.MASS, self.MU_S, self.MU_K, speed=speed, law=law)
+            trace = rig.run(round(3.0 / h))
             moving = trace.speed[:, 0] > 0.0
             start = int(np.argmax(moving))
             stop = start + int(np.argmin(moving[start:]))
@@ -207,16 +180,16 @@ class TestInertia:
             rates,
             (0, batch.t[-1]),
             start,
-            max_step=5e-4,
+            max_step=1e-3,
             rtol=1e-8,
             dense_output=True,
         )
         return np.array([contact_at(*solution.sol(time))[0] for time in batch.t])
 
-    @pytest.mark.parametrize("loss_s", [0.0005, 0.003])
-    def test_hit_bounce_and_press_are_the_equations(self, tmp_path, loss_s):
+    def test_hit_bounce_and_press_are_the_equations(self, tmp_path):
+        loss_s = 0.003
         batches = [
-            run(self.swing(tmp_path, h, loss_s, after_s=0.25), h) for h in (2e-4, 1e-4)
+            run(self.swing(tmp_path, h, loss_s, after_s=0.25), h) for h in (4e-4, 2e-4)
         ]
         want = self.oracle(batches[0], loss_s)
         errors = [
@@ -224,24 +197,6 @@ class TestInertia:
         ]
         assert errors[1] < 0.1
         assert errors[1] < 0.75 * errors[0]
-
-    def test_a_hit_has_short_steps_of_its_own(self, tmp_path):
-        trial_scene = self.swing(tmp_path, 0.01, loss_s=0.003)
-        h = 0.01
-        loss_s = 0.003
-        plan = make_plan(trial_scene, specs_of(trial_scene))
-        plans = plan, plan.with_hooks(pace=[])
-        paced, plain = (run(trial_scene, h, plan=plan) for plan in plans)
-        want = self.oracle(paced, loss_s)
-        hit = slice(0, int(np.argmax(want)) + 4)
-        errors = [
-            np.abs(b.force[0, hit] - want[hit]).max() / want.max()
-            for b in (paced, plain)
-        ]
-        assert errors[0] < 0.1
-        assert errors[1] > 0.4
-        # It bounces, as it does by the equations.
-        assert (paced.force[0, hit.stop : hit.stop + 3] == 0.0).all()
 
     def test_steps_are_shorter_near_a_jolt_alone(self, tmp_path, monkeypatch):
         trial_scene = self.swing(tmp_path, 0.01, loss_s=0.02)
@@ -339,16 +294,13 @@ class TestFriction:
         assert t.states["sliding"].weight.tolist() == [0.0, 0.0]
 
     def test_the_shear_presses_a_pushed_box_to_the_floor(self):
-        plain, held = (
-            run(make(movable(1.0, 0.56, 0.5, width_m=0.2, **more)), 0.005)
-            for more in ({}, {"skin_friction": 0.5})
-        )
-        assert plain.force[0].max() == pytest.approx(0.56 * GRAVITY, rel=0.1)
+        box = movable(1.0, 0.56, 0.5, width_m=0.2, skin_friction=0.5)
+        held = run(make(box), 0.005)
         t = held.trials
         assert t.states["sliding"].weight[0] == pytest.approx(
             GRAVITY - t.contact.pull[0] * t.contact.along_face[2, 0], rel=0.01
         )
-        assert held.force[0].max() > 1.2 * plain.force[0].max()
+        assert held.force[0].max() > 1.2 * 0.56 * GRAVITY
 
 
 class TestTilt:
@@ -375,15 +327,3 @@ class TestTilt:
         lever = batch.trials.states["tilt"].lever
         assert (batch.traces["slide_m"][:, -1] > 0.2).all()
         assert (lever[0] == 0.0).all()  # as near to it as a row is
-
-    def test_a_step_leaves_depth_and_tilt_where_the_joints_are(self):
-        trial_scene = make(
-            one_object(width_m=0.05, skin_friction=0.4),
-            "tilt",
-            "inertia",
-        )
-        t = run(trial_scene, 0.0025).trials
-        moved = (t.contact.jacobian * (t.arm.q - t.arm.q_frame)[:, None]).sum(axis=0)
-        assert (np.abs(moved) > 1e-9).all()
-        want = t.contact.y_frame + moved
-        assert_allclose(t.contact.depth, want, rtol=0.0, atol=1e-13)

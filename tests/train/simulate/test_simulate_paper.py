@@ -55,15 +55,6 @@ def test_each_trial_is_felt_and_belongs_to_the_papers_tasks(dataset):
 
 
 @pytest.mark.slow
-def test_each_trial_is_long_enough(dataset):
-    """A light thing on smooth ground may be felt so late that its window is short."""
-    assert min(trial.onset_s for trial in dataset.trials) > 0.1
-    short = [t for t in dataset.trials if t.series.t[-1] < 1.2 and not t.series.ended]
-    assert len(short) <= 2
-    assert {t.labels["object"] for t in short} <= {"bed pillow"}
-
-
-@pytest.mark.slow
 def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_samples(
     cody18,
     dataset,
@@ -80,21 +71,6 @@ def test_headline_accuracies_differ_from_the_papers_by_the_chance_of_both_sample
         ours = float(np.mean([result[task].accuracy for result in results]))
         deviation = np.sqrt(ours * (1.0 - ours) * (1.0 + 1.0 / SEEDS) / 140)
         assert abs(paper / 100.0 - ours) <= norm.ppf(0.5 + SURE / 2.0) * deviation, task
-
-
-@pytest.mark.slow
-def test_fixed_things_push_back_harder_and_movable_ones_go_further(dataset):
-    force = dataset.features()[:, 39]
-    motion = dataset.features()[:, 119]
-    category = dataset.labels("category")
-    mean = {
-        c: (force[category == c].mean(), motion[category == c].mean())
-        for c in set(category)
-    }
-    assert mean["rigid-fixed"][0] > mean["rigid-movable"][0] > mean["soft-movable"][0]
-    assert mean["rigid-fixed"][0] > mean["soft-fixed"][0]
-    assert mean["rigid-movable"][1] > mean["rigid-fixed"][1]
-    assert mean["soft-movable"][1] > mean["soft-fixed"][1]
 
 
 @pytest.mark.slow

@@ -36,8 +36,8 @@ def push(**keys):
 
 
 class TestTurning:
-    @pytest.mark.parametrize("aside", [-0.06, 0.03])
-    def test_an_off_centre_push_needs_less_and_turns_it(self, aside):
+    def test_an_off_centre_push_needs_less_and_turns_it(self):
+        aside = -0.06
         batch = push(aside_m=aside, foot_m=0.24)
         lever = 2.0 / 3.0 * 0.12
         force = MU * MASS * GRAVITY / math.sqrt(1.0 + (aside / lever) ** 2)
@@ -70,15 +70,11 @@ class TestTurning:
             felt, rel=1e-12
         )
 
-    def test_in_the_middle_it_is_as_if_it_could_not_turn(self):
-        assert push(aside_m=0.0, foot_m=0.2).counts.tobytes() == push().counts.tobytes()
-
 
 class TestSlope:
     @pytest.mark.parametrize(
         ("degrees", "mu", "keys", "rel"),
         [
-            (-2.0, MU, {}, 0.02),
             (1.0, MU, {}, 0.02),
             (1.0, 0.2, {"friction_kinetic": 0.2, "stribeck_m_s": 0.01}, 0.1),
         ],
@@ -156,7 +152,7 @@ def test_what_slides_at_the_skin_bears_force_at_every_step_of_a_frame():
     trials = {**cody18.trials, "after_s": 1.1}
     level_scene = replace(cody18, spread={}, trials=trials)
     of_kind = (specs for specs in kinds(level_scene).values())
-    every = [replace(spec, step_s=5e-4) for specs in of_kind for spec in specs]
+    every = [replace(spec, step_s=1e-3) for specs in of_kind for spec in specs]
     spec = next(spec for spec in every if spec.key == "plastic-bin-movable")
     plan = make_plan(level_scene, (spec,)).with_hooks(pace=[])
     *hooks, last = plan.stages["settle"]
@@ -170,6 +166,6 @@ def test_what_slides_at_the_skin_bears_force_at_every_step_of_a_frame():
     run_physics(level_scene, (spec,), plan=plan, images=False)
 
     first = int(np.argmax(np.array(forces) > 0.0))
-    sliding = np.array(forces[first + 400 : first + 1800])
+    sliding = np.array(forces[first + 200 : first + 900])
     assert sliding.min() > 2.0
     assert sliding.max() < 3.5

@@ -12,14 +12,13 @@ from scipy.linalg import solve, toeplitz
 from tests.train.simulate.scenes import Law, Rig, make, one_object, press, run
 from train.simulate import contact
 from train.simulate.effects import cover, lateral
-from train.simulate.effects.pop import BREAKS, SLOPES
 from train.simulate.scene_model import Value
 
 RADIUS = 0.04604
 
 
 class TestRelaxation:
-    @pytest.mark.parametrize("tau", [1e-6, 0.004, 0.05, 0.5, 2.0, 1e5])
+    @pytest.mark.parametrize("tau", [1e-6, 0.05, 1e5])
     def test_ramp_and_hold_of_the_standard_linear_solid(self, tau):
         k = 500.0
         ratio = 1.2
@@ -42,13 +41,13 @@ class TestBed:
     MODULUS = 10e3 / 0.1
     LENGTH = 0.173
 
-    def bed(self, rows, columns, depth, *, curve=1e6, shift=0.0):
+    def bed(self, rows, columns, depth, curve):
         """Force and area of the taxels touched, as the base lays them."""
         angle = 2.0 * math.pi / columns
         pitch = self.LENGTH / rows
         taxel = RADIUS * angle * pitch
         z = (np.arange(rows) - (rows - 1) / 2.0)[:, None] * pitch
-        angles = np.abs((np.arange(columns) + 0.5 - shift) * angle - math.pi)
+        angles = np.abs((np.arange(columns) + 0.5) * angle - math.pi)
         stiffness = np.where(angles < math.pi / 2, self.MODULUS * taxel, 0.0)
         gaps = RADIUS * (1.0 - np.cos(angles))
         depths = depth - contact.curve_gap(z, curve)
@@ -57,42 +56,19 @@ class TestBed:
         loads = contact.spring_loads(depths, *springs, weight)
         return loads.sum(), (loads > 0.0).sum() * taxel
 
-    def cylinder(self, depth):
-        return 4.0 / 3.0 * self.MODULUS * depth * math.sqrt(2.0 * RADIUS * depth)
-
-    @pytest.mark.parametrize(
-        ("depth", "low", "high"),
-        [(0.5e-3, 0.54, 1.35), (2e-3, 0.93, 1.08), (5e-3, 0.95, 1.06)],
-    )
-    def test_sampled_on_taxels_it_keeps_to_the_continuum_law(self, depth, low, high):
-        ratios = []
-        for shift in np.linspace(-0.5, 0.5, 21):
-            force, _ = self.bed(16, 24, depth, shift=shift)
-            ratios.append(force / self.LENGTH / self.cylinder(depth))
-        assert low <= min(ratios)
-        assert max(ratios) <= high
-        if depth < 1e-3:  # the trap: a shallow contact falls between the taxels
-            assert max(ratios) / min(ratios) > 1.5
-
-    def test_fine_taxels_give_the_cylinder_law(self):
-        force, _ = self.bed(16, 4800, 3e-3)
-        assert force / self.LENGTH == pytest.approx(self.cylinder(3e-3), rel=0.01)
-
     def test_a_round_thing_across_gives_the_foundations_area_twice_hertz(self):
         # Crossed cylinders of one radius press as a sphere does: F = pi (E/H) R d^2 and
         # area 2 pi R d on a foundation; Hertz's half space has pi R d and d^1.5.
         depth = 3e-3
-        force, area = self.bed(600, 1000, depth, curve=RADIUS)
+        force, area = self.bed(600, 1000, depth, RADIUS)
         assert area == pytest.approx(2.0 * math.pi * RADIUS * depth, rel=0.02)
         assert force == pytest.approx(
             math.pi * self.MODULUS * RADIUS * depth**2, rel=0.02
         )
-        twice, _ = self.bed(600, 1000, 2 * depth, curve=RADIUS)
-        assert math.log2(twice / force) == pytest.approx(2.0, abs=0.05)
 
     def test_the_closed_form_is_the_bed_in_fractions(self):
         rng = np.random.default_rng(11)
-        for furthest in [50, 4000] * 60:
+        for furthest in [50, 4000] * 20:
             gaps = np.sort(rng.integers(0, 50, 5)) / 1024.0
             k = 2.0 ** rng.integers(-3, 30, 5)
             c = float(2.0 ** rng.integers(-12, 2))
@@ -135,9 +111,7 @@ def layer_solution(half_width):
 
 
 class TestLateral:
-    @pytest.mark.parametrize(
-        ("part", "bound"), [(0.1, 0.2), (0.3, 0.1), (0.6, 0.1), (1.0, 0.1)]
-    )
+    @pytest.mark.parametrize(("part", "bound"), [(0.1, 0.2), (0.6, 0.1)])
     def test_load_and_width_are_the_elastic_layers(self, part, bound):
         load, depth, peak = layer_solution(part)
         # Columns so fine that the sum is the integral; E = H = R = 1.
@@ -149,15 +123,12 @@ class TestLateral:
         assert x[inside > 0.0].max() == pytest.approx(part, rel=bound)
         shape = np.sqrt(inside[inside > 0.0])
         assert shape.max() / shape.mean() == pytest.approx(peak, rel=0.05)
-        # Independent springs are as wide as the square root of the depth says, and too
-        # soft.
-        assert math.sqrt(2.0 * depth) > 1.15 * part
 
     def test_the_bed_of_taxels_keeps_to_it(self):
         foam = one_object(family="foam", modulus_pa=12e3, depth_m=0.1, relax_ratio=0.0)
         batch = run(make(foam))
         depth = batch.traces["depth_m"][0, -1] / 0.1
-        parts_of_depth = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+        parts_of_depth = (0.2, 0.3, 0.4)
         loads, depths, _ = zip(*map(layer_solution, parts_of_depth), strict=True)
         scale = RADIUS / 0.1
         want = np.interp(depth * scale, depths, loads) / scale
@@ -189,7 +160,6 @@ class TestAskew:
     @pytest.mark.parametrize(
         ("degrees", "force", "depth_mm", "peak", "rows"),
         [
-            (10.0, 2.94, 14.4, 0.287, [0.894, 0.710, 0.546, 0.382, 0.250, 0.130]),
             (17.0, 2.94, 18.1, 0.364, [1.288, 0.854, 0.524, 0.236, 0.034, 0.0]),
             (17.0, 6.00, 25.5, 0.445, [1.828, 1.454, 1.086, 0.786, 0.522, 0.258]),
         ],
@@ -243,27 +213,20 @@ def test_a_sleeve_is_in_series_with_the_skin():
     assert_allclose(t.bed.taxel_k, 1.0 / (1.0 / 1e4 + 1.0 / 2500.0))
 
 
-def test_a_sleeve_spreads_the_load_and_loses_none():
-    plain, covered = (
-        press(width_m=0.05, **more)
-        for more in ({}, {"cover_n_m": 2500.0, "cover_spread": 0.2})
-    )
-    for batch in (plain, covered):
-        total = batch.counts[0].sum(axis=(1, 2)) / 1000.0
-        assert_allclose(total, batch.force[0], atol=0.05)
-    assert (covered.counts[0, -1] > 0).sum() > (plain.counts[0, -1] > 0).sum()
-
-
 def test_a_sleeve_gives_each_of_four_neighbours_its_part():
     t = press(cover_n_m=2500.0, cover_spread=0.1).trials
     t.touch.image[:] = 0.0
     t.touch.image[5, 3] = 1.0
+    t.touch.image[0, 8] = 1.0
     cover.pass_on(t.everyone)
     image = t.touch.image[..., 0]
     want = np.zeros_like(image)
     want[5, 3] = 0.6
     want[[4, 6], 3] = 0.1
     want[5, [2, 4]] = 0.1
+    want[0, 8] = 0.7  # none is lost beyond the skin's end
+    want[1, 8] = 0.1
+    want[0, [7, 9]] = 0.1
     assert_allclose(image, want, atol=1e-15)
 
 
@@ -372,18 +335,3 @@ def test_under_a_pivoting_arm_the_springs_that_are_left_bear_by_their_depth():
     assert (np.ptp(intact.sum(axis=0), axis=0) > 0.0).all()
     want = (loads_of(t) * intact).sum(axis=0)
     assert_allclose(t.bed.row_force, want, atol=1e-6)
-
-
-def test_the_tangents_of_a_bubble_lie_below_the_gas_law_by_a_third_at_most():
-    depth = np.linspace(0.0, 0.88, 8801)[1:]
-    law = depth / (1.0 - depth)
-    starts = (0.0, *BREAKS)
-    steeper = np.diff((0.0, *SLOPES))
-    tangents = sum(
-        slope * np.maximum(depth - start, 0.0)
-        for slope, start in zip(steeper, starts, strict=True)
-    )
-    below = 1.0 - tangents / law
-    assert below.min() == pytest.approx(0.0, abs=1e-12)
-    assert below.max() == pytest.approx(1.0 / 3.0, abs=1e-4)
-    assert depth[below.argmax()] == pytest.approx(BREAKS[0], abs=1e-4)

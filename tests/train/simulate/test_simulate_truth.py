@@ -57,13 +57,6 @@ class TestLabels:
         assert sum(t["redrawn"] > 0 for t in simulations) == stuck
         assert write(boxes, tmp_path).redrawn == stuck
 
-    def test_drawn_again_means_from_the_same_range_by_a_stream_of_the_same_name(
-        self, simulations
-    ):
-        masses = [t["values"]["mass_kg"] for t in simulations if t["redrawn"]]
-        assert all(0.5 <= mass <= 6.0 for mass in masses)
-        assert len(set(masses)) == len(masses) > 0
-
     def test_redraws_do_not_depend_on_the_batch(self):
         trial_scene = scene(BOX, trials={"count": 4, "lead_s": 0.1, "after_s": 1.4})
         single = dict(simulate(trial_scene, batch=1))
@@ -82,40 +75,17 @@ class TestLabels:
     def test_a_motion_that_never_touches_is_refused(self):
         trial_scene = scene({**BOX, "conditions": ["fixed"]})
         still = replace(trial_scene, damping=(0.0,) * 5, travel_s=1e-6)
-        refused(still, "was never touched, as the arm's stroke.*motion")
+        refused(still, "was never touched.*motion")
 
-    @pytest.mark.parametrize(
-        ("change", "says"),
-        [
-            (
-                {"motion": {"travel_s": 0.2}},
-                r"as the arm's stroke ended 0\.\d\d s.*travel_s",
-            ),
-            (
-                {"motion": {"start_deg": [116.0, 5.0, 0.0, 42.0, 0.0]}},
-                "stroke ended.*start_deg",
-            ),
-            (
-                {"trials": {"count": 1, "after_s": 0.1}},
-                r"and the trial ended 0\.\d\d s.*after_s",
-            ),
-        ],
-    )
-    def test_the_error_names_the_reason_why_a_trial_ended_early(self, change, says):
-        light = scene({**BOX, "mass_kg": 1.0}, **change)
-        refused(light, r"the last moved \d+ mm, less than 20, .*" + says)
-
-    @pytest.mark.parametrize("family", ["rigid", "foam", "bubbles"])
     @pytest.mark.parametrize("step_s", [{}, {"base": 0.01}])
     def test_an_object_inside_the_arm_is_refused_at_once(
         self,
         monkeypatch,
-        family,
         step_s,
     ):
         fail = partial(pytest.fail, "it measured the step first")
         monkeypatch.setattr(convergence, "measure", lambda *_: fail())
-        wide = scenes.one_object(name="wall", family=family, width_m=1.0)
+        wide = scenes.one_object(name="wall", width_m=1.0)
         rest = {"spread": {"yaw_deg": 30.0}, "effects": {"add": ["tilt", "inertia"]}}
         trial_scene = scene(*wide, step_s=step_s, **rest)
         says = r"'wall' touches the arm before it moves, in trial \d .* by \d\d degrees; .*yaw_deg"
@@ -166,7 +136,6 @@ class TestFamilies:
     @pytest.mark.parametrize(
         ("change", "says"),
         [
-            ({"count": 0}, "count must be a whole number from 1 to 1000, not 0"),
             (
                 {"mass_kg": [50.0, 60.0]},
                 r"low enough that 6 N \(labels.push_n\) move it",
@@ -175,7 +144,6 @@ class TestFamilies:
                 {"colour": 3},
                 "family 'crate': unknown key colour; allowed: name.*, count",
             ),
-            ({"stem_count": 3}, "family 'crate': unknown key stem_count"),
             ({"friction_kinetic": 0.2}, "unknown key friction_kinetic; .*kinetic_part"),
             ({"base_m": 0.2}, "family 'crate': object 'crate 01': height_m is missing"),
         ],
@@ -189,7 +157,7 @@ class TestLimits:
     def test_the_stroke_ends_at_the_joints_limits(self):
         trial_scene = scene(
             {**BOX, "conditions": ["fixed"], "width_m": 0.02},
-            trials={"count": 1, "after_s": 20.0},
+            trials={"count": 1, "after_s": 8.0},
             motion={"rate_deg_s": [60.0, 0.0, 0.0, 0.0, 0.0]},
         )
         batch = run(trial_scene)
