@@ -75,34 +75,6 @@ def test_whole_objects_are_left_out_where_every_class_has_three(make_touch, tmp_
     assert (fitted.chosen["object"].folds == folds).all()
 
 
-@pytest.fixture(scope="module")
-def objects(make_touch, tmp_path_factory):
-    """Touches of eight objects, four of each softness, which overlap."""
-    folder = tmp_path_factory.mktemp("objects")
-    for kind in ("hard", "soft"):
-        for number in range(4):
-            labels = {"softness": kind, "object": f"{kind} {number}"}
-            for trial in range(4):
-                touch = make_touch(kind=kind, seed=40 * number + trial, labels=labels)
-                save(folder / f"{kind}-{number}-{trial}.npz", touch)
-    return str(folder)
-
-
-def test_early_errors_of_recorded_objects_are_told_for_both_ways_to_choose(objects):
-    """The second is that of an export with `--leave-out trial`."""
-    fixed = {**PAPER, "decision_points_s": (0.6, 1.2)}
-    exported = train.fit(objects, **fixed)
-    assert exported.chosen["softness"].left_out == "object"
-    single = train.fit(objects, leave_out="trial", **fixed)
-    smallest = [
-        fitted.sequential.stopping_["softness"].smallest_error
-        for fitted in (exported, single)
-    ]
-    (note,) = [note for note in exported.notes if "`--leave-out trial`" in note]
-    assert note.endswith(f"softness {smallest[0]:.1%}, instead {smallest[1]:.1%}")
-    assert not any("`--leave-out trial`" in note for note in single.notes)
-
-
 def test_touches_that_were_missed_are_wrong_and_none_found_in_none_is_right(
     recordings,
     make_touch,

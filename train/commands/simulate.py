@@ -27,8 +27,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     text = "trials of each object in each condition, instead of the scene's"
     option("--trials", type=int, metavar="N", help=text)
     option("--jobs", type=int, default=1, help="processes; -1 for all cores")
-    text = "run the batches on the cluster of this Dask scheduler, like tcp://127.0.0.1:8786"
-    option("--address", help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,7 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
                 scene,
                 arguments.out,
                 jobs=arguments.jobs,
-                address=arguments.address,
                 progress=progress.update,
             )
         headline = f"recordings written to {arguments.out}: {len(written.paths)}"

@@ -1,8 +1,7 @@
-"""Recordings of a scene's trials, made on this machine's cores or on a Dask cluster."""
+"""Recordings of a scene's trials, made on all cores."""
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
 from os import cpu_count
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any
 from edge import saving
 from edge.recording import Recording
 from edge.writing import check_writable
-from train.cluster import on_cluster
 from train.simulate.arm import Array, Places
 from train.simulate.convergence import Convergence, Kind, kinds, measured
 from train.simulate.engine import PhysicsRun, batch_size, readings
@@ -140,7 +138,6 @@ def write(
     *,
     batch: int | None = None,
     jobs: int = 1,
-    address: str | None = None,
     progress: Callable[[int], Any] = lambda count: None,
 ) -> Written:
     """Write the recordings of a scene into a folder.
@@ -150,12 +147,10 @@ def write(
     Args:
         batch: most trials simulated side by side; see `batches_of`.
         jobs: processes on this machine (joblib).
-        address: of a Dask scheduler that runs the batches and sends the recordings
-            back.
         progress: called with the number of trials just written.
 
     Raises:
-        InputError: a file cannot be written, or there is no scheduler at `address`.
+        InputError: a file cannot be written.
     """
     target = Path(folder)
     check_writable(target)
@@ -166,7 +161,7 @@ def write(
     paths = []
     redrawn = 0
     unfelt = 0
-    for name, trial in _simulated(scene, work, jobs, address):
+    for name, trial in _simulated(scene, work, jobs):
         saving.save(target / name, trial, lasting=False)
         paths.append(target / name)
         redrawn += trial.meta["simulation"]["redrawn"] > 0
@@ -184,19 +179,17 @@ def _simulated(
     scene: Scene,
     work: list[tuple[TrialSpec, ...]],
     jobs: int,
-    address: str | None,
 ) -> Iterator[tuple[str, Recording]]:
-    """The trials of each batch as soon as it is simulated, here or on a cluster."""
-    if jobs == 1 and address is None:
+    """The trials of each batch as soon as it is simulated."""
+    if jobs == 1:
         for specs in work:
             yield from simulate_trials(scene, specs)
         return
     from joblib import Parallel, delayed
 
-    with nullcontext() if address is None else on_cluster(address):
-        run = Parallel(jobs if address is None else -1, return_as="generator_unordered")
-        for batch in run(delayed(_simulate_batch)(scene, specs) for specs in work):
-            yield from batch
+    run = Parallel(jobs, return_as="generator_unordered")
+    for batch in run(delayed(_simulate_batch)(scene, specs) for specs in work):
+        yield from batch
 
 
 def _simulate_batch(

@@ -80,19 +80,6 @@ def test_long_trials_are_simulated_fewer_side_by_side():
     assert sum(map(len, batches)) == 50
 
 
-def test_the_same_bytes_from_a_dask_cluster(demo, written, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    where = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None}
-    with distributed.LocalCluster(
-        2,
-        threads_per_worker=1,
-        processes=False,
-        **where,
-    ) as cluster:
-        write(demo, tmp_path, address=cluster.scheduler_address)
-    assert digests(tmp_path) == digests(written[0])
-
-
 def test_another_seed_gives_other_trials_and_more_trials_leave_the_first(
     written, tmp_path
 ):
