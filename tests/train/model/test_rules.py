@@ -90,7 +90,7 @@ def test_certificates_fail_no_oftener_than_they_say():
     a tenth."""
     error = 0.2
     rng = np.random.default_rng(2)
-    world_confidence, world = drawn(20_000, rng)
+    world_confidence, world = drawn(5_000, rng)
     failed = 0
     for _ in range(300):
         confidence, right = drawn(100, rng)
@@ -101,7 +101,7 @@ def test_certificates_fail_no_oftener_than_they_say():
         ]
         if able:
             at = stops(world_confidence, able[-1], np.zeros_like(world))
-            failed += 1.0 - world[at, np.arange(20_000)].mean() > error
+            failed += 1.0 - world[at, np.arange(5_000)].mean() > error
     assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
 
 
