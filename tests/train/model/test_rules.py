@@ -86,13 +86,13 @@ def test_a_rule_is_certified_no_lower_than_those_tested_before_it():
 
 
 def test_certificates_fail_no_oftener_than_they_say():
-    """Of 300 calibrations the share whose rule errs more often than certified; at most
+    """Of 100 calibrations the share whose rule errs more often than certified; at most
     a tenth."""
     error = 0.2
     rng = np.random.default_rng(2)
     world_confidence, world = drawn(5_000, rng)
     failed = 0
-    for _ in range(300):
+    for _ in range(100):
         confidence, right = drawn(100, rng)
         able = [
             rule
@@ -102,7 +102,7 @@ def test_certificates_fail_no_oftener_than_they_say():
         if able:
             at = stops(world_confidence, able[-1], np.zeros_like(world))
             failed += 1.0 - world[at, np.arange(5_000)].mean() > error
-    assert failed <= binom.ppf(0.99, 300, TEST_SHARE * RISK)
+    assert failed <= binom.ppf(0.99, 100, TEST_SHARE * RISK)
 
 
 class TestProduct:
