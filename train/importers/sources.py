@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.output import counted
 from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
@@ -31,7 +30,6 @@ from train.importers.reading import (
     require_filled,
     suffix_of,
 )
-from train.progress import say
 
 LABELS = "labels.csv"
 SKIN = "skin.json"
@@ -188,20 +186,10 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
-    """The tables among paths; says how many files are none."""
-    tables = []
-    foreign = []
-    for path in paths:
-        if path.name in (LABELS, SKIN):
-            continue
-        if suffix_of(path) in SUFFIXES:
-            tables.append(path)
-        elif path.is_file():
-            foreign.append(path)
-    if tables and foreign:
-        count = counted(len(foreign), "file")
-        say(f"left out {count} of another format, such as {foreign[0]}")
-    return tables
+    """The tables among paths."""
+    return [
+        path for path in paths if path.name != LABELS and suffix_of(path) in SUFFIXES
+    ]
 
 
 def _counting(places: Sequence[Path]) -> set[str]:

@@ -292,9 +292,7 @@ def test_recordings_without_labels_are_refused(make_touch, tmp_path):
 def test_damaged_files_stop_the_fit_and_the_first_is_named(folder):
     for name in ("hard_3", "soft_1"):
         (folder / f"{name}.npz").write_bytes(b"PK")
-    with pytest.raises(
-        InputError, match=r"hard_3.npz: not .*; 1 more cannot be used either"
-    ):
+    with pytest.raises(InputError, match=r"hard_3.npz: not .*"):
         load_trials([folder])
 
 

@@ -60,7 +60,9 @@ def test_a_start_with_a_missing_value_is_not_the_quietest(kind, capsys):
     complete = trial([90, 80], [90, 80], [90, 80])
     rest = rest_of([incomplete, complete], ValueOptions(**{kind: True}))
     assert rest.values.tolist() == [[90], [80]]
-    assert "at rest, which is never" not in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "missing: 1 value" in output
+    assert "at rest, which is never" not in output
 
 
 def test_taxels_without_a_value_at_rest_are_said(capsys):
