@@ -160,15 +160,10 @@ def _compare(trial: Measured, first: Measured) -> None:
     first_path = first.samples.where
     sense = trial.meaning
     first_sense = first.meaning
-    if len(sense.taxels) != len(first_sense.taxels):
-        raise InputError(
-            f"{path}: has {len(sense.taxels)} taxels, and {first_path} "
-            f"{len(first_sense.taxels)}; name them by --taxels"
-        )
     if sense.taxels != first_sense.taxels:
         raise InputError(
             f"{path}: its taxels are {short_text(sense.taxels)}, and those of "
-            f"{first_path} {short_text(first_sense.taxels)}"
+            f"{first_path} {short_text(first_sense.taxels)}; name them by --taxels"
         )
     if sense.unit != first_sense.unit:
         raise InputError(

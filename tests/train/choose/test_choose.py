@@ -229,9 +229,3 @@ def test_a_window_that_is_given_is_kept(words, make_touch, tmp_path):
     fitted = train.fit(touches(make_touch, tmp_path, 4.0, 1.8), **FEW, **words)
     assert fitted.window_s == 1.2
     assert not any("the window is" in note for note in fitted.notes)
-
-
-def test_touches_that_last_little_longer_than_the_window_are_told_in_it(
-    make_touch, tmp_path
-):
-    assert train.fit(touches(make_touch, tmp_path, 2.0, 1.8), **FEW).window_s == 1.2

@@ -100,17 +100,6 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
     assert proposed(strong).threshold == 80
 
 
-def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
-    make_touch,
-):
-    touch = make_touch(seed=0, lead_s=0.0)
-    slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
-    slow.frames[0] = 3
-    proposal = proposed([replace(slow, meta={"skin": slow.meta["skin"]})])
-    assert proposal.threshold == 6
-    assert proposal.onset == 9
-
-
 def saved(folder, make_touch, **skin):
     for seed in range(20):
         touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)

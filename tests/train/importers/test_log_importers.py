@@ -413,7 +413,6 @@ TWO = (skin(topic="/left"), skin(topic="/right"))
         (TWO, {}, (), 'are on /left, /right; name one of them as "frames_topic"'),
         (TWO, {"frames_topic": {}}, (), "must be one of ['/left', '/right']"),
         ([skin()], [], (), "grasp.json: the file must be a table, not []"),
-        ([skin()], {"arm": 5}, (), "grasp.json: arm must be a table, not 5"),
         ([camera()], {}, (), "no frames: /camera is rgb8; frames are mono16"),
         ([joints()], {}, (), "holds no frames; they must be sensor_msgs/msg/Image"),
         (

@@ -17,9 +17,7 @@ from train.model.rules import (
 )
 
 
-@pytest.mark.parametrize(
-    ("wrong", "trials"), [(0, 20), (3, 140), (139, 140), (140, 140)]
-)
+@pytest.mark.parametrize(("wrong", "trials"), [(0, 20), (3, 140), (140, 140)])
 def test_the_upper_limit_is_where_the_exact_binomial_test_turns(wrong, trials):
     limit = upper_limit(wrong, trials, 0.1)
     assert binom.cdf(wrong, trials, min(limit + 1e-9, 1.0)) <= 0.1 or limit == 1.0
