@@ -130,7 +130,10 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
-    _check_size(len(loaded.dataset.trials))
+    if len(labels) < FEWEST_TRIALS:
+        raise InputError(
+            f"{len(labels)} trials are too few to fit; record at least {FEWEST_TRIALS}"
+        )
     settings = choose(loaded, y, fixed)
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
@@ -174,12 +177,6 @@ def load(
         windows = windows_of(seconds)
     loaded = trials_of(recordings, windows, options)
     return replace(loaded, notes=[*copies(recordings), *loaded.notes])
-
-
-def _check_size(trials: int) -> None:
-    if trials < FEWEST_TRIALS:
-        number = "1 trial is" if trials == 1 else f"{trials} trials are"
-        raise InputError(f"{number} too few to fit; record at least {FEWEST_TRIALS}")
 
 
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:

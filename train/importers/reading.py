@@ -42,8 +42,6 @@ MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
 ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
-COMMAS = re.compile(r"(?:\s*[+-]?\d+(?:,\d+)?(?!\S)){2,}\s*")
-"""A row of numbers with decimal commas, separated by blanks."""
 FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
 """A cell with a fraction after a sign, where commas separate no cells."""
 LONGEST_LINE = 4 << 20
@@ -291,8 +289,6 @@ def _mark(line: str) -> str:
     """The sign between the cells of a line; empty where blanks stand there."""
     if len(line) > LONGEST_LINE:
         raise InputError(f"has a line of {len(line) >> 20} MB, too long for a frame")
-    if COMMAS.fullmatch(line):
-        return ""
     return next(filter(line.__contains__, MARKS), "")
 
 

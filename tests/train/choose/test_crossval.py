@@ -108,11 +108,6 @@ def test_features_near_the_ends_of_float64_have_the_neighbours_of_others(scaling
         assert (neighbours(far, scaling=scaling, max_components=6) == near).all()
 
 
-def test_features_that_spread_beyond_any_distance_are_refused():
-    with pytest.raises(InputError, match="store them in other units"):
-        neighbours(overlapping()[0] * 1e200)
-
-
 def subspace_gap(ours, exact):
     """Largest sine between the spans of the first 1, 2, ... axes."""
     worst = 0.0

@@ -166,16 +166,6 @@ def test_where_most_lack_joint_angles_motion_is_on_the_skin(make_touch, tmp_path
     assert data.left_out == {}
 
 
-def test_a_label_that_a_few_lack_stays_a_task_without_them(folder, make_touch):
-    save(
-        folder / "odd.npz",
-        make_touch(labels={"category": "rigid-fixed", "mood": "bad"}),
-    )
-    data = load_trials([folder])
-    assert data.tasks == ("category", "object")
-    assert [path.name for path in data.left_out["a label for object"]] == ["odd.npz"]
-
-
 @pytest.fixture
 def two(make_touch):
     """Two contacts, half a second apart."""
@@ -269,21 +259,16 @@ def test_recordings_that_do_not_belong_together_are_refused(
         load_trials([folder])
 
 
-def test_recordings_without_labels_are_refused(make_touch, tmp_path):
-    for i in range(3):
-        for name, labels in ((i, {"mood": "bad"} if i else {}), (f"bare{i}", {})):
-            touch = make_touch(seed=i)
-            touch.meta["labels"] = labels
-            save(tmp_path / f"{name}.npz", touch)
-    with pytest.raises(InputError, match="share no label"):
-        load_trials([tmp_path])
-
-
 def test_damaged_files_stop_the_fit_and_the_first_is_named(folder):
     for name in ("hard_3", "soft_1"):
         (folder / f"{name}.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"hard_3.npz: not .*"):
         load_trials([folder])
+
+
+def test_a_threshold_that_no_contact_reaches_is_said(recordings):
+    with pytest.raises(InputError, match="no contact in any of 16 recordings"):
+        load_trials([recordings], Measurement(threshold=60000))
 
 
 def test_angles_are_measured_by_the_names_of_their_joints(

@@ -135,18 +135,6 @@ def test_letters_that_are_no_axes_are_refused(text, tmp_path, capsys):
     assert "must be x, y and z in some order" in capsys.readouterr().err
 
 
-def test_a_word_among_decimal_commas_is_named_by_its_own_cell(tmp_path, capsys):
-    rows = [f"0,{i:02};1,5;2,5;{100 + i},5" for i in range(FRAMES)]
-    rows[40] = "0,40;1,5;2,5;broken"
-    lines = ["t;s1_x;s1_y;s1_z", *rows]
-    (tmp_path / "cup_1.csv").write_text("\n".join(lines) + "\n")
-    words = ["import", "csv", str(tmp_path), "--out", str(tmp_path / "out")]
-    assert main([*words, "--axes", "xyz"]) == 2
-    error = capsys.readouterr().err
-    assert "broken" in error
-    assert "line 42" in error
-
-
 def test_shear_beyond_its_range_is_refused(folder, refusal):
     large = THREE.copy()
     large[30, 0, 0] = 40000

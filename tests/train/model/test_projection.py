@@ -88,9 +88,7 @@ def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
     assert max(sum(abs(weights)) * 2**24) < 2**53
 
 
-@pytest.mark.parametrize(
-    ("components", "bits"), [(0, 22), (20, 22), (115, 22), (116, 21), (500, 20)]
-)
+@pytest.mark.parametrize(("components", "bits"), [(0, 22), (115, 22), (116, 21)])
 def test_squared_distances_stay_below_2_to_the_53(components, bits):
     assert coordinate_bits(components) == bits
     longest = 2**bits
