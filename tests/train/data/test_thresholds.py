@@ -101,7 +101,7 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
 
 
 def saved(folder, make_touch, **skin):
-    for seed in range(20):
+    for seed in range(12):
         touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
         save(
             folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
@@ -130,5 +130,5 @@ def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
 ):
     folder = saved(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
     fitted = train.fit(folder, **GIVEN)
-    assert len(fitted.dataset.trials) == 20
+    assert len(fitted.dataset.trials) == 12
     assert any("no recording has a contact at its own" in note for note in fitted.notes)
