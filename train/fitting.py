@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from train.choose.options import FitOptions, Loaded, trials_of
 from train.choose.settings import Chosen, Settings
 from train.choose.windows import windows_of
 from train.data.dataset import DataSet, read
-from train.data.groups import are_drawn
+from train.data.groups import TRIAL, are_drawn
 from train.data.leaks import copies, leaks
 from train.data.tasks import labels_of_tasks, lacking
 from train.data.vectors import Labels, Vectors
@@ -130,11 +130,14 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     y = labels_of_tasks(loaded.dataset, fixed.tasks)
     labels = [trial.labels for trial in loaded.dataset.trials]
     doubts = [f"warning: probably a slip: {sentence}" for sentence in slips(labels)]
-    _check_size(len(loaded.dataset.trials))
+    if len(labels) < FEWEST_TRIALS:
+        raise InputError(
+            f"{len(labels)} trials are too few to fit; record at least {FEWEST_TRIALS}"
+        )
     settings = choose(loaded, y, fixed)
     measured = loaded.dataset.with_kernels(settings.window_s)
     notes = [*doubts, *lacking(loaded.dataset, fixed.tasks), *loaded.notes]
-    notes += [*settings.notes, *leaks(measured, y)]
+    notes += [*settings.notes, *_of_unseen(settings, fixed), *leaks(measured, y)]
     points = decision_points(measured, settings, fixed, notes)
     if len(points) < 2:
         settings = replace(settings, early=None)
@@ -142,9 +145,8 @@ def fit(data: DataSet | str | Path | Sequence[str | Path], **options: Any) -> Fi
     vectors = dataset.vectors(settings.window_s, fixed.samples, y)
     sequential = None
     if points:
-        sequential, of_known = calibrate(measured, y, points, settings, fixed)
+        sequential = calibrate(measured, y, points, settings, fixed)
         classifier = sequential.decision_points_[-1]
-        notes += of_known
     else:
         classifier = ContactClassifier.of(settings.choices, vectors)
     return Fitted(
@@ -177,12 +179,6 @@ def load(
     return replace(loaded, notes=[*copies(recordings), *loaded.notes])
 
 
-def _check_size(trials: int) -> None:
-    if trials < FEWEST_TRIALS:
-        number = "1 trial is" if trials == 1 else f"{trials} trials are"
-        raise InputError(f"{number} too few to fit; record at least {FEWEST_TRIALS}")
-
-
 def choose(loaded: Loaded, y: Labels, options: FitOptions) -> Settings:
     """The settings of each task, and the window."""
     dataset = loaded.dataset
@@ -205,11 +201,9 @@ def calibrate(
     points: tuple[float, ...],
     settings: Settings,
     options: FitOptions,
-) -> tuple[SequentialClassifier, list[str]]:
-    """A classifier for all decision points, with its stopping rules, and sentences that
-    a user should read."""
-    known = settings.of_known
-    names = settings.features(folds=True) | known.features(folds=True)
+) -> SequentialClassifier:
+    """A classifier for all decision points, with its stopping rules."""
+    names = settings.features(folds=True)
     dataset = measured.of(sorted(names))
     at_points = np.stack([dataset.features(s, options.samples) for s in points])
     classifier = SequentialClassifier(
@@ -218,44 +212,18 @@ def calibrate(
         dataset.names,
         jobs=options.processes,
         widths=dataset.widths(options.samples),
-        early=None if settings.early is None else settings.early.settings,
+        early=settings.early,
     )
-    classifier.fit(
-        at_points,
-        y,
-        settings.folds,
-        settings.without,
-    )
-    tasks = [
-        task for task, c in settings.chosen.items() if c.choice_of_known is not None
-    ]
-    if options.quick or not tasks:
-        return classifier, []
-    instead = classifier.smallest_errors(
-        at_points,
-        y,
-        known.without,
-        None if known.early is None else known.early.settings,
-    )
-    return classifier, [_errors_of_known(tasks, classifier, instead)]
+    return classifier.fit(at_points, y, settings.folds, settings.without)
 
 
-def _errors_of_known(
-    tasks: Sequence[str],
-    exported: SequentialClassifier,
-    instead: Mapping[str, float],
-) -> str:
-    """What early decisions about recorded objects would gain by settings for these.
-
-    Where groups are left out, settings are chosen for objects never met, though
-    certificates are for recorded ones.
-    """
-    errors = []
-    for task in tasks:
-        smallest = exported.stopping_[task].smallest_error
-        errors.append(f"{task} {smallest:.1%}, instead {instead[task]:.1%}")
-    return (
+def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:
+    """How to choose settings for recorded objects instead, where they are chosen for
+    others."""
+    left_out = {chosen.left_out for chosen in settings.chosen.values()}
+    if options.quick or left_out == {TRIAL}:
+        return []
+    return [
         "the settings are chosen for objects never met; `--leave-out trial` chooses "
-        "them for the recorded ones, whose smallest certified errors of early decisions "
-        f"(--error) are: {'; '.join(errors)}"
-    )
+        "them for the recorded ones"
+    ]

@@ -21,7 +21,7 @@ from train.choose.evaluate import (
 )
 from train.choose.protocols import GroupsLeftOut, TrialsLeftOut, promised
 from train.choose.search import SearchGrid
-from train.choose.settings import Chosen, EarlySettings, Settings
+from train.choose.settings import Chosen, Settings
 from train.data.dataset import DataSet
 from train.data.groups import TRIAL, Divisions, Groups
 from train.data.vectors import Labels, Vectors
@@ -226,7 +226,7 @@ class Choosing:
         self,
         window_s: float,
         chosen: Mapping[str, Chosen],
-    ) -> EarlySettings | None:
+    ) -> Early | None:
         """The settings of the decision points before the full window, by the same rule
         as those of the full window; None without candidates for them."""
         if not self._early_candidates:
@@ -234,15 +234,14 @@ class Choosing:
         tables = [self._early_tables(share * window_s) for share in EARLY_SHARES]
         trials, groups = self._protocols(*map(averaged, zip(*tables, strict=True)))
         folds = self._divisions.folds
-        of_known = {}
-        usual = {}
+        settled = {}
         for task in self._y:
             # The graph has one number of neighbours for all decision points.
             k = chosen[task].choice.k
             protocol = self._protocol(task, trials, groups)
-            of_known[task] = trials.with_neighbours(task, k, folds)
-            usual[task] = protocol.with_neighbours(task, k, folds)
-        return EarlySettings(_early(window_s, usual), _early(window_s, of_known))
+            settled[task] = protocol.with_neighbours(task, k, folds)
+        choices, *by_fold = _by_fold(settled)
+        return Early(window_s, choices, by_fold)
 
     def _early_tables(self, window_s: float) -> tuple[AnswerTable, AnswerTable]:
         """The answers of the candidates for early decision points at one of them."""
@@ -276,12 +275,6 @@ class Choosing:
             picks=tuple(choice for _, choice in own_choices),
             folds=protocol.folds,
         )
-        if protocol is not trials:
-            chosen = replace(
-                chosen,
-                choice_of_known=trials.choice(task),
-                known_by_fold=tuple(trials.by_fold(task)),
-            )
         return chosen, without
 
 
@@ -310,12 +303,6 @@ def _by_fold(choices: Mapping[str, Sequence[Choice]]) -> list[dict[str, Choice]]
     """[fold]{task: its choice} from {task: [fold] its choice}."""
     folds = zip(*choices.values(), strict=True)
     return [dict(zip(choices, of_fold, strict=True)) for of_fold in folds]
-
-
-def _early(window_s: float, settled: Mapping[str, Sequence[Choice]]) -> Early:
-    """Early settings from {task: its choice, and the choice made without each fold}."""
-    choices, *by_fold = _by_fold(settled)
-    return Early(window_s, choices, by_fold)
 
 
 def decided_together(

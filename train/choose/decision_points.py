@@ -106,7 +106,7 @@ def _size(points: int, dataset: DataSet, settings: Settings, samples: int) -> in
     novelty += 8 * columns + 8 * trials
     early = settings.choices
     if settings.early is not None:
-        early = {**early, **settings.early.settings.choices}
+        early = {**early, **settings.early.choices}
     full = _bytes_of(settings.choices, dataset, samples)
     before = (points - 1) * (novelty + _bytes_of(early, dataset, samples))
     return shared + before + novelty + full

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,19 +12,6 @@ from train.choose.candidates import Candidate
 from train.choose.evaluate import Promise
 from train.model.pipeline import Choice, Choices
 from train.model.stopping import Early
-
-
-@dataclass(frozen=True)
-class EarlySettings:
-    """The settings of the decision points before the full window.
-
-    Attributes:
-        settings: chosen as those of the full window are.
-        settings_of_known: chosen for objects that were recorded.
-    """
-
-    settings: Early
-    settings_of_known: Early
 
 
 @dataclass(frozen=True)
@@ -45,9 +32,6 @@ class Chosen:
         by_fold: [fold]{task: the choice without the fold's trials}, whose decisions
             `accuracy` counts: those of the task and of the tasks that are decided
             together with it.
-        choice_of_known: the settings that are best for objects that were recorded, where groups
-            were left out to choose the others.
-        known_by_fold: [fold] the same, chosen without the fold's trials.
     """
 
     choice: Choice
@@ -58,8 +42,6 @@ class Chosen:
     picks: tuple[Choice, ...] = ()
     folds: Integers = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
     by_fold: tuple[dict[str, Choice], ...] = ()
-    choice_of_known: Choice | None = None
-    known_by_fold: tuple[Choice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,28 +65,12 @@ class Settings:
     candidates: Sequence[Candidate]
     window_s: float
     notes: list[str]
-    early: EarlySettings | None = None
+    early: Early | None = None
 
     @property
     def choices(self) -> dict[str, Choice]:
         """{task: its choice}."""
         return {task: settled.choice for task, settled in self.chosen.items()}
-
-    @property
-    def of_known(self) -> Settings:
-        """Those that are best for objects that were recorded, where groups were left
-        out to choose the others."""
-        chosen = dict(self.chosen)
-        without = list(map(dict, self.without))
-        for task, settled in self.chosen.items():
-            if settled.choice_of_known is not None:
-                chosen[task] = replace(settled, choice=settled.choice_of_known)
-                for by_task, choice in zip(without, settled.known_by_fold, strict=True):
-                    by_task[task] = choice
-        early = self.early
-        if early is not None:
-            early = replace(early, settings=early.settings_of_known)
-        return replace(self, chosen=chosen, without=without, early=early)
 
     @property
     def tested(self) -> int:
@@ -120,9 +86,8 @@ class Settings:
         settings: list[Choices] = [self.choices]
         settings += self.without if folds else []
         if self.early is not None:
-            early = self.early.settings
-            settings.append(early.choices)
-            settings += early.by_fold if folds else []
+            settings.append(self.early.choices)
+            settings += self.early.by_fold if folds else []
         names: set[str] = set()
         for choices in settings:
             names.update(*(choice.features for choice in choices.values()))

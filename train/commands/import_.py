@@ -6,17 +6,11 @@ format, see train/importers/__init__.py.
 """
 
 import argparse
-import hashlib
-import logging
 import os
-import re
 import sys
-from collections import Counter
 from collections.abc import Iterator, Sequence, Set
-from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
-from logging.handlers import BufferingHandler
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +25,6 @@ from train.data.thresholds import count_felt, proposed
 from train.importers import Refused, Trial, names
 from train.progress import bar, say
 
-LOG = logging.getLogger(__name__)
 ZERO_FRAMES = 3
 
 
@@ -75,37 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.file = arguments.file.resolve()
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
-    with counted_warnings():
-        return write(importer.trials(arguments.file, arm, *options), arm, arguments)
-
-
-@contextmanager
-def counted_warnings() -> Iterator[None]:
-    """Print the first of the warnings that differ in names and numbers alone, and how
-    many more there were."""
-    kept = BufferingHandler(capacity=sys.maxsize)
-    loggers = [logging.getLogger(name) for name in ("edge", "train")]
-    handlers = [logger.handlers for logger in loggers]
-    for logger in loggers:
-        logger.handlers = [kept]
-        logger.propagate = False
-    try:
-        yield
-    finally:
-        for logger, former in zip(loggers, handlers, strict=True):
-            logger.handlers = former
-            logger.propagate = True
-        messages = [record.getMessage() for record in kept.buffer]
-        kinds = Counter(map(kind_of, messages))
-        firsts = {kind_of(message): message for message in reversed(messages)}
-        for kind, count in kinds.items():
-            more = f" (and {count - 1} more like it)" if count > 1 else ""
-            LOG.warning(printable(f"{firsts[kind]}{more}"))
-
-
-def kind_of(message: str) -> str:
-    """A warning without the names before it and without numbers."""
-    return re.sub(r"[\d.e+-]*\d", "#", message.rpartition(": ")[2])
+    return write(importer.trials(arguments.file, arm, *options), arm, arguments)
 
 
 def write(
@@ -116,7 +79,6 @@ def write(
     """Write the recordings of an importer; the exit status."""
     without_threshold: list[tuple[Path, Recording]] = []
     paths: set[Path] = set()
-    frames: dict[str, list[str]] = {}
     skipped: list[str] = []
     for result in bar(trials, desc="importing", unit=" trials"):
         if isinstance(result, Refused):
@@ -133,25 +95,22 @@ def write(
             continue
         paths.add(path)
         recording = zeroed(recording) if arguments.zero else recording
-        digest = hashlib.sha256(recording.frames.tobytes()).hexdigest()
-        frames.setdefault(digest, []).append(name)
         if "threshold_counts" in recording.meta["skin"]:
             save(path, recording)
         else:
             without_threshold.append((path, recording))
     if skipped and not paths:
-        more = f"; {len(skipped) - 1} more cannot be used either" * (len(skipped) > 1)
-        raise InputError(skipped[0] + more)
-    report = [set_thresholds(without_threshold)] if without_threshold else []
-    print(f"recordings written to {arguments.out}: {len(paths)}", *report, sep="\n")
-    warn_of_copies(list(frames.values()))
-    for warning in former_recordings.warnings(arguments.out, paths):
+        raise InputError(skipped[0])
+    print(f"recordings written to {arguments.out}: {len(paths)}")
+    if without_threshold:
+        print(set_thresholds(without_threshold))
+    return _status(arguments.out, paths, skipped)
+
+
+def _status(folder: Path, paths: Set[Path], skipped: Sequence[str]) -> int:
+    """Say what else the folder holds, and what was left out; 1 if anything was."""
+    for warning in former_recordings.warnings(folder, paths):
         say(warning)
-    return _status(skipped)
-
-
-def _status(skipped: Sequence[str]) -> int:
-    """Print what was left out; 1 if anything was."""
     for sentence in skipped:
         print(printable(f"left out: {sentence}"), file=sys.stderr)
     return int(bool(skipped))
@@ -160,16 +119,6 @@ def _status(skipped: Sequence[str]) -> int:
 def _require_joints(recording: Recording, arm: Chain | None, file: Path) -> None:
     if arm is not None and recording.joints is None:
         raise InputError(f"{file}: holds no joint angles; leave --arm out")
-
-
-def warn_of_copies(groups: Sequence[Sequence[str]]) -> None:
-    """Warn of trials with equal frames, given the names that share theirs."""
-    copies = [names for names in groups if len(names) > 1]
-    if copies:
-        say(
-            f"warning: {sum(map(len, copies))} trials have the frames of others, such as "
-            f"{' and '.join(copies[0][:2])}; keep one of each, or accuracies are too high"
-        )
 
 
 def _path(arguments: argparse.Namespace, name: str, paths: Set[Path]) -> Path:

@@ -44,7 +44,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="data sets of the scene whose mean is set beside the paper's numbers (default: 1, "
         "these recordings alone; with 8, each takes about half a minute)",
     )
-    option("--address", help="address of a Dask scheduler that runs the sweeps instead")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,8 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_writable(arguments.out)  # before the work
 
-    options = {
-        name: getattr(arguments, name) for name in ("scene", "jobs", "address", "seeds")
-    }
+    options = {name: getattr(arguments, name) for name in ("scene", "jobs", "seeds")}
     print(study(arguments.data, arguments.out, **options))
     return 0

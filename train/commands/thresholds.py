@@ -36,20 +36,12 @@ def run(arguments: argparse.Namespace) -> int:
         low, high = (round(factor * max(level, 1)) for level in (threshold, onset))
         rows.append((name, min(low, 65534), min(high, 65534)))
     print(f"{'':<11}threshold  onset  recordings with a contact  contacts")
-    counts = {}
     for name, low, high in bar(rows, desc="following", leave=False):
-        counts[name] = touched, total = count_contacts(recordings, low, high)
+        touched, total = count_contacts(recordings, low, high)
         tqdm.write(
             f"{name:<11}{low:>9}  {high:>5}  {touched:>12} of {len(recordings):<10}  "
             f"{total:>8}"
         )
     print(f"proposed from {proposal.source}")
     print(f"use: --threshold {threshold} --onset {onset}")
-    hidden = max(counts.values())[0] - counts["proposed"][0]
-    if hidden:
-        print(
-            f"other thresholds show a contact in {hidden} more of the recordings; this "
-            "is noise, or touches as weak as noise. `make export` also tries lower "
-            "ones and keeps the best"
-        )
     return 0

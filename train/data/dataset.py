@@ -242,8 +242,7 @@ def read(data: Sequence[str | Path], *, progress: bool = False) -> Recordings:
         except InputError as error:
             bad.append(str(error))
     if bad:
-        more = f"; {len(bad) - 1} more cannot be used either" if len(bad) > 1 else ""
-        raise InputError(bad[0] + more)
+        raise InputError(bad[0])
     return Recordings(tuple(paths), tuple(recordings), digest.hexdigest())
 
 

@@ -4,14 +4,11 @@ that tell labels, and recordings that begin in contact."""
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from edge.recording import Recording
-from train.data import thresholds
 from train.data.dataset import DataSet, Recordings
 from train.data.vectors import Labels
 
@@ -47,7 +44,11 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
     recordings = [t.recording for t in dataset.trials]
     untouched = np.array([t.onset_s > t.recording.t[0] for t in dataset.trials])
     if 2 * untouched.sum() < len(untouched):
-        return [_late_recordings(recordings, float((~untouched).mean()))]
+        return [
+            f"warning: {(~untouched).mean():.0%} of the touches begin with their "
+            "recording, so their onset is not known; record from before the touch, or "
+            "take higher thresholds (`python -m train thresholds`)"
+        ]
     X = np.stack([recording.frames[0].reshape(-1) for recording in recordings])
     squares = cdist(X[untouched], X[untouched], "sqeuclidean")
     np.fill_diagonal(squares, np.inf)
@@ -69,18 +70,3 @@ def leaks(dataset: DataSet, y: Labels) -> list[str]:
                 "first frames"
             )
     return notes
-
-
-def _late_recordings(recordings: Sequence[Recording], share: float) -> str:
-    """The warning that a share of the recordings begins in contact."""
-    mend = "record from before the touch"
-    proposal = thresholds.proposed(recordings)
-    low = proposal.threshold
-    high = proposal.onset
-    with_contact, _ = thresholds.count_contacts(recordings, low, high)
-    if with_contact >= (1.0 - thresholds.MISSED_SHARE) * len(recordings):
-        mend += f", or take --threshold {low} --onset {high}, by which it begins later"
-    return (
-        f"warning: {share:.0%} of the touches begin with their recording, so their "
-        f"onset is not known; {mend}"
-    )

@@ -1,4 +1,4 @@
-"""Recordings far outside all others, by a feature or by a joint angle.
+"""Recordings far outside all others, by a feature, or with impossible joint angles.
 
 One damaged recording or frame spoils the scale of a feature for all trials. It is told
 by its distance to the mean of the others, in their standard deviations.
@@ -17,8 +17,6 @@ MOST_DEVIATIONS = 20.0
 """No trial of the simulated and recorded sets that we know lies so far outside."""
 ROUNDING = 1e-12
 """A spread of a smaller share of the values is rounding."""
-STILL_RAD = 0.01
-"""Joints that move less count as moving so much: a still arm may stand elsewhere."""
 UNLIMITED = (-np.inf, np.inf)
 LEAVE_OUT = "leave the recording out if it is wrong"
 FEWEST_TRIALS = 10
@@ -75,30 +73,20 @@ def by_features(dataset: DataSet, X: Floats, widths: Sequence[int]) -> Iterator[
 
 
 def by_joints(dataset: DataSet) -> Iterator[str]:
-    """A sentence on each recording with a joint angle beyond its limits, or else far
-    outside those of the other recordings."""
+    """A sentence on each recording with a joint angle beyond its limits."""
     if dataset.chain is None:
         return
-    joints = _angles_of(dataset)
     limits = np.array([pair or UNLIMITED for pair in dataset.chain.limits])
-    sums = _sums([*joints.values()])
-    for i, (path, angles) in enumerate(joints.items()):
+    for path, angles in _angles_of(dataset).items():
         excess = np.maximum(limits[:, 0] - angles, angles - limits[:, 1])
         excess = np.nan_to_num(excess, neginf=0.0)
-        distances = _outside(angles, np.delete(sums, i, axis=0).sum(axis=0))
-        why = ""
         if excess.max() > LIMIT_TOLERANCE:
             frame, joint = np.unravel_index(excess.argmax(), excess.shape)
             low, high = limits[joint]
-            why = f"beyond its limits of {low:g} and {high:g}"
-        elif len(joints) >= FEWEST_TRIALS and distances.max() > MOST_DEVIATIONS:
-            frame, joint = np.unravel_index(distances.argmax(), distances.shape)
-            times = distances[frame, joint]
-            why = f"{times:.0f} deviations outside all other recordings"
-        if why:
             yield (
                 f"warning: {path}: at frame {frame} joint {dataset.chain.names[joint]} "
-                f"is at {angles[frame, joint]:g}, {why}; {LEAVE_OUT}"
+                f"is at {angles[frame, joint]:g}, beyond its limits of {low:g} and "
+                f"{high:g}; {LEAVE_OUT}"
             )
 
 
@@ -106,24 +94,3 @@ def _angles_of(dataset: DataSet) -> dict[Path, Floats]:
     """{path: (n, dof) angles} of the recordings that have some."""
     angles = {trial.path: trial.recording.joints for trial in dataset.trials}
     return {path: joints for path, joints in angles.items() if joints is not None}
-
-
-def _sums(joints: Sequence[Floats]) -> Floats:
-    """(recordings, 3, dof) for each joint: number of angles, their sum, and the sum of
-    their squares."""
-    return np.array(
-        [
-            [np.isfinite(q).sum(0), np.nansum(q, axis=0), np.nansum(q**2, axis=0)]
-            for q in joints
-        ]
-    )
-
-
-def _outside(angles: Floats, sums: Floats) -> Floats:
-    """(frames, dof) distances to the mean of other recordings in deviations, by their
-    sums (3, dof); 0 where an angle is unknown."""
-    count, total, squares = sums
-    mean = total / np.maximum(count, 1)
-    variance = squares / np.maximum(count, 1) - mean**2
-    spread = np.sqrt(np.maximum(variance, STILL_RAD**2))
-    return np.asarray(np.nan_to_num(np.abs(angles - mean) / spread))

@@ -18,6 +18,7 @@ Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see 
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import mode
 from typing import Any
@@ -73,18 +74,24 @@ def trials(
         InputError: there is no file, or one cannot be used with `--strict`.
     """
     options = TableOptions.of(arguments)
-
-    def understood(source: Source) -> Measured:
-        return _understood(source, options)
-
+    understood = partial(_understood, options=options)
     measured = list(tried(sources_in(path, options), understood, options.strict))
     if not measured:
         kind = "folder of frames" if options.frames else f"file {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: holds no {kind}; give a folder of trials")
-    results = _alike(measured, options.strict)
-    usable = [result for result in results if isinstance(result, Measured)]
+    return _recorded(path, arm, _alike(measured, options.strict), options)
+
+
+def _recorded(
+    path: Path,
+    arm: Chain | None,
+    alike: Sequence[Measured | Refused],
+    options: TableOptions,
+) -> Iterator[Trial | Refused]:
+    """The recordings of trials; prints what was taken."""
+    usable = [trial for trial in alike if isinstance(trial, Measured)]
     if not usable:
-        yield from (result for result in results if isinstance(result, Refused))
+        yield from (result for result in alike if isinstance(result, Refused))
         return
     folder = path if path.is_dir() else path.parent
     skin = json_table(folder / SKIN)
@@ -102,7 +109,7 @@ def trials(
             meta["arm"] = arm and arm.to_dict()
         return Trial(trial.name, rest.recording(trial.samples, shape, meta))
 
-    yield from tried(results, recorded, options.strict)
+    yield from tried(alike, recorded, options.strict)
 
 
 def _announced(
@@ -153,15 +160,10 @@ def _compare(trial: Measured, first: Measured) -> None:
     first_path = first.samples.where
     sense = trial.meaning
     first_sense = first.meaning
-    if len(sense.taxels) != len(first_sense.taxels):
-        raise InputError(
-            f"{path}: has {len(sense.taxels)} taxels, and {first_path} "
-            f"{len(first_sense.taxels)}; name them by --taxels"
-        )
     if sense.taxels != first_sense.taxels:
         raise InputError(
             f"{path}: its taxels are {short_text(sense.taxels)}, and those of "
-            f"{first_path} {short_text(first_sense.taxels)}"
+            f"{first_path} {short_text(first_sense.taxels)}; name them by --taxels"
         )
     if sense.unit != first_sense.unit:
         raise InputError(

@@ -40,16 +40,11 @@ UNPACKERS: dict[str, Callable[..., Any]] = {
 PACKED = (*UNPACKERS, ".zip")
 MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
 """Separators; a text with none of them is separated by blanks."""
-HEX = re.compile(r"[+-]?0[xX][0-9a-fA-F]+")
 ABOVE = re.compile(r"[#%]|sep=.\Z|\s*\Z", re.A)
 """How a comment, blank line or separator (of Excel) before the first row begins."""
-COMMAS = re.compile(r"(?:\s*[+-]?\d+(?:,\d+)?(?!\S)){2,}\s*")
-"""A row of numbers with decimal commas, separated by blanks."""
 FRACTION = r"(?i)(?<![^\s;|\"])[+-]?\d*%s\d+(?:e[+-]?\d+)?(?![^\s;|\"])"
 """A cell with a fraction after a sign, where commas separate no cells."""
 LONGEST_LINE = 4 << 20
-FEWEST_NAMES = 3
-"""Whole numbers in a row from 0 or 1 are a header if they are so many."""
 
 
 @dataclass(frozen=True)
@@ -294,8 +289,6 @@ def _mark(line: str) -> str:
     """The sign between the cells of a line; empty where blanks stand there."""
     if len(line) > LONGEST_LINE:
         raise InputError(f"has a line of {len(line) >> 20} MB, too long for a frame")
-    if COMMAS.fullmatch(line):
-        return ""
     return next(filter(line.__contains__, MARKS), "")
 
 
@@ -323,12 +316,9 @@ def _header(text: _Text) -> _Header:
     """The names of a text's columns: in its first row, or in the comment above it.
 
     Raises:
-        InputError: two columns are named alike, or a name is a damaged number.
+        InputError: two columns are named alike.
     """
     header = _stated(text)
-    for name in header.names:
-        if HEX.fullmatch(name):
-            raise InputError(f"{name} is no decimal number; save it as one")
     require_unique(header.unique)
     if header.rows == len(text.rows):
         raise InputError(EMPTY)
@@ -345,11 +335,6 @@ def _stated(text: _Text) -> _Header:
     heading = _names(heading)
     if len(heading) == len(cells) and not _is_number(heading[0]):
         return _Header(heading, True, 0)
-    running = numbered("", len(cells))
-    is_count = cells in (running, ["0", *running[:-1]])
-    if is_count and len(cells) >= FEWEST_NAMES and len(text.rows) > 1:
-        form = "the first row, which counts the columns, is a header"
-        return _Header(cells, True, 1, (form,))
     return _without_names(text)
 
 

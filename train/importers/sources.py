@@ -4,6 +4,7 @@ before their columns are understood."""
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +12,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from edge.commands.output import counted
 from edge.config import short_text
 from edge.errors import InputError, about
 from edge.files import parsing
@@ -30,7 +30,6 @@ from train.importers.reading import (
     require_filled,
     suffix_of,
 )
-from train.progress import say
 
 LABELS = "labels.csv"
 SKIN = "skin.json"
@@ -122,9 +121,8 @@ def _labelled(
     trials = [source.name for source in sources if isinstance(source, Source)]
     rows = _label_rows(path, trials)
     files = {_name(file, path.parent) for file in _visible(path.parent)}
-    for row in rows:
-        if row not in trials and row not in files:
-            yield Refused(f"{path}: {row} names no file")
+    for row in sorted(rows.keys() - {*trials, *files}):
+        yield Refused(f"{path}: {row} names no file")
     for source in sources:
         if isinstance(source, Refused):
             yield source
@@ -157,20 +155,25 @@ def _sources(
     options: TableOptions,
 ) -> Iterator[Source | Refused]:
     """The trials of the file, or of the files or folders in the folder."""
+    read: Callable[[Path, Path, TableOptions], Iterator[Source | Refused]] = _of_file
     places = [path]
     if options.frames:
+        read = _of_frames
         places = [place for place in _visible(path) if place.is_dir()]
     elif path.is_dir():
         places = _files(_visible(path))
-    read = _of_frames if options.frames else _of_file
     counting = _counting([place.relative_to(folder) for place in places])
     for place in places:
-        labels, label = _label(place.relative_to(folder), counting, options.task)
-        for source in until_refused(read(place, folder, options), options.strict):
-            if isinstance(source, Refused) or source.label:
-                yield source
-            else:
-                yield replace(source, labels=labels, label=label)
+        named = partial(
+            _named_by, *_label(place.relative_to(folder), counting, options.task)
+        )
+        sources = until_refused(read(place, folder, options), options.strict)
+        yield from tried(sources, named, options.strict)
+
+
+def _named_by(labels: dict[str, str], label: str, source: Source) -> Source:
+    """A trial with the labels of its names, where nothing else tells one."""
+    return source if source.label else replace(source, labels=labels, label=label)
 
 
 def _visible(folder: Path) -> list[Path]:
@@ -183,20 +186,10 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
-    """The tables among paths; says how many files are none."""
-    tables = []
-    foreign = []
-    for path in paths:
-        if path.name in (LABELS, SKIN):
-            continue
-        if suffix_of(path) in SUFFIXES:
-            tables.append(path)
-        elif path.is_file():
-            foreign.append(path)
-    if tables and foreign:
-        count = counted(len(foreign), "file")
-        say(f"left out {count} of another format, such as {foreign[0]}")
-    return tables
+    """The tables among paths."""
+    return [
+        path for path in paths if path.name != LABELS and suffix_of(path) in SUFFIXES
+    ]
 
 
 def _counting(places: Sequence[Path]) -> set[str]:

@@ -303,11 +303,9 @@ class Log:
         if name is None:
             return next(iter(topics), None)
         if not (isinstance(name, str) and name in topics):
-            reasons = self._left_out.get(str(name))
-            why = f"; it {reasons[0]}" if reasons else ""
             raise InputError(
                 f"{self.path}: {kind}_topic in {self.path.stem}.json must be one of "
-                f"{sorted(self._topics[kind])}, not {short_text(name)}{why}"
+                f"{sorted(self._topics[kind])}, not {short_text(name)}"
             )
         return name
 

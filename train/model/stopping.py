@@ -288,26 +288,6 @@ class SequentialClassifier:
             )
         return stopping
 
-    def smallest_errors(
-        self,
-        X: Floats,
-        y: Mapping[str, Strings],
-        fold_choices: Sequence[Choices],
-        early: Early | None,
-    ) -> dict[str, float]:
-        """{task: the smallest error that would be certified with other settings}, with
-        the novelty of these.
-
-        Args:
-            X, y, fold_choices: as for `fit`.
-            early: settings of early decision points.
-        """
-        vectors = Vectors(X, y, self.features, self.widths)
-        run = self.without(fold_choices, early)
-        (answered,) = held_out(vectors, self._folds, [run], self.jobs)
-        certified = self._certified(answered)
-        return {task: certified[task].rules[0].error for task in certified}
-
     @property
     def products_(self) -> dict[str, dict[str, tuple[int, ...]]]:
         """{task: its factors} of the tasks decided together."""

@@ -17,13 +17,10 @@ class Workers:
 
     Attributes:
         jobs: number of processes.
-        cluster: name of the joblib backend to use in place of this machine's processes,
-            if any.
         progress: show progress bars on stderr.
     """
 
     jobs: int = 1
-    cluster: str | None = None
     progress: bool = True
 
     def __post_init__(self) -> None:
@@ -46,7 +43,6 @@ class Workers:
         # Memory maps would make arrays read-only files, which pays only for large ones.
         run = Parallel(
             n_jobs=self.jobs,
-            backend=self.cluster,
             return_as="generator",
             max_nbytes=None,
         )

@@ -3,13 +3,11 @@ report."""
 
 import tempfile
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 from edge.errors import InputError
-from train.cluster import on_cluster
 from train.data.dataset import DataSet, Measurement, load_trials
 from train.data.feature_sets import expand
 from train.progress import bar
@@ -81,7 +79,6 @@ def study(
     *,
     scene: str | None = None,
     jobs: int = 1,
-    address: str | None = None,
     seeds: int = 1,
 ) -> Path:
     """Run every analysis and write the report; its path.
@@ -92,17 +89,15 @@ def study(
         scene: the scene that the recordings were simulated from; without it, the
             paper's numbers are left out.
         jobs: processes on this machine.
-        address: address of a Dask scheduler that runs the sweeps instead.
         seeds: number of data sets of the scene, including these recordings, whose mean
             is compared with the paper's numbers.
 
     Raises:
-        InputError: the data set cannot be used, its trials are not of the scene, or
-            there is no scheduler.
+        InputError: the data set cannot be used, or its trials are not of the scene.
     """
     if seeds < 1:
         raise InputError(f"--seeds must be at least 1, not {seeds}")
-    workers = Workers(jobs, None if address is None else "dask")
+    workers = Workers(jobs)
     source = None if scene is None else scenes.load(scene)
     dataset = _studied(data)
     if source is not None:
@@ -114,8 +109,7 @@ def study(
             f"every trial has the same {' and the same '.join(constant)}: there is "
             "nothing to distinguish; give recordings of two classes or more"
         )
-    with nullcontext() if address is None else on_cluster(address):
-        sections = _analysed(context, seeds)
+    sections = _analysed(context, seeds)
     name = Path(data[0]).absolute().name if source is None else source.name
     title = f"The paper's analyses, repeated on {name}"
     return write(out, title, _lead(context, constant), sections)

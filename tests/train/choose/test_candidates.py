@@ -111,12 +111,6 @@ def test_of_things_drawn_from_kinds_only_what_carries_over_is_tried(joints, sets
     assert numbers == {"shrinkage": 0.3, "directions": {10}, "components": 10}
 
 
-def test_of_other_things_less_shrinkage_and_all_directions_are_tried():
-    numbers = numbers_of(candidates(TASKS))
-    assert numbers["shrinkage"] < 0.3
-    assert numbers["directions"] == {None}
-
-
 def test_the_fewest_weights_are_cheapest_whatever_the_shrinkage_and_k():
     choices = [
         Choice("IV", 3, 1, "lda", 0.1, ("a", "b")),

@@ -10,6 +10,7 @@ from edge.errors import InputError
 from train.choose.crossval import accuracies, neighbours, votes_right
 from train.model.pipeline import vote
 from train.model.projection import Projection, Spectrum, on_grid, principal_axes
+from train.threads import single_thread
 
 # The oracle warns where every trial has a label of its own.
 pytestmark = pytest.mark.filterwarnings("ignore:The number of unique classes")
@@ -27,6 +28,7 @@ def sklearn_table(X, y, scaling, components, ks):
         {"project__components": components, "knn__n_neighbors": ks},
         cv=LeaveOneOut(),
         scoring="accuracy",
+        refit=False,
     ).fit(X, y)
     # The search tries the values of the first name by the alphabet one after another.
     return search.cv_results_["mean_test_score"].reshape(len(ks), len(components)).T
@@ -42,14 +44,15 @@ def overlapping(n=24, seed=0):
     return X, y
 
 
-@pytest.mark.parametrize("scaling", ["none", "IV"])
-def test_the_table_is_that_of_grid_search(scaling):
-    X, y = overlapping(16)
+def test_the_table_is_that_of_grid_search():
+    X, y = overlapping(12)
     components = [1, 20]
-    ks = [1, 4, 9]
-    ours = accuracies(neighbours(X, scaling=scaling), y)
-    theirs = sklearn_table(X, y, scaling, components, ks)
-    assert ours.shape == (20, 15)
+    ks = [1, 4]
+    ours = accuracies(neighbours(X, scaling="IV"), y)
+    # Threads of OpenMP wait for each other where other processes are at work.
+    with single_thread():
+        theirs = sklearn_table(X, y, "IV", components, ks)
+    assert ours.shape == (20, 11)
     picked = ours[np.ix_([c - 1 for c in components], [k - 1 for k in ks])]
     assert np.abs(picked - theirs).max() < 1e-12
     assert len(np.unique(picked)) > 2
@@ -67,7 +70,7 @@ def test_votes_for_every_k_at_once_are_those_one_by_one():
             assert (right[i, :, k - 1] == (winners == truth[i])).all()
 
 
-@pytest.mark.parametrize(("distinct", "copies"), [(3, 3), (4, 30), (3, 41)])
+@pytest.mark.parametrize(("distinct", "copies"), [(3, 3), (3, 41)])
 def test_of_many_equal_distances_the_earlier_rows_are_taken(distinct, copies):
     """With 123 rows a matrix product rounds its last rows otherwise than the others."""
     n = distinct * copies
@@ -96,18 +99,13 @@ def test_too_few_trials_and_values_that_are_not_finite_are_named():
         neighbours(X)
 
 
-@pytest.mark.parametrize("scaling", ["I", "II", "IV"])
+@pytest.mark.parametrize("scaling", ["I", "IV"])
 def test_features_near_the_ends_of_float64_have_the_neighbours_of_others(scaling):
     X, _ = overlapping(20)
     near = neighbours(X, scaling=scaling, max_components=6)
     for power in (-990, 1010):  # the sum of a column would overflow
         far = np.ldexp(X, power - int(np.frexp(np.abs(X).max())[1]))
         assert (neighbours(far, scaling=scaling, max_components=6) == near).all()
-
-
-def test_features_that_spread_beyond_any_distance_are_refused():
-    with pytest.raises(InputError, match="store them in other units"):
-        neighbours(overlapping()[0] * 1e200)
 
 
 def subspace_gap(ours, exact):
@@ -127,7 +125,7 @@ def rows_of(shape, values, rng):
 
 
 @pytest.mark.parametrize("shape", [(60, 24), (24, 60)])
-@pytest.mark.parametrize("decades", [2, 3.9, 8, 15])
+@pytest.mark.parametrize("decades", [3.9, 15])
 def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     """Below 1e-4 of the largest singular value the covariance is not trusted any
     more."""
@@ -140,7 +138,7 @@ def test_leading_axes_are_those_of_the_full_decomposition(shape, decades):
     assert np.abs(ours @ ours.T - np.eye(len(ours))).max() < 1e-7
 
 
-@pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (0.02, 0.005), (2e-4, 0.5)])
+@pytest.mark.parametrize(("share", "gap"), [(0.5, 2e-4), (2e-4, 0.5)])
 @pytest.mark.parametrize("shape", [(60, 120), (120, 60)])
 def test_leading_axes_give_the_coordinates_of_a_projection_to_the_bit(
     shape,

@@ -97,7 +97,7 @@ def test_sets_and_features_expand_to_features_in_their_order_each_once():
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if "kernels" not in name])
-@pytest.mark.parametrize("samples", [2, 10, 40])
+@pytest.mark.parametrize("samples", [2, 40])
 def test_a_vector_has_the_widths_that_are_told(name, samples):
     features = SETS[name]
     frames = touch(PEAKS, joints=np.zeros((5, 3)))
@@ -143,9 +143,7 @@ def test_the_transform_next_to_the_name_is_the_first():
 
 
 def test_a_square_root_keeps_the_sign():
-    frames = [
-        pressed(SKIN, t, {(0, 2): 50, (1, 1): 50, (2, 0): 50}) for t in (0.0, 1.0)
-    ]
+    frames = [pressed(SKIN, t, {(0, 2): 50, (1, 1): 50, (2, 0): 50}) for t in (0, 1)]
     slant = vector_of(frames, "skin_slant")
     assert (slant < 0.0).all()
     assert vector_of(frames, "sqrt_skin_slant") == pytest.approx(-np.sqrt(-slant))
@@ -251,7 +249,6 @@ def test_angles_that_lack_are_interpolated_and_flagged():
     [
         (0.0, 3, "has 2 joint angles, the features were measured with 3"),
         (np.inf, 2, "angle 1 of a frame's joints is not finite"),
-        (np.nan, 2, "angle 1 of a frame's joints is not finite"),
     ],
 )
 def test_angles_that_do_not_suit_are_one_sentence(angle, joints, sentence):

@@ -33,11 +33,3 @@ def test_biases_are_quantiles_of_the_results_of_training(biases):
     shares = np.arange(1, biases + 1) * (np.sqrt(5) + 1) / 2 % 1
     assert ((of_bias < limits).mean(axis=1) <= shares).all()
     assert (shares < (of_bias <= limits).mean(axis=1)).all()
-
-
-def test_the_same_touches_give_the_same_table():
-    assert kernel_table(TOUCHES, 504, alike=True) == kernel_table(
-        TOUCHES,
-        504,
-        alike=True,
-    )

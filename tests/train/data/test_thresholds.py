@@ -100,19 +100,8 @@ def test_a_proposal_that_misses_touches_is_as_high_as_the_noise(make_touch):
     assert proposed(strong).threshold == 80
 
 
-def test_the_first_frame_alone_is_quiet_where_frames_come_ten_times_a_second(
-    make_touch,
-):
-    touch = make_touch(seed=0, lead_s=0.0)
-    slow = replace(touch, t=np.arange(len(touch.t)) * 0.1)
-    slow.frames[0] = 3
-    proposal = proposed([replace(slow, meta={"skin": slow.meta["skin"]})])
-    assert proposal.threshold == 6
-    assert proposal.onset == 9
-
-
 def saved(folder, make_touch, **skin):
-    for seed in range(20):
+    for seed in range(12):
         touch = make_touch(kind=("hard", "soft")[seed % 2], seed=seed)
         save(
             folder / f"{seed:02}.npz", weaker(touch, 0.3 if seed % 3 else 0.08, **skin)
@@ -127,9 +116,6 @@ def test_lower_thresholds_are_taken_where_they_decide_better(make_touch, tmp_pat
     assert fitted.dataset.layout.threshold_counts < 150
     assert "recordings show no contact; in cross-validation" in fitted.notes[0]
     assert not fitted.dataset.untouched
-    held = train.fit(data, **GIVEN, threshold=150)
-    assert held.dataset.layout.threshold_counts == 150
-    assert held.dataset.untouched
 
 
 def test_a_skin_saved_without_thresholds_gets_those_of_its_noise(make_touch, tmp_path):
@@ -144,5 +130,5 @@ def test_an_export_without_a_contact_at_the_saved_thresholds_proposes_others(
 ):
     folder = saved(tmp_path, make_touch, threshold_counts=39619, onset_counts=59000)
     fitted = train.fit(folder, **GIVEN)
-    assert len(fitted.dataset.trials) == 20
+    assert len(fitted.dataset.trials) == 12
     assert any("no recording has a contact at its own" in note for note in fitted.notes)

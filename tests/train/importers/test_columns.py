@@ -38,14 +38,7 @@ def test_taxels_with_a_row_and_a_column_tell_the_shape(form):
     assert sense.taxels[:3] == [form.format(0, col) for col in range(3)]
 
 
-def test_numbers_of_taxels_may_stand_in_brackets():
-    names = [f"tactile[{i}]" for i in (10, *range(10))]
-    assert sense_of(table(*names), rate=10).taxels == [*names[1:], names[0]]
-
-
-@pytest.mark.parametrize(
-    "name", ["label", "object_id", "slipped", "temperature", "frame", "sample", ""]
-)
+@pytest.mark.parametrize("name", ["label", "frame", ""])
 def test_any_further_column_is_left_out_and_named(name):
     sense = sense_of(table("p1", "p2", name), rate=10)
     assert sense.taxels == ["p1", "p2"]
@@ -56,7 +49,6 @@ def test_any_further_column_is_left_out_and_named(name):
     ("names", "sentence"),
     [
         (("thumb", "index"), "no columns are named as taxels"),
-        (("s1", "s3"), "no columns are named as taxels"),
         (("p1", "p2", "f1", "f2"), 'are the taxels "p1" to "p2" or "f1" to "f2"'),
         (("taxel_1", "taxel_2", "tactile1", "tactile2"), 'are the taxels "taxel_1"'),
     ],
@@ -80,7 +72,6 @@ def test_columns_that_are_called_taxels_are_taken_beside_other_running_numbers(n
         ("b,a", ["b", "a"]),
         ("a-c", ["a", "b", "c"]),
         ("2-3", ["b", "c"]),
-        ("d", ["d"]),
         ("q", ["q.1", "q.2"]),
         ("hand.skin", ["hand.skin.1", "hand.skin.2"]),
     ],
@@ -93,9 +84,7 @@ def test_columns_are_named_by_names_ranges_and_places(terms, names):
 @pytest.mark.parametrize(
     ("wishes", "sentence"),
     [
-        ({"taxels": "5-9"}, "has no column 5-9"),
         ({"taxels": "s3"}, r"a.csv: has no column s3; it has \['s1', 's2'\]"),
-        ({"taxels": "s2-s1"}, "has no column s2-s1"),
         ({"taxels": "s1,s1"}, "named twice"),
         ({"taxels": "s1-s2", "joints": "s2"}, "both as a taxel and as time or joint"),
         ({"joints": "s1,s2"}, "no column is left for taxels"),
@@ -119,10 +108,8 @@ def test_a_rate_beside_a_time_is_refused_and_neither_too():
     [
         ("t", 0.01, "s"),
         ("t", 10.0, "ms"),
-        ("t", 1e4, "us"),
         ("t", 1e7, "ns"),
         ("time_ms", 0.5, "ms"),
-        ("Time [s]", 2.0, "s"),
         ("timestamp (us)", 1.0, "us"),
     ],
 )
@@ -134,9 +121,7 @@ def test_the_unit_of_times_comes_from_their_name_or_their_steps(name, step, unit
     assert times == pytest.approx(COUNTS * step * seconds)
 
 
-@pytest.mark.parametrize(
-    ("start", "unit"), [(1.7e9, "s"), (1.7e12, "ms"), (1.7e15, "us"), (1.7e18, "ns")]
-)
+@pytest.mark.parametrize(("start", "unit"), [(1.7e9, "s"), (1.7e18, "ns")])
 def test_times_since_1970_tell_their_unit(start, unit):
     assert sense_of(table("s1", t=start + COUNTS * 1e6)).unit == unit
 
@@ -151,7 +136,7 @@ def test_iso_dates_are_times_whatever_their_column_is_called():
 
 @pytest.mark.parametrize(
     ("step", "units"),
-    [(0.5, "s or ms"), (1, "s or ms"), (2.5e3, "ms or us"), (1e6, "us or ns")],
+    [(1, "s or ms"), (2.5e3, "ms or us")],
 )
 def test_steps_that_may_be_in_either_of_two_units_are_asked_for(step, units):
     with pytest.raises(InputError, match=f"give --time-unit {units}"):

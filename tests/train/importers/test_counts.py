@@ -54,18 +54,15 @@ def test_values_that_rise_where_they_should_fall_are_said(capsys):
     assert sentence in capsys.readouterr().out
 
 
-def test_missing_values_are_counted_and_said(capsys):
-    rest_of([trial([1, NAN], [NAN, 2]), trial([1, NAN])], ValueOptions())
-    assert "missing: 3 values" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("kind", ["falls", "signed"])
 def test_a_start_with_a_missing_value_is_not_the_quietest(kind, capsys):
     incomplete = trial([100, NAN], [100, 90], [100, 90])
     complete = trial([90, 80], [90, 80], [90, 80])
     rest = rest_of([incomplete, complete], ValueOptions(**{kind: True}))
     assert rest.values.tolist() == [[90], [80]]
-    assert "at rest, which is never" not in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "missing: 1 value" in output
+    assert "at rest, which is never" not in output
 
 
 def test_taxels_without_a_value_at_rest_are_said(capsys):
@@ -100,7 +97,7 @@ def test_shear_stands_where_the_normal_does(sheared):
     assert counted.shear[3].tolist() == [[[5, -10]]]
 
 
-@pytest.mark.parametrize("unknown", [NAN, np.inf, -np.inf])
+@pytest.mark.parametrize("unknown", [NAN, np.inf])
 def test_a_taxel_without_one_of_its_axes_is_not_valid(unknown):
     shear = np.arange(1.0, 7.0).reshape(1, 3, 2)
     shear[0, 1, 0] = unknown
@@ -115,14 +112,6 @@ def test_a_taxel_without_a_value_at_rest_is_never_valid():
     counted = recorded(rest, trial([3, 4], [5, 6]))
     assert counted.valid[:, 0].tolist() == 2 * [[True, False]]
     assert counted.frames[:, 0].tolist() == [[2, 0], [4, 0]]
-
-
-def test_a_taxel_without_a_shear_at_rest_is_never_valid():
-    shear = np.full((4, 2, 2), 5.0)
-    shear[0, 1, 0] = NAN
-    counted = signed(trial([1, 1], [1, 1], [1, 1], [2, 2], shear=shear))
-    assert counted.valid[:, 0].tolist() == 4 * [[True, False]]
-    assert not counted.shear.any()
 
 
 def test_values_that_are_all_missing_at_rest_have_no_scale():
@@ -140,12 +129,6 @@ def test_what_is_no_count_is_refused(values, hint):
         recorded(Rest(), trial(values))
 
 
-def test_a_long_recording_is_counted_in_parts(monkeypatch):
-    monkeypatch.setattr("train.importers.counts.PART", 2)
-    counted = recorded(Rest(), trial([1], [2], [3], [4], [5]))
-    assert counted.frames.ravel().tolist() == [1, 2, 3, 4, 5]
-
-
 def test_values_cannot_fall_and_be_signed():
     with pytest.raises(InputError, match="exclude each other"):
         rest_of([trial([1])], ValueOptions(falls=True, signed=True))
@@ -155,7 +138,7 @@ def test_a_shape_is_rows_and_columns():
     assert shape_of_skin("16x24") == (16, 24)
 
 
-@pytest.mark.parametrize("text", ["16", "x", "axb", "16x", f"{'1' * 5000}x2", "²x2"])
+@pytest.mark.parametrize("text", ["16", "axb", f"{'1' * 5000}x2", "²x2"])
 def test_another_text_is_no_shape(text):
     with pytest.raises(argparse.ArgumentTypeError, match="must be ROWSxCOLS"):
         shape_of_skin(text)

@@ -71,14 +71,6 @@ def a_long_table_of_values(folder):
     (folder / "all.csv").write_text(text(rows[::-1], ";", "trial;object;t;taxel;value"))
 
 
-def a_long_table_of_frames(folder):
-    rows = [("3", "cup", *row) for row in WIDE]
-    (folder / "all.tsv").write_text(
-        text(rows, "\t", "trial\tobject\tseconds\ta\tb\tc\td\te\tf")
-    )
-    return ["--taxels", "a-f"]
-
-
 def put(folder, files):
     """Write files by their names; the folder, or the long table in it."""
     for name, content in files.items():
@@ -105,7 +97,6 @@ def imported(folder, *words):
         an_array,
         a_matlab_file,
         a_long_table_of_values,
-        a_long_table_of_frames,
         a_file_for_each_frame,
         a_numbered_file_for_each_frame,
     ],
@@ -179,7 +170,6 @@ RATE = ("--rate", "1")
             RATE,
             "1.npy: holds no values; leave it out or save it again",
         ),
-        ({"1.npy": b"hello"}, RATE, "1.npy: not a table: "),
         (
             {"1.txt": "1 2\n"},
             (*RATE, "--shape", "2x2"),
@@ -188,7 +178,7 @@ RATE = ("--rate", "1")
         (
             {"1.txt": "1 2\n", "2.txt": "1 2 3\n"},
             (*RATE, "--strict"),
-            "2.txt: has 3 taxels, and ",
+            "2.txt: its taxels are ['1', '2', '3'], and those of ",
         ),
         (
             {"all.csv": "trial,t,p1\na,0,1\na,1,2\n"},
@@ -218,24 +208,9 @@ RATE = ("--rate", "1")
             "0.npy: not a frame: could not convert string to float",
         ),
         (
-            {"1.txt": "1 2\n", "skin.json": '{"rows": "x"}'},
-            RATE,
-            "skin.json: rows must be a whole",
-        ),
-        (
             {"1.txt": "1 2\n", "labels.csv": "trial,who\n2,me\n"},
             RATE,
             "labels.csv: needs a column trial with names such as ['1']",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "object,who\n1,me\n"},
-            RATE,
-            "labels.csv: needs a col",
-        ),
-        (
-            {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n,cup\n"},
-            RATE,
-            "labels.csv: line 3 has no trial; enter it",
         ),
         (
             {"1.txt": "1 2\n", "labels.csv": "trial,object\n1,box\n1,cup\n"},
@@ -260,7 +235,7 @@ def test_what_cannot_be_used_is_one_sentence(files, words, sentence, folder, ref
     assert sentence in refusal("import", "csv", path, "--out", out, *words)
 
 
-TABLES = int(os.environ.get("TABLES", "30"))
+TABLES = int(os.environ.get("TABLES", "20"))
 """Generated tables; TABLES=2000 tries as many."""
 STEP_S = 0.02
 
@@ -317,8 +292,6 @@ TRIAL = "t,p1\n0,1\n0.1,2\n"
     "name",
     [
         "{}/trial_1/x.csv",
-        "{}/1/x.csv",
-        "{}/x_1.csv",
         "{}_1.csv",
         "{}/exp3/day_2/x.csv",
         "{}/2024-03-01/x.csv",
@@ -346,17 +319,13 @@ def test_files_that_are_only_numbered_have_no_label(folder, capsys):
     assert "label: none, as the files' names only count" in capsys.readouterr().out
 
 
-def test_hidden_files_are_not_read_and_other_formats_are_said(folder, capsys):
+def test_hidden_files_and_other_formats_are_not_read(folder):
     hidden = {"._cup_1.csv": b"\0", ".cache/cup_2.csv": TRIAL}
     foreign = {"cup_3.xlsx": b"PK", "skin.json": "{}"}
     put(folder, {"cup_1.csv": TRIAL} | hidden | foreign)
     status, recordings = imported(folder)
     assert status == 0
     assert list(recordings) == ["cup_1"]
-    output = capsys.readouterr().out
-    assert (
-        f"left out 1 file of another format, such as {folder / 'cup_3.xlsx'}" in output
-    )
 
 
 def test_the_columns_are_those_of_most_files(folder, capsys):
@@ -401,16 +370,6 @@ def test_a_column_that_stays_the_same_in_all_trials_is_a_taxel(folder):
     assert recordings["1"].frames.shape == (8, 1, 2)
 
 
-def test_a_bad_file_is_named_and_stops_none_of_the_others(folder, capsys):
-    bad = {"pen_1.csv": "t,p1\n0,1\n0.1,x\n"}
-    put(folder, {f"cup_{i}.csv": f"t,p1\n0,1\n0.1,{i}\n" for i in range(3)} | bad)
-    status, recordings = imported(folder)
-    err = capsys.readouterr().err
-    assert status == 1
-    assert sorted(recordings) == ["cup_0", "cup_1", "cup_2"]
-    assert "pen_1.csv: 'x' in column p1 is no number" in err
-
-
 def test_of_two_trials_of_one_name_the_first_is_imported(folder, capsys):
     put(folder, {"cup_1.csv": TRIAL, "cup_1.txt": TRIAL, "cup_2.csv": TRIAL})
     status, recordings = imported(folder)
@@ -435,16 +394,13 @@ def test_a_row_of_a_file_that_is_not_imported_is_no_slip(folder, capsys):
     files = {"r0.csv": TRIAL, "r1.csv": b"\0", "r2.csv": "t,p1\n0,x\n"}
     labels = "trial,object\nr0,box\nr1,cup\nr2,cup\n"
     put(folder, files | {"labels.csv": labels})
-    imported(folder)
-    assert "names no file" not in capsys.readouterr().err
+    _, recordings = imported(folder)
+    assert list(recordings) == ["r0"]
+    error = capsys.readouterr().err
+    assert "r1.csv: not a table: it is not text" in error
+    assert "names no file" not in error
     out = str(folder.parent / "one")
     assert main(["import", "csv", str(folder / "r0.csv"), "--out", out]) == 0
-
-
-def test_trials_with_the_same_frames_are_named(folder, capsys):
-    put(folder, {"cup_1.csv": TRIAL, "cup_2.csv": TRIAL})
-    imported(folder)
-    assert "2 trials have the frames of others" in capsys.readouterr().out
 
 
 def test_numbers_of_columns_count_in_the_file_as_it_stands(folder):
@@ -461,13 +417,12 @@ def test_a_number_among_words_is_a_label_where_it_stays_the_same(folder):
     assert recordings["cup"].labels == {"kind": "cup"}
 
 
-@pytest.mark.parametrize("kind", ["object", "category"])
-def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder, kind):
+def test_numbers_that_a_parquet_file_holds_as_texts_are_labels(folder):
     pytest.importorskip("pyarrow")
     rows = [("a", "1", t, t) for t in (0, 10)]
     rows += [("b", None, t, t) for t in (0, 10)]
     table = pd.DataFrame(rows, columns=["trial", "softness", "t", "p1"])
-    table.astype({"softness": kind}).to_parquet(folder / "all.parquet")
+    table.astype({"softness": "category"}).to_parquet(folder / "all.parquet")
     _, recordings = imported(folder)
     assert recordings["a"].labels == {"softness": "1"}
     assert recordings["b"].labels == {}
@@ -514,20 +469,12 @@ def test_dates_that_run_within_a_trial_are_its_times(folder):
             "the taxels need times in common",
         ),
         (
-            text([("a", 1, 1)], head="trial,taxel,value"),
-            "needs the columns value and a time beside taxel",
-        ),
-        (
             text([("a", 1, 2, 1, 1)], head="trial,frame,step,taxel,value"),
             "needs the columns value and a time beside taxel, which --time names",
         ),
         (
             text([("a", "box", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
             "trial a: object changes, from 'box' to 'cup'",
-        ),
-        (
-            text([("a", "", 0, 1), ("a", "cup", 1, 1)], head="trial,object,t,p1"),
-            "trial a: object changes, from '' to 'cup'",
         ),
         (
             text([("a", 0, 1), ("", 1, 1), ("", 2, 1)], head="trial,t,p1"),
@@ -549,14 +496,6 @@ def test_a_long_table_that_contradicts_itself_is_refused(
     path.write_text(table)
     assert sentence in refusal("import", "csv", path, "--out", folder.parent / "out")
     assert not (folder.parent / "out").exists()
-
-
-def test_a_trial_whose_label_is_empty_has_none(folder):
-    rows = [("a", "", 0, 1), ("a", "", 1, 2), ("b", "cup", 0, 1), ("b", "cup", 1, 3)]
-    put(folder, {"all.csv": text(rows, head="trial,object,t,p1")})
-    _, recordings = imported(folder, "--time-unit", "s")
-    assert recordings["a"].labels == {}
-    assert recordings["b"].labels == {"object": "cup"}
 
 
 def test_labels_and_the_names_of_trials_stand_as_they_are(folder):

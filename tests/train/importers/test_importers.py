@@ -103,7 +103,6 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
     ("content", "word"),
     [
         (b"BZh9 no bzip2", "Invalid data stream"),
-        (dsa()[:-20], "unclosed token"),
         ('<!DOCTYPE x [<!ENTITY a "b">]>' + dsa(), "declares a document type"),
         (dsa(frames=[], stamps=()), "has no frame"),
         (dsa(pads=(0, 1, 2)), "lacks matrix 1 or 5"),
@@ -114,9 +113,7 @@ def test_joint_angles_are_interpolated_in_radians_and_unknown_far_from_them(tmp_
         (dsa().replace("C3F30000", "hello"), "non-hexadecimal number"),
         (dsa().replace('index="0"', f'index="{"1" * 5000}"'), "limit (4300 digits)"),
         (dsa().replace("<time_stamp>1032</time_stamp>", ""), "time_stamp must be"),
-        (dsa(stamps=(1000, 1032, 1032)), "its time stands still at frame"),
         (dsa(angles=[(0, [1.0] * 6)]), "does not hold 7"),
-        (dsa(angles=[(0, ["x"] * 7)]), "could not convert string to float"),
         (dsa(angles=[(40, [0.0] * 7), (0, [0.0] * 7)]), "goes back"),
     ],
 )

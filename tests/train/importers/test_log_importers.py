@@ -228,8 +228,7 @@ def differences(recording, *, with_joints=True):
     return [name for name, equal in same.items() if not equal]
 
 
-@pytest.mark.parametrize("version", [1, 2])
-@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize(("version", "big"), [(1, False), (2, True)])
 def test_a_bag_of_images_with_joint_states(bag, imported, version, big):
     name = "grasp.bag" if version == 1 else "grasp"
     topics = skin(version=version, big=big), joints(version=version)
@@ -251,14 +250,13 @@ def publishers():
 @pytest.mark.parametrize(
     ("states", "warning"),
     [
-        (joints(NAMES[::-1], [4, 3, 2, 1, 0]), ""),
         (
-            joints(("wheel_left", *NAMES, "finger"), [0, 0, 1, 2, 3, 4, 1]),
+            joints(("wheel_left", *NAMES[::-1], "finger"), [0, 4, 3, 2, 1, 0, 1]),
             "/joint_states: joints outside the arm: wheel_left, finger\n",
         ),
         (publishers(), ""),
     ],
-    ids=["backwards", "among others", "of two publishers"],
+    ids=["backwards among others", "of two publishers"],
 )
 def test_angles_are_told_apart_by_the_names_of_their_joints(
     bag,
@@ -305,17 +303,10 @@ def test_arrays_take_the_shape_from_the_layout_or_from_beside(
     assert differences(recording, with_joints=False) == []
 
 
-@pytest.mark.parametrize(
-    ("kind", "scale", "options"),
-    [
-        ("Float32", np.float32(0.25), ("--scale", 4)),
-        ("Int16", np.int16(1), ()),
-    ],
-)
-def test_arrays_of_every_kind_are_frames(bag, imported, kind, scale, options):
+def test_arrays_of_floats_are_scaled_into_frames(bag, imported):
     counts = (FRAMES % 200).astype(np.uint8)
-    frames = [array(frame * scale, kind=kind) for frame in counts]
-    recording = imported(bag(skin(frames)), *SHAPE, *options)
+    frames = [array(frame * np.float32(0.25), kind="Float32") for frame in counts]
+    recording = imported(bag(skin(frames)), *SHAPE, "--scale", 4)
     assert np.array_equal(recording.frames, counts)
 
 
@@ -386,12 +377,11 @@ def test_a_sensors_own_message_is_read_by_the_definition_in_the_log(
     assert recording.shear is None
 
 
-@pytest.mark.parametrize("letters", ["xyz", "XYZ"])
-def test_axes_may_be_letters_at_the_end_of_fields(tmp_path, letters):
+def test_axes_may_be_letters_at_the_end_of_fields(tmp_path):
     axes = Axes.of("xyz", None)
     options = LogOptions(field="taxels.f", axes=axes, shape=(1, 1))
     log = Log(tmp_path / "grasp", None, options)
-    values = dict(zip([f"f{letter}" for letter in letters], (1, 2, 3), strict=True))
+    values = dict(zip(("fx", "fy", "fz"), (1, 2, 3), strict=True))
     message = SimpleNamespace(taxels=[SimpleNamespace(**values)])
     log.add("/hub", "maker/msg/State", message, 0.0)
     recording = log.recording()
@@ -423,8 +413,6 @@ TWO = (skin(topic="/left"), skin(topic="/right"))
         (TWO, {}, (), 'are on /left, /right; name one of them as "frames_topic"'),
         (TWO, {"frames_topic": {}}, (), "must be one of ['/left', '/right']"),
         ([skin()], [], (), "grasp.json: the file must be a table, not []"),
-        ([skin()], {"skin": [1]}, (), "grasp.json: skin must be a table, not [1]"),
-        ([skin()], {"arm": 5}, (), "grasp.json: arm must be a table, not 5"),
         ([camera()], {}, (), "no frames: /camera is rgb8; frames are mono16"),
         ([joints()], {}, (), "holds no frames; they must be sensor_msgs/msg/Image"),
         (

