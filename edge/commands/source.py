@@ -218,13 +218,16 @@ def reading(
         InputError: the options cannot be used.
         EdgeError: the skin cannot be read.
     """
-    dof = None if arm is None else arm.dof
-    if model is not None and arm is None:
+    names = None
+    dof = None
+    if arm is None and model is not None:
         arm = model.info.chain
         dof = model.info.dof
+    if arm is not None:
+        names = arm.names
+        dof = arm.dof
     if arguments.fake is not None:
         arguments.real_time |= real_time or arguments.web is not None
-    names = None if arm is None else arm.names
     played_names = names if arguments.joints is None else None
     with ExitStack() as stack:
         opening = open_skin(arguments, model=model, joint_names=played_names)

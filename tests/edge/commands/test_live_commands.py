@@ -122,7 +122,8 @@ def bare(make_touch, tmp_path):
 def test_run_flags_a_decision_whose_joints_never_came(run, bare, options, flag):
     status, events, _ = run("--fake", bare, *options)
     assert status == 0
-    assert [flags[0] for flags in decided(events, "flags")] == [flag] * 2
+    # A busy machine may miss frames of what is played in real time, which is flagged too.
+    assert [flag in flags for flags in decided(events, "flags")] == [True] * 2
 
 
 def test_run_takes_joints_from_stdin(exported, recordings):
