@@ -294,6 +294,6 @@ if __name__ == "__main__":
     start(
         measure,
         __doc__,
-        ("--sets", 140, "data sets drawn"),
+        ("--sets", 70, "data sets drawn"),
         ("--exports", 4, "further data sets, exported in full"),
     )
