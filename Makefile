@@ -332,7 +332,7 @@ demo-data: $(READY)
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/known
 	$(BIN)/python -m train simulate train/scenes/demo.toml --out $(DEMODATA)/unseen --seed 2012 --trials 1
 	$(BIN)/python -m export --data $(DEMODATA)/known --out $(DEMODATA) --decision-points 1.2 \
-		--features paper --samples 20 --projection pca --tasks category mobility object --name demo
+		--features paper --projection pca --tasks category mobility object --name demo
 	PYTHONPATH=. $(BIN)/python tests/board/demo_data.py $(DEMODATA)
 
 HARD := $(OUT)/hard-cases

@@ -95,7 +95,7 @@ def test_any_value_can_be_asked_for_by_name(graph):
     z = product.inputs[0]
     model = onnx.load(demo.MODEL)
     assert z in {name for node in model.graph.node for name in node.output}
-    [coordinates] = graph.run([z], {"features": np.zeros((3, 60))})
+    [coordinates] = graph.run([z], {"features": np.zeros((3, 120))})
     assert coordinates.shape[0] == 3
     np.testing.assert_array_equal(coordinates, np.rint(coordinates))
 
