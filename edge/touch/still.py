@@ -91,15 +91,17 @@ class StillTaxels:
             self.early = []
             return [now]
         beside = active_taxels(frame, self._layout, self.aside)
-        began = age_s <= EARLY_S
-        grows = began and bool(self.early) and _grown(active, beside)
-        if self.touched or grows:
-            early = self.early if began else []
+        if self.touched or self._grows(active, beside, age_s):
+            early = self.early if age_s <= EARLY_S else []
             self.early = []
             return [*early, now]
         if age_s == 0.0 or (self.early and age_s <= self._longest_s):
             self.early.append(View(frame, active, late=True))
         return [View(frame, beside)]
+
+    def _grows(self, active: ActiveTaxels, beside: ActiveTaxels, age_s: float) -> bool:
+        """Whether what was set aside in the first frame soon grows."""
+        return age_s <= EARLY_S and bool(self.early) and _grown(active, beside)
 
     def _watch(self, frame: Frame, active: ActiveTaxels) -> None:
         """Set taxels aside or take them back, by a frame and its active taxels."""

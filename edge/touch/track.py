@@ -132,7 +132,10 @@ class ContactTracker:
                 contacts.append(contact)
                 self._follow(contact, frame, active, region)
         self.contacts = [contact for contact in contacts if not contact.ended]
-        # Those that have lasted long enough to count.
+        return self._confirmed(contacts)
+
+    def _confirmed(self, contacts: Sequence[Contact]) -> list[Contact]:
+        """The contacts that have lasted long enough to count."""
         return [contact for contact in contacts if contact.frames >= self._debounce]
 
     def _regions(
