@@ -26,6 +26,8 @@ MOST_COUNTS = 65535
 MOST_SHEAR = 32767
 DECIMALS = 6
 """Most decimals that signed values keep."""
+PART = 1 << 16
+"""Frames that are converted at a time."""
 
 
 @dataclass(frozen=True)
@@ -150,24 +152,34 @@ class Rest:
         axes = trial.values.shape[2]
         if axes == 3:
             skin["axes"] = axes
-        counts = self._counts(trial, valid).reshape(-1, *shape, axes)
+        # A part at a time, as a long recording would else fill the memory several
+        # times.
+        frames = np.empty((len(valid), *shape), np.uint16)
+        shear = np.empty((*frames.shape, 2), np.int16) if axes == 3 else None
+        for at in range(0, len(valid), PART):
+            part = slice(at, at + PART)
+            counts = self._counts(trial, valid, part).reshape(-1, *shape, axes)
+            frames[part] = counts[..., 0]
+            if shear is not None:
+                shear[part] = counts[..., 1:]
         return Recording(
             t=trial.t - trial.t[0],
-            frames=counts[..., 0].astype(np.uint16),
+            frames=frames,
             joints=trial.joints,
             valid=None if valid.all() else valid.reshape(-1, *shape),
             meta={**meta, "skin": skin, **values},
-            shear=counts[..., 1:].astype(np.int16) if axes == 3 else None,
+            shear=shear,
         )
 
     def _counts(
         self,
         trial: Samples,
         valid: NDArray[np.bool_],
+        rows: slice,
     ) -> NDArray[np.int32]:
-        """Whole counts (n, taxels, axes); 0 where not valid."""
+        """Whole counts (rows, taxels, axes) of some frames; 0 where not valid."""
         at_rest = 0.0 if self.values is None else self.values
-        moved = np.where(valid[..., None], trial.values - at_rest, 0.0)
+        moved = np.where(valid[rows, :, None], trial.values[rows] - at_rest, 0.0)
         counts = moved * self.scale
         if self.values is not None:
             normal = counts[..., 0]
