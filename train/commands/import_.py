@@ -6,8 +6,11 @@ format, see train/importers/__init__.py.
 """
 
 import argparse
+import logging
 import os
+import re
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 from importlib import import_module
@@ -25,6 +28,7 @@ from train.data.thresholds import count_felt, proposed
 from train.importers import Refused, Trial, names
 from train.progress import bar, say
 
+LOG = logging.getLogger(__name__)
 ZERO_FRAMES = 3
 
 
@@ -68,7 +72,37 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.file = arguments.file.resolve()
     importer = arguments.importer
     options = (arguments,) if hasattr(importer, "add_options") else ()
-    return write(importer.trials(arguments.file, arm, *options), arm, arguments)
+    first = FirstOfEachKind()
+    handlers = logging.getLogger("edge").handlers
+    for handler in handlers:
+        handler.addFilter(first)
+    try:
+        return write(importer.trials(arguments.file, arm, *options), arm, arguments)
+    finally:
+        for handler in handlers:
+            handler.removeFilter(first)
+        if first.withheld:
+            LOG.warning(f"{first.withheld} more warnings like these")
+
+
+class FirstOfEachKind(logging.Filter):
+    """Lets the first through of the warnings that differ in names and numbers alone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._kinds: Counter[str] = Counter()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether no warning of its kind came before."""
+        without_name = record.getMessage().rpartition(": ")[2]
+        kind = re.sub(r"[\d.e+-]*\d", "#", without_name)
+        self._kinds[kind] += 1
+        return self._kinds[kind] == 1
+
+    @property
+    def withheld(self) -> int:
+        """Number of warnings that were not let through."""
+        return self._kinds.total() - len(self._kinds)
 
 
 def write(

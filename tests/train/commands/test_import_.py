@@ -54,3 +54,16 @@ def test_data_without_thresholds_get_those_of_their_noise(make_touch, tmp_path, 
     assert main([*words, str(tmp_path / "own")]) == 0
     assert "noise" not in capsys.readouterr().out
     assert load(tmp_path / "own" / "trial0.npz").layout.threshold_counts == 90
+
+
+def test_warnings_that_are_alike_are_counted(make_touch, tmp_path, capsys):
+    for name in "abc":
+        touch = make_touch(seconds=0.05, lead_s=0.0, arm=False)
+        write_frames(tmp_path / "csv" / name, touch.t, touch.frames + 500)
+    (tmp_path / "csv" / "skin.json").write_text('{"threshold_counts": 90}')
+    out = tmp_path / "out"
+    main(["import", "csv", str(tmp_path / "csv"), "--frames", "--out", str(out)])
+    lines = capsys.readouterr().err.splitlines()
+    (warning,) = [line for line in lines if "its first frame is above" in line]
+    assert warning.startswith(f"train: {out / 'a.npz'}: ")
+    assert "train: 2 more warnings like these" in lines
