@@ -224,6 +224,6 @@ def _of_unseen(settings: Settings, options: FitOptions) -> list[str]:
     if options.quick or left_out == {TRIAL}:
         return []
     return [
-        "the settings are chosen for objects never met; `--leave-out trial` chooses "
+        "the settings are chosen for unseen objects; `--leave-out trial` chooses "
         "them for the recorded ones"
     ]

@@ -109,7 +109,7 @@ def open_skin(
             skin.touch_counts = min(skin.touch_counts, threshold_counts)
         for status in skin.status():
             if status.error:
-                LOG.warning(f"{status.error}; left out for now")
+                LOG.warning(f"{status.error}; skipped for now")
         yield opened
 
 

@@ -110,7 +110,7 @@ def _aside(line: Line) -> str:
         return _at(line["t"], "all taxels are followed again")
     places = ", ".join(f"({row}, {col})" for row, col in taxels[:MOST_PLACES])
     more = " ..." if len(taxels) > MOST_PLACES else ""
-    return _at(line["t"], f"set aside as still: taxels {places}{more}")
+    return _at(line["t"], f"ignored as still: taxels {places}{more}")
 
 
 def _end(line: Line) -> str:

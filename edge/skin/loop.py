@@ -78,7 +78,7 @@ class Stop:
 class Schedule:
     """Ticks at start + k * period: a late tick does not move the next ones.
 
-    Ticks that have passed are left out and counted in `missed_ticks`.
+    Ticks that have passed are skipped and counted in `missed_ticks`.
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:

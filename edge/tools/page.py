@@ -162,7 +162,7 @@ class Page:
         try:
             self.saved(path, load(path))
         except InputError as error:
-            sentence = f"{error}; it is left out of the list"
+            sentence = f"{error}; the list skips it"
             if sentence not in self._notices:
                 self.notice(sentence)
 

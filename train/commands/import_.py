@@ -146,7 +146,7 @@ def _status(folder: Path, paths: Set[Path], skipped: Sequence[str]) -> int:
     for warning in former_recordings.warnings(folder, paths):
         say(warning)
     for sentence in skipped:
-        print(printable(f"left out: {sentence}"), file=sys.stderr)
+        print(printable(f"skipped: {sentence}"), file=sys.stderr)
     return int(bool(skipped))
 
 

@@ -36,7 +36,7 @@ def lacking(dataset: DataSet, tasks: Sequence[str] | None) -> list[str]:
         if not _is_usual(dataset, task):
             count = np.count_nonzero(dataset.labels(task))
             sentences.append(
-                f"warning: task {task} is left out: {count} of {len(dataset.trials)} "
+                f"warning: task {task} is ignored: {count} of {len(dataset.trials)} "
                 "trials have a label for it; --tasks names it where it is meant"
             )
     return sentences

@@ -130,7 +130,7 @@ def parted(table: Table, normal: str) -> Parted:
     if len(odd):
         raise InputError(
             f"{table.where}: {short_text(sorted(odd)[:3])} lacks one of the axes x, y, z; "
-            "leave --axes out, or mend the names"
+            "leave --axes out, or fix the names"
         )
     taxel_of = dict(zip(axes[normal], axes.index, strict=True))
     plain = table.data.drop(columns=axes.to_numpy().ravel())

@@ -69,7 +69,7 @@ def order(
     if len(back):
         raise InputError(
             f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
-            f"{numbers[back[0] + 1]}; split it there, or mend the times"
+            f"{numbers[back[0] + 1]}; split it there, or fix the times"
         )
     kept = np.argsort(t, kind="stable")
     last = np.append(np.diff(t[kept]) > 0.0, True)
@@ -78,7 +78,7 @@ def order(
         still = kept[repeated[0] + 1]
         raise InputError(
             f"{where}: its time stands still at {frame} {numbers[still]}; name another "
-            "time, or mend the times"
+            "time, or fix the times"
         )
     changes = []
     swapped = int((steps < 0.0).sum())
@@ -86,7 +86,7 @@ def order(
         changes.append(f"{counted(swapped, 'time')} went back within the jitter")
     if len(repeated):
         changes.append(
-            f"{counted(len(repeated), 'frame')} left out, as later ones have their times"
+            f"{counted(len(repeated), 'frame')} skipped, as later ones have their times"
         )
     return Order(kept[last], "; ".join(changes))
 

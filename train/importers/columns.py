@@ -77,7 +77,7 @@ class Meaning:
             text += f", joint angles: {spanned(self.joints)}"
         text += f", label: {label}"
         if self.left_out:
-            text += f"; left out: {', '.join(map(quoted, self.left_out))}"
+            text += f"; ignored: {', '.join(map(quoted, self.left_out))}"
         return text
 
 

@@ -3,7 +3,7 @@
 A folder holds a file for each trial: a row a frame, a column a taxel, and if you like
 columns of time and joint angles. Taxels are the columns whose names share a stem with
 running numbers (s1 to s16, taxel_0_3), all columns of a file without a header, or those
-that --taxels names; what was taken and what was left out is printed. The label is the
+that --taxels names; what was taken and what was ignored is printed. The label is the
 name of the folder that the file lies in (or of the one above folders that only count
 trials), or else its own name without the number at the end; `labels.csv`, with the
 column `trial` and one for each task, replaces it. A single file with a column `trial`
@@ -11,7 +11,7 @@ holds all trials. It has such rows, or the columns `taxel` and `value` with a ro
 each value; its columns of text are labels, and that of the task. COLS are names, ranges
 or numbers from 1, such as `s1-s9,force` or `3-5`. `skin.json` in the folder is the
 `skin` of the recordings. With `--frames`, a folder holds a folder for each trial, with
-a file for each frame: a line a row. A file that cannot be used is named and left out.
+a file for each frame: a line a row. A file that cannot be used is named and skipped.
 Taxels of three axes are columns such as s1_x, s1_y, s1_z, or three arrays: see --axes.
 """
 

@@ -465,7 +465,7 @@ def numbers_of(table: Table, name: str) -> pd.Series:
     if infinite.any():
         raise InputError(
             f"{table.where}: column {name} has a number beyond measure in "
-            f"{place_of(infinite)}; mend or leave it out"
+            f"{place_of(infinite)}; fix or delete it"
         )
     require_converted(table, name, numbers, "no number")
     return numbers

@@ -383,7 +383,7 @@ def _pivoted(table: Table, time_terms: str | None) -> Table:
         raise InputError(
             f"{table.where} has two taxels of one name; rename one of them"
         )
-    form = [f'left out: "{name}"' for name in further if name != time]
+    form = [f'ignored: "{name}"' for name in further if name != time]
     return replace(
         table,
         data=wide.reset_index(),

@@ -186,7 +186,7 @@ class Log:
                 count = len(reasons)
                 messages = f"{count + len(frames)} messages of {topic}"
                 part = f"{count} of {messages}, the first of"
-            say(f"{self.path}: left out {part} which {reasons[0]}")
+            say(f"{self.path}: skipped {part} which {reasons[0]}")
         shapes = {values.shape for values in frames["values"]}
         if len(shapes) > 1:
             raise InputError(

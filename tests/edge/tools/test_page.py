@@ -209,7 +209,7 @@ def test_a_damaged_recording_is_named_and_left_out(folder_page):
     folder_page.look()
     (notice,) = folder_page._notices
     assert "c.npz" in notice
-    assert "left out" in notice
+    assert "skips it" in notice
 
 
 @pytest.mark.parametrize("action", ["relabel", "delete"])

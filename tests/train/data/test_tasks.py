@@ -15,7 +15,7 @@ DATASET = SimpleNamespace(tasks=("kind", "room"), labels=LABELS.get, trials=rang
 def test_a_task_that_most_trials_lack_is_fitted_where_it_is_named():
     assert list(labels_of_tasks(DATASET, None)) == ["kind"]
     (sentence,) = lacking(DATASET, None)
-    assert "task room is left out: 1 of 3" in sentence
+    assert "task room is ignored: 1 of 3" in sentence
     assert list(labels_of_tasks(DATASET, ["room"])) == ["room"]
     assert lacking(DATASET, ["room"]) == []
 

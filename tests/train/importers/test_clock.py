@@ -39,7 +39,7 @@ def test_of_few_frames_at_one_time_the_later_counts():
     result = order(t, "a.bag")
     assert 49 not in result.kept.tolist()
     assert len(result.kept) == 199
-    assert result.text == "1 frame left out, as later ones have their times"
+    assert result.text == "1 frame skipped, as later ones have their times"
 
 
 def test_two_frames_in_a_hundred_at_one_time_stand_still():

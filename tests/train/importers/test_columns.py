@@ -154,5 +154,5 @@ def test_a_line_says_what_was_taken():
     sense = sense_of(source, time_unit="ms")
     assert sense.text("folder", (4, 4)) == (
         'time: "t" in ms (as said), taxels: "p1" to "p16" (16, as 4 x 4), label: folder; '
-        'left out: "label", a column without a name'
+        'ignored: "label", a column without a name'
     )

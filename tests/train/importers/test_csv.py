@@ -433,7 +433,7 @@ def test_one_value_in_a_row_has_the_time_that_is_called_one(folder, capsys):
     put(folder, {"all.csv": text(rows, head="trial,class,t,taxel,value")})
     _, recordings = imported(folder)
     assert recordings["a"].t.tolist() == [0.0, 0.01, 0.02]
-    assert 'left out: "class"' in capsys.readouterr().out
+    assert 'ignored: "class"' in capsys.readouterr().out
 
 
 def test_a_bad_trial_of_a_long_table_stops_none_of_the_others(folder, capsys):

@@ -327,13 +327,13 @@ def test_the_file_of_a_bag_is_read_without_its_folder(tmp_path, bag, imported):
 
 def test_a_colour_camera_beside_the_skin_is_left_out_and_said(bag, imported, capsys):
     assert differences(imported(bag(skin(), joints(), camera()))) == []
-    sentence = "left out /camera, which is rgb8; frames are mono16"
+    sentence = "skipped /camera, which is rgb8; frames are mono16"
     assert sentence in capsys.readouterr().out
 
 
 def test_a_damaged_frame_is_left_out_and_counted(bag, imported, capsys):
     assert len(imported(bag(damaged("/skin"))).t) == N - 1
-    sentence = f"left out 1 of {N} messages of /skin, the first of which has an image"
+    sentence = f"skipped 1 of {N} messages of /skin, the first of which has an image"
     assert sentence in capsys.readouterr().out
 
 
@@ -341,7 +341,7 @@ def test_a_topic_that_is_not_named_is_never_read(bag, imported, capsys):
     topics = skin(), joints(), camera(), damaged()
     path = bag(*topics, beside={"frames_topic": "/skin"})
     assert differences(imported(path)) == []
-    assert "left out" not in capsys.readouterr().out
+    assert "skipped" not in capsys.readouterr().out
 
 
 def test_angles_across_a_gap_are_unknown(bag, imported, capsys):
