@@ -1,6 +1,8 @@
 """Errors by name, bits on the wire, and the sentence for a bus that is missing."""
 
 import errno
+import fcntl
+import os
 import re
 
 import numpy as np
@@ -17,8 +19,11 @@ from edge.fake.bus import wire_bits
     ("messages", "bits"),
     [
         ([write(0x2C, [0, 0x0B]), read(0x2C, 24)], 255),  # AD7147, 12 results
+        ([write(0x5A, [0x04]), read(0x5A, 24)], 246),  # MPR121, 12 electrodes
         ([write(0x70, [1])], 20),  # TCA9548A, a channel
         ([read(0x70, 1)], 20),
+        ([write(0x28, [0]), read(0x28, 768)], 6942),  # 57.6 frames a second at 400 kHz
+        ([write(0x28, [0]), read(0x28, 384)], 3486),  # 114.7
     ],
 )
 def test_bits_on_the_wire_are_those_of_the_data_sheets(messages, bits):
@@ -57,6 +62,19 @@ def test_an_errno_is_a_named_error_and_a_builtin_one(code, error, builtin):
     )
 
 
+def test_a_hung_transfer_is_not_sent_again_and_a_broken_one_is():
+    retries = [
+        e.retries
+        for e in (
+            protocol.BusTimeout,
+            protocol.BusGone,
+            protocol.BusFault,
+            protocol.BusNack,
+        )
+    ]
+    assert retries == [0, 0, 2, 3]
+
+
 def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
     with pytest.raises(
         protocol.BusMissing, match=r"^/dev/i2c-no-such: no such bus; .*ENOENT"
@@ -75,6 +93,14 @@ def test_a_device_that_is_missing_or_no_bus_is_named(tmp_path):
 def test_a_read_takes_only_a_buffer_that_the_kernel_can_write(into):
     with pytest.raises(ValueError, match="contiguous uint8"):
         read(0x2C, into)
+
+
+def test_the_process_that_holds_a_lock_is_named(tmp_path):
+    path = tmp_path / "i2c"
+    with path.open("w") as locked, path.open("w") as blocked:
+        assert linux.lock_holder(blocked.fileno()) == "another program"
+        fcntl.flock(locked, fcntl.LOCK_EX)
+        assert linux.lock_holder(blocked.fileno()).endswith(f" ({os.getpid()})")
 
 
 @pytest.fixture
