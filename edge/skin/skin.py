@@ -96,11 +96,12 @@ class Skin:
             calibration.noise.ravel(),
             self._decoder.taxels.sign,
         )
-        self._shear = None
+        self.shear = None
+        """Reads the tangential axes of a skin of three axes; None of others."""
         if file.layout.axes:
             from edge.skin.shear import ShearReader  # few skins have three axes
 
-            self._shear = ShearReader(file, self._decoder.rows)
+            self.shear = ShearReader(file, self._decoder.rows)
         self._valid = np.zeros(shape, dtype=np.bool_)
         self.invalid_for = np.zeros(shape, dtype=np.int64)
         """(rows, cols) number of frames in a row for which a taxel has had no valid
@@ -230,12 +231,6 @@ class Skin:
         """The last frame's raw values (rows, cols), and which of them are valid."""
         return self._decoder.values.reshape(self.layout.shape), self._valid
 
-    def raw_shear(self) -> Counts | None:
-        """The last frame's raw shear (rows, cols, 2) of a skin of three axes."""
-        if self._shear is None:
-            return None
-        return self._shear.raw.reshape(*self.layout.shape, 2)
-
     def _assemble(self, t: float) -> Frame:
         decoder = self._decoder
         shape = self.layout.shape
@@ -253,8 +248,8 @@ class Skin:
         if settled:
             self.baseline.follow(decoder.values, valid)
         shear = None
-        if self._shear is not None:
-            shear = self._shear.read(valid, settled=settled)
+        if self.shear is not None:
+            shear = self.shear.read(valid, settled=settled)
         times = decoder.times.reshape(shape)
         return Frame(t, counts.reshape(shape), self._valid, times, shear=shear)
 
