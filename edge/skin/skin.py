@@ -75,8 +75,6 @@ class Skin:
         self.period_s = 1.0 / file.reading.rate_hz
         self.touch_counts = file.layout.threshold_counts
         """A taxel above this is touched, and the baseline is frozen."""
-        self.oldest_s = self.period_s * OLDEST_FRAMES
-        """Maximum age of a valid value, in seconds."""
         self._decoder = Decoder(file)
         rows = iter(self._decoder.rows)  # of which each bus takes those of its chips
         self.readers = [
@@ -215,8 +213,8 @@ class Skin:
 
         Returns:
             A frame whose `times` tell when each taxel was read. A taxel that could not
-            be read, is dead, or was last read more than `oldest_s` ago is not `valid`
-            and reads 0.
+            be read, is dead, or was last read more than `OLDEST_FRAMES` periods ago is
+            not `valid` and reads 0.
         """
         clock = self.clock
         # The buses of a virtual clock start together.
@@ -234,7 +232,7 @@ class Skin:
     def _assemble(self, t: float) -> Frame:
         decoder = self._decoder
         shape = self.layout.shape
-        valid = decoder.decode(self._slots, t, t - self.oldest_s)
+        valid = decoder.decode(self._slots, t, t - OLDEST_FRAMES * self.period_s)
         self._valid = valid.reshape(shape)
         counts = self.baseline.above(decoder.values)
         counts *= valid
