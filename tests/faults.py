@@ -24,7 +24,7 @@ from edge.chips.chip import ChipSpec
 from edge.fake.clock import VirtualClock
 from edge.fake.player import calibrated
 from edge.skin import file as skinfile
-from edge.skin.loop import Schedule
+from edge.skin.loop import Schedule, Stop
 from edge.skin.skin import Skin
 from edge.skin.wiring import BusSpec
 from tests.bench import tables
@@ -231,7 +231,7 @@ def run(name, file, faults=(), *, resets=(), seconds=LASTS_S, overhead_s=0.0):
         end = max((fault.during[1] for fault in moved), default=start)
         schedule = Schedule(skin.clock, skin.period_s)
         for k in count(1):
-            if schedule.wait() - start >= seconds:
+            if schedule.wait(Stop()) - start >= seconds:
                 break
             if k in resets:
                 end = skin.clock.now()

@@ -9,32 +9,27 @@ from edge.chips.chip import Chip
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of chip: words for a person, and where its classes are.
+    """The places of the classes of a kind of chip.
 
     Attributes:
-        description: a few words.
         driver: path of the driver, a `edge.chips.chip.Chip`.
         model: path of its model for the fake bus, a `edge.fake.chip.FakeChip`.
     """
 
-    description: str
     driver: str
     model: str
 
 
 KINDS = {
     "ad7147": Kind(
-        "a capacitance-to-digital converter",
         "edge.chips.ad7147.AD7147",
         "edge.fake.ad7147.FakeAD7147",
     ),
     "mpr121": Kind(
-        "a capacitive touch controller",
         "edge.chips.mpr121.MPR121",
         "edge.fake.mpr121.FakeMPR121",
     ),
     "block": Kind(
-        "a microcontroller that serves frames",
         "edge.chips.block.Block",
         "edge.fake.block.FakeBlock",
     ),

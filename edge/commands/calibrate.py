@@ -8,7 +8,6 @@ touched, or has taxels that cannot be read or are saturated, is refused.
 import argparse
 import math
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
 import numpy as np
 
@@ -86,8 +85,8 @@ def measure(skin: Skin, frames: int, lasts_s: float = math.inf) -> Measurement:
     for count, _ in enumerate(Loop(skin, lasts_s=lasts_s).frames(), 1):
         raw, valid = skin.raw()
         normal.add(raw, valid)
-        shear = skin.raw_shear()
-        if shear is not None:
+        if skin.shear is not None:
+            shear = skin.shear.raw.reshape(*skin.layout.shape, 2)
             tangential.add(shear, valid[:, :, None])
         if count == frames:
             break
@@ -305,9 +304,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if not arguments.force:
         check_rest(file, measured.calibration, former)
-    now = datetime.now(UTC).replace(microsecond=0)
-    calibration = replace(measured.calibration, taken=now)
-    backup = save_calibration(arguments.skin, calibration)
+    backup = save_calibration(arguments.skin, measured.calibration)
     median = float(np.median(noise))
     largest = float(noise.max())
     event = {

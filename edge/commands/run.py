@@ -105,9 +105,8 @@ def run(arguments: argparse.Namespace) -> int:
         real_time=arguments.joints is not None,
     ) as live:
         if live.skin.layout != model.info.layout:
-            from edge.touch.differences import (
-                differences,
-            )  # a skin often is the model's
+            # A skin often is the model's.
+            from edge.touch.differences import differences
 
             for sentence in differences(model.info.layout, live.skin.layout):
                 LOG.warning(f"{arguments.model}: {sentence}")

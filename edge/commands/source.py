@@ -40,8 +40,13 @@ def ending_signals() -> list[int]:
 
 def chip_event(status: ChipStatus, **more: Any) -> dict[str, Any]:
     """The event of a chip's state, with `more` keys."""
-    event = {"event": "chip", **more, "bus": status.bus, "place": status.spec.route}
-    event["state"] = status.state
+    event = {
+        "event": "chip",
+        **more,
+        "bus": status.bus,
+        "place": status.spec.route,
+        "state": status.state,
+    }
     if status.error:
         event["error"] = status.error
     return event
@@ -165,8 +170,13 @@ class Reading:
                 events.append({"event": "bus", "t": t, "bus": name, "state": state})
             silent = skin.silent_changes()
             if silent is not None:
-                taxels = {"event": "taxels", "t": t, "invalid": silent}
-                events.append({**taxels, "frames": SILENT_FRAMES})
+                taxels = {
+                    "event": "taxels",
+                    "t": t,
+                    "invalid": silent,
+                    "frames": SILENT_FRAMES,
+                }
+                events.append(taxels)
             events += [chip_event(status, t=t) for status in skin.changes()]
             yield frame, events
 

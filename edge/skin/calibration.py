@@ -3,6 +3,7 @@
 import os
 import re
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +24,12 @@ CALIBRATION = re.compile(
 
 
 def calibration_text(calibration: TaxelCalibration) -> str:
-    """The `[calibration]` table as TOML, one line for each row of the skin."""
-    lines = ["[calibration]\n"]
-    if calibration.taken is not None:
-        lines.append(f"taken = {calibration.taken.isoformat(timespec='seconds')}\n")
+    """The `[calibration]` table as TOML, one line for each row of the skin.
+
+    The time at which it was taken, now in UTC, is for people; no program reads it.
+    """
+    taken = datetime.now(UTC).isoformat(timespec="seconds")
+    lines = ["[calibration]\n", f"taken = {taken}\n"]
     for key in ("baseline", "noise", "shear_baseline", "shear_noise"):
         array = getattr(calibration, key)
         if array is not None:

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -71,14 +70,12 @@ class TaxelCalibration:
         baseline: (rows, cols) raw counts, rounded means; 0 where a taxel could not be
             read.
         noise: (rows, cols) raw counts, standard deviations.
-        taken: time of measurement (UTC), or None where unknown.
         shear_baseline, shear_noise: (rows, cols, 2) likewise of both tangential axes;
             None on a skin of one axis.
     """
 
     baseline: Counts
     noise: Floats
-    taken: datetime | None = None
     shear_baseline: Counts | None = None
     shear_noise: Floats | None = None
 
@@ -199,9 +196,7 @@ def _calibration(
 ) -> TaxelCalibration:
     baseline = _array(table, "baseline", layout, "whole numbers").astype(np.uint16)
     noise = _array(table, "noise", layout, "numbers")
-    taken = table.get("taken", None)
-    if taken is not None and not isinstance(taken, datetime):
-        raise table.fail("taken", "a date and time")
+    table.has("taken")  # for people
     shear_rest = shear_noise = None
     if layout.axes:
         shear_rest = _array(table, "shear_baseline", layout, "pairs").astype(np.uint16)
@@ -216,7 +211,7 @@ def _calibration(
                 f"{chip.kind.name}, which tells at most {chip.traits.highest}; delete "
                 "[calibration], and calibrate again"
             )
-    return TaxelCalibration(baseline, noise, taken, shear_rest, shear_noise)
+    return TaxelCalibration(baseline, noise, shear_rest, shear_noise)
 
 
 def _array(

@@ -89,14 +89,13 @@ class Schedule:
         self.missed_ticks = 0
         self.periods = Periods()
 
-    def wait(self, stop: Stop | None = None) -> float:
+    def wait(self, stop: Stop) -> float:
         """Wait for the next tick, or until `stop` is asked for.
 
         Returns:
             The time for which the tick was planned, in seconds.
         """
         now = self.clock.now()
-        stop = stop or Stop()
         if self.tick < 0:
             self.start = now
         self.tick += 1

@@ -75,8 +75,6 @@ class Skin:
         self.period_s = 1.0 / file.reading.rate_hz
         self.touch_counts = file.layout.threshold_counts
         """A taxel above this is touched, and the baseline is frozen."""
-        self.oldest_s = self.period_s * OLDEST_FRAMES
-        """Maximum age of a valid value, in seconds."""
         self._decoder = Decoder(file)
         rows = iter(self._decoder.rows)  # of which each bus takes those of its chips
         self.readers = [
@@ -96,11 +94,12 @@ class Skin:
             calibration.noise.ravel(),
             self._decoder.taxels.sign,
         )
-        self._shear = None
+        self.shear = None
+        """Reads the tangential axes of a skin of three axes; None of others."""
         if file.layout.axes:
             from edge.skin.shear import ShearReader  # few skins have three axes
 
-            self._shear = ShearReader(file, self._decoder.rows)
+            self.shear = ShearReader(file, self._decoder.rows)
         self._valid = np.zeros(shape, dtype=np.bool_)
         self.invalid_for = np.zeros(shape, dtype=np.int64)
         """(rows, cols) number of frames in a row for which a taxel has had no valid
@@ -214,8 +213,8 @@ class Skin:
 
         Returns:
             A frame whose `times` tell when each taxel was read. A taxel that could not
-            be read, is dead, or was last read more than `oldest_s` ago is not `valid`
-            and reads 0.
+            be read, is dead, or was last read more than `OLDEST_FRAMES` periods ago is
+            not `valid` and reads 0.
         """
         clock = self.clock
         # The buses of a virtual clock start together.
@@ -230,16 +229,10 @@ class Skin:
         """The last frame's raw values (rows, cols), and which of them are valid."""
         return self._decoder.values.reshape(self.layout.shape), self._valid
 
-    def raw_shear(self) -> Counts | None:
-        """The last frame's raw shear (rows, cols, 2) of a skin of three axes."""
-        if self._shear is None:
-            return None
-        return self._shear.raw.reshape(*self.layout.shape, 2)
-
     def _assemble(self, t: float) -> Frame:
         decoder = self._decoder
         shape = self.layout.shape
-        valid = decoder.decode(self._slots, t, t - self.oldest_s)
+        valid = decoder.decode(self._slots, t, t - OLDEST_FRAMES * self.period_s)
         self._valid = valid.reshape(shape)
         counts = self.baseline.above(decoder.values)
         counts *= valid
@@ -253,8 +246,8 @@ class Skin:
         if settled:
             self.baseline.follow(decoder.values, valid)
         shear = None
-        if self._shear is not None:
-            shear = self._shear.read(valid, settled=settled)
+        if self.shear is not None:
+            shear = self.shear.read(valid, settled=settled)
         times = decoder.times.reshape(shape)
         return Frame(t, counts.reshape(shape), self._valid, times, shear=shear)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from edge.bus import tca9548a
 from edge.chips.chip import MOST_TAXELS, UNUSED, Chip, ChipSpec
 from edge.chips.kinds import KINDS, driver
-from edge.config import ConfigTable, short_text
+from edge.config import ConfigTable
 from edge.errors import InputError
 from edge.touch.layout import SkinLayout
 
@@ -74,12 +74,8 @@ def _shared(chip: ConfigTable, bus: ConfigTable, keys: Sequence[str]) -> ConfigT
 
 def _port(table: ConfigTable) -> tuple[str, int]:
     """A serial port and its bits per second."""
-    port = table.text("serial")
-    if table.has("device"):
-        raise InputError(
-            f"{table.key_name('device')} is an I2C bus; give it or serial, not both"
-        )
-    return port, table.whole("baud", 115_200, range(1_200, 20_000_001))
+    baud = table.whole("baud", 115_200, range(1_200, 20_000_001))
+    return table.text("serial"), baud
 
 
 def _adapter(table: ConfigTable) -> tuple[str, int]:
@@ -93,14 +89,6 @@ def _adapter(table: ConfigTable) -> tuple[str, int]:
     return path, table.whole("clock_hz", 400_000, range(1_000, 5_000_001))
 
 
-def _kind(table: ConfigTable) -> type[Chip]:
-    name = table.get("kind")
-    if not isinstance(name, str) or name not in KINDS:
-        kinds = [f"{name} ({kind.description})" for name, kind in KINDS.items()]
-        raise table.fail("kind", f"one of {', '.join(kinds)}")
-    return driver(name)
-
-
 def _chip(
     chip: ConfigTable,
     bus: ConfigTable,
@@ -108,7 +96,8 @@ def _chip(
     sign: int | None,
     serial: bool,
 ) -> ChipSpec:
-    kind = _kind(_shared(chip, bus, ("kind",)))
+    name = _shared(chip, bus, ("kind",)).choice("kind", tuple(KINDS))
+    kind = driver(name)
     if layout.axes:
         from edge.chips.three_axes import three_axes  # few skins have them
 
@@ -144,10 +133,6 @@ def _address(table: ConfigTable, kind: type[Chip], serial: bool) -> int:
     if not kind.serial:
         raise InputError(
             f"{table.key_name('kind')} is {kind.name}; a serial port carries block only"
-        )
-    if table.has("address"):
-        raise InputError(
-            f"{table.key_name('address')} has no meaning on a serial port; leave it out"
         )
     return 0
 
@@ -215,10 +200,8 @@ def taxel_at(
     """
     row, col = table.pair(key, value)
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-        raise InputError(
-            f"{table.key_name(key)} names taxel [{short_text(row)}, {short_text(col)}], which lies "
-            f"outside of {layout.rows} x {layout.cols}"
-        )
+        inside = f"[row, col] within {layout.rows} x {layout.cols}"
+        raise table.fail(key, inside, value)
     return row, col
 
 

@@ -216,12 +216,8 @@ def exported(seed):
     return judged_rows
 
 
-def measure(sets, exports):
-    """Simulate, fit, count; 1 where a promise is broken more often than chance
-    explains."""
-    workers = Workers(cpu_count())
-    seeds = np.random.SeedSequence(0).generate_state(SEEDS).tolist()
-    batches = workers.map("batches of trials", simulated, [(s,) for s in seeds])
+def drawn_sets(batches, count):
+    """The arguments of `judged` for data sets drawn from the trials of all batches."""
     pool = np.array([t for batch, _ in batches for t in batch.trials], dtype=object)
     X = np.concatenate([vectors for _, vectors in batches], axis=1)
     first, _ = batches[0]
@@ -231,11 +227,20 @@ def measure(sets, exports):
     shared = {"pool": X, "columns": dict(zip(first.names, columns, strict=True))}
     rng = np.random.default_rng(0)
     cases = []
-    for _ in range(sets):
+    for _ in range(count):
         rows = np.sort(rng.permutation(len(pool))[:TRIALS])
         fields = {**vars(first), "trials": tuple(pool[rows])}
         cases.append((DrawnSet(**fields, rows=rows, **shared), y))
-    results = workers.map("data sets", judged, cases)
+    return cases
+
+
+def measure(sets, exports):
+    """Simulate, fit, count; 1 where a promise is broken more often than chance
+    explains."""
+    workers = Workers(cpu_count())
+    seeds = np.random.SeedSequence(0).generate_state(SEEDS).tolist()
+    batches = workers.map("batches of trials", simulated, [(s,) for s in seeds])
+    results = workers.map("data sets", judged, drawn_sets(batches, sets))
     certified, fronts, trusted = map(chain.from_iterable, zip(*results, strict=True))
     seeds = range(1, exports + 1)
     full = workers.map("full exports", exported, [(seed,) for seed in seeds])

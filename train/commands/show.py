@@ -1,7 +1,7 @@
 """Draw recordings.
 
 Draws a recording: frames over time with the contact region, and the three features;
-with --scene, the arm and the object from the side; with --model, its curves over those
+with --scene, the arm and the contact from the side; with --model, its curves over those
 of the nearest training trials. Draws several recordings side by side, with the
 decisions of --model.
 """
@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         "--scene",
         action="store_true",
-        help="sketch arm, contact and its path from the side too",
+        help="sketch the arm and the contact from the side too",
     )
     option(
         "--dark",

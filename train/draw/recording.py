@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from edge.errors import InputError
-from edge.files import parsing
 from edge.recording import Recording
 from edge.touch.active import Region
 from edge.touch.contact import FeatureSeries
@@ -47,13 +46,13 @@ def draw(
 
     Args:
         where: name of the recording in errors.
-        scene: add the arm and the contact's path, seen from the side.
+        scene: add the arm and the contact, seen from the side.
         threshold: counts above which a taxel is in contact; the recording's own where
             None.
 
     Raises:
-        InputError: a sketch is asked for without a known arm or of a damaged
-            `meta.simulation`, or `out` cannot be written.
+        InputError: a sketch is asked for without a known arm, or `out` cannot be
+            written.
     """
     layout = with_thresholds(recording.layout, threshold, None)
     chain = arm_of(recording, where)
@@ -75,14 +74,8 @@ def draw(
         axis = figure.add_subplot(grid[1, third * i : third * (i + 1)])
         _curve(axis, feature, units(layout)[feature], series)
     if scene and chain is not None:
-        with parsing(f"{where}: meta.simulation", "that of a scene"):
-            draw_side(
-                figure.add_subplot(grid[2, 1:-1]),
-                recording,
-                chain,
-                layout,
-                onset,
-            )
+        side = figure.add_subplot(grid[2, 1:-1])
+        draw_side(side, recording, chain, layout, onset)
     with write_whole(out) as file:
         figure.savefig(file, format="png", dpi=110)
 

@@ -108,7 +108,7 @@ chips = [{ address = 0x30, first = [0, 0] }, { address = 0x31, first = [0, 2] }]
 @pytest.fixture
 def toy(monkeypatch):
     """The toy among the kinds of chips."""
-    kind = Kind("a toy", f"{__name__}.Toy", f"{__name__}.FakeToy")
+    kind = Kind(f"{__name__}.Toy", f"{__name__}.FakeToy")
     monkeypatch.setitem(KINDS, "toy", kind)
     monkeypatch.setitem(sys.modules, __name__, sys.modules[Toy.__module__])
 

@@ -17,7 +17,7 @@ def test_ticks_stay_on_the_grid_however_long_the_work_takes():
     schedule = Schedule(clock, 0.01)
     draw = np.random.default_rng(0)
     for k in range(1000):
-        assert schedule.wait() == 5.0 + k * 0.01
+        assert schedule.wait(Stop()) == 5.0 + k * 0.01
         clock.sleep_until(clock.now() + draw.uniform(0.0, 0.0099))
     assert schedule.missed_ticks == 0
 
@@ -27,7 +27,7 @@ def test_a_late_tick_moves_no_other_and_those_gone_by_are_counted():
     schedule = Schedule(clock, 0.01)
     due = []
     for k in range(6):
-        due.append(round(schedule.wait(), 9))
+        due.append(round(schedule.wait(Stop()), 9))
         clock.sleep_until(clock.now() + (0.025 if k == 1 else 0.004))
     assert due == [0.0, 0.01, 0.03, 0.04, 0.05, 0.06]
     assert schedule.missed_ticks == 1

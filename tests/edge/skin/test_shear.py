@@ -60,7 +60,7 @@ def test_a_taxel_that_is_not_valid_has_no_shear():
     skin, _ = play(skin_file(LAYOUT), touch())
     with skin:
         skin.read()
-        shear = skin._shear.read(np.arange(12) != 5, settled=False)
+        shear = skin.shear.read(np.arange(12) != 5, settled=False)
     assert not shear.reshape(12, 2)[5].any()
     assert shear.reshape(12, 2)[[4, 6]].any()
 

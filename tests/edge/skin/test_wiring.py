@@ -64,7 +64,7 @@ def test_taxels_name_each_stage_and_an_empty_one_is_none():
         (
             "first = [0, 3]",
             "first = [0, 4]",
-            "first names taxel [0, 6], which lies outside",
+            "first must be [row, col] within 4 x 6, not [0, 6]",
         ),
         (
             "first = [0, 3]",
@@ -112,12 +112,12 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("[[bus]]", "[[bus]]\ndevice = 1", "give it or serial, not both"),
+        ("[[bus]]", "[[bus]]\ndevice = 1", "unknown key device; allowed: serial, baud"),
         ('"block"', '"mpr121"', "kind is mpr121; a serial port carries block only"),
         (
             '"block"',
             '"microcontroller"',
-            "(a microcontroller that serves frames), not 'micro",
+            "kind must be one of ad7147, mpr121, block, not 'micro",
         ),
         (
             "= [{",
@@ -127,7 +127,7 @@ def test_a_microcontroller_may_stand_on_a_serial_port_and_serve_a_single_taxel()
         (
             "[{ first",
             "[{ address = 8, first",
-            "address has no meaning on a serial port",
+            "unknown key address; allowed: kind",
         ),
     ],
 )

@@ -58,34 +58,3 @@ def test_without_contact_it_is_drawn_and_without_an_arm_it_is_not_sketched(
     with pytest.raises(InputError, match="there is no arm to sketch"):
         draw(load(tmp_path / "quiet.npz"), tmp_path / "no.png", scene=True)
     assert not (tmp_path / "no.png").exists()
-
-
-def edited(folder, simulation):
-    """The file of a touch with another simulation."""
-    touch = load(TOUCH)
-    file = folder / "edited.npz"
-    save(file, replace(touch, meta={**touch.meta, "simulation": simulation}))
-    return file
-
-
-@pytest.mark.parametrize(
-    "simulation",
-    [
-        5,
-        {"effects": ["sliding"]},
-        {"effects": [], "values": {"height_m": "tall"}},
-        {"effects": ["stems"], "values": {"stem_count": -3}},
-    ],
-)
-def test_an_edited_simulation_that_cannot_be_sketched_is_one_sentence(
-    simulation,
-    tmp_path,
-    refusal,
-):
-    file = edited(tmp_path, simulation)
-    sentence = refusal("show", file, "--scene")
-    assert sentence.startswith(f"train: {file}: meta.simulation: not that of a scene: ")
-
-
-def test_an_edited_simulation_does_not_hinder_a_picture_without_the_sketch(tmp_path):
-    assert main(["show", str(edited(tmp_path, 5))]) == 0
