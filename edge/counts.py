@@ -51,7 +51,7 @@ def in_rows(frames: Array, rows: Any, cols: Any) -> Array:
     Raises:
         InputError: the numbers of rows and columns are not those of the frames.
     """
-    whole = type(rows) is int and type(cols) is int
-    if not (whole and rows > 0 and rows * cols == frames.shape[1]):
+    are_whole = type(rows) is int and type(cols) is int
+    if not (are_whole and rows > 0 and rows * cols == frames.shape[1]):
         raise InputError('frames are flat; give their "rows" and "cols" in meta.skin')
     return frames.reshape(len(frames), rows, cols)

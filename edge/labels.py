@@ -41,8 +41,8 @@ class Product:
         implied: dict[str, str] = {}
         joined = self.label(labels)
         if labels.get(self.task, "").count("-") == 1:
-            parts = labels[self.task].split("-")
-            implied = dict(zip(self.factors, parts, strict=True))
+            names = labels[self.task].split("-")
+            implied = dict(zip(self.factors, names, strict=True))
         elif joined is not None:
             implied = {self.task: joined}
         return {**implied, **labels}

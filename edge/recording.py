@@ -247,8 +247,8 @@ def _labels(values: Any) -> dict[str, str]:
     labels = {}
     if isinstance(values, dict):
         for task, label in values.items():
-            whole = type(label) is int or isinstance(label, np.integer)
-            labels[task] = str(label) if whole else label
+            is_whole = type(label) is int or isinstance(label, np.integer)
+            labels[task] = str(label) if is_whole else label
     if not isinstance(values, dict) or not _are_names([*labels, *labels.values()]):
         raise InputError("meta.labels must map task names to labels, both text")
     return labels

@@ -146,17 +146,24 @@ def test_a_lerobot_data_set_is_imported(tmp_path, data_set):
         assert (second.shear.reshape(30, 6, 2) == SHEARED[:, :, :2]).all()
 
 
+def with_gap_and_shear(trial, is_valid, axes):
+    """The trial with a taxel that is valid or not, and shear where it has three axes."""
+    valid = np.ones(trial.frames.shape, dtype=bool)
+    valid[3, 4, 5] = is_valid
+    if axes == 1:
+        return replace(trial, valid=valid)
+    quarter = (trial.frames // 4).astype(np.int16)
+    shear = np.stack([quarter, -quarter], axis=3)
+    return replace(trial, valid=valid, shear=shear)
+
+
 @pytest.mark.parametrize("axes", [1, 3])
 def test_import_reads_a_table_of_recordings_back(make_touch, tmp_path, axes):
     pytest.importorskip("pyarrow")
     trials = []
     for number in range(2):
         trial = make_touch(seed=number, labels={"object": f"thing {number}"})
-        valid = np.ones(trial.frames.shape, dtype=bool)
-        valid[3, 4, 5] = number == 0
-        quarter = (trial.frames // 4).astype(np.int16)
-        shear = np.stack([quarter, -quarter], axis=3) if axes == 3 else None
-        trials.append(replace(trial, valid=valid, shear=shear))
+        trials.append(with_gap_and_shear(trial, number == 0, axes))
         edge.save(tmp_path / "in" / f"touch_{number}.npz", trials[-1])
     table = tmp_path / "all.parquet"
     program("save_table.py")(str(tmp_path / "in"), str(table))

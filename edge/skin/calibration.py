@@ -28,8 +28,8 @@ def calibration_text(calibration: TaxelCalibration) -> str:
 
     The time at which it was taken, now in UTC, is for people; no program reads it.
     """
-    taken = datetime.now(UTC).isoformat(timespec="seconds")
-    lines = ["[calibration]\n", f"taken = {taken}\n"]
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    lines = ["[calibration]\n", f"taken = {now}\n"]
     for key in ("baseline", "noise", "shear_baseline", "shear_noise"):
         array = getattr(calibration, key)
         if array is not None:

@@ -94,9 +94,9 @@ def _roots(count: int, first: Indices, second: Indices) -> Indices:
             grandparents = parents[parents]
         first = parents[lower]
         second = parents[higher]
-        apart = first != second
-        first = first[apart]
-        second = second[apart]
+        differ = first != second
+        first = first[differ]
+        second = second[differ]
     return parents
 
 

@@ -42,14 +42,14 @@ def kinds_of(recordings: Sequence[Recording]) -> Strings | None:
     object is of a kind of its own. None without such a scene.
     """
     kinds = []
-    drawn: dict[str, set[str]] = {}
+    objects_of_kind: dict[str, set[str]] = {}
     for recording in recordings:
         kind = name = recording.labels.get(LEAVE_OUT, "")
         if "simulation" in recording.meta:
             kind = re.sub(r" \d+$", "", name)
-            drawn.setdefault(kind, set()).add(name)
+            objects_of_kind.setdefault(kind, set()).add(name)
         kinds.append(kind)
-    several = any(len(objects) > 1 for objects in drawn.values())
+    several = any(len(objects) > 1 for objects in objects_of_kind.values())
     return np.array(kinds) if several else None
 
 

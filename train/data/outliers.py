@@ -41,9 +41,9 @@ def deviations(values: Floats) -> Floats:
 def _sum_of_others(x: Floats) -> Floats:
     """(n, p) the sum of the other rows, without a difference that an outlier would
     round."""
-    none = np.zeros((1, x.shape[1]))
-    before = np.cumsum(np.concatenate([none, x[:-1]]), axis=0)
-    after = np.cumsum(np.concatenate([none, x[:0:-1]]), axis=0)[::-1]
+    zeros = np.zeros((1, x.shape[1]))
+    before = np.cumsum(np.concatenate([zeros, x[:-1]]), axis=0)
+    after = np.cumsum(np.concatenate([zeros, x[:0:-1]]), axis=0)[::-1]
     return np.asarray(before + after)
 
 

@@ -71,11 +71,11 @@ def order(
             f"{where}: its time goes back by {-steps[back[0]]:g} s at {frame} "
             f"{numbers[back[0] + 1]}; split it there, or fix the times"
         )
-    kept = np.argsort(t, kind="stable")
-    last = np.append(np.diff(t[kept]) > 0.0, True)
+    frames = np.argsort(t, kind="stable")
+    last = np.append(np.diff(t[frames]) > 0.0, True)
     repeated = np.flatnonzero(~last)
     if len(repeated) > MOST_REPEATED * len(t):
-        still = kept[repeated[0] + 1]
+        still = frames[repeated[0] + 1]
         raise InputError(
             f"{where}: its time stands still at {frame} {numbers[still]}; name another "
             "time, or fix the times"
@@ -88,7 +88,7 @@ def order(
         changes.append(
             f"{counted(len(repeated), 'frame')} skipped, as later ones have their times"
         )
-    return Order(kept[last], "; ".join(changes))
+    return Order(frames[last], "; ".join(changes))
 
 
 def angles_at(
@@ -110,8 +110,8 @@ def angles_at(
         release_s: of the skin; a longer step is a gap, unless it is less than five
             usual steps.
     """
-    whole = np.unwrap(angles, axis=0)
-    columns = [np.interp(t, joints_t, column) for column in whole.T]
+    unwrapped = np.unwrap(angles, axis=0)
+    columns = [np.interp(t, joints_t, column) for column in unwrapped.T]
     at_frames = np.stack(columns, axis=1)
     gap_s = release_s
     if len(joints_t) > 1:

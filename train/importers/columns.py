@@ -209,9 +209,9 @@ def _taxels(
     if options.taxels:
         return columns(table, options.taxels), ()
     arrays = table.arrays.values()
-    whole = [names for names in arrays if len(names) == math.prod(table.shape)]
-    if table.shape and len(whole) == 1:
-        return whole[0], ()
+    complete = [names for names in arrays if len(names) == math.prod(table.shape)]
+    if table.shape and len(complete) == 1:
+        return complete[0], ()
     if not rest:
         raise InputError(
             f"{table.where}: no column is left for taxels beside the time and the joints"

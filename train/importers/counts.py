@@ -86,9 +86,11 @@ class Samples:
         if not order.text:
             return self
         LOG.warning(f"{self.where}: {order.text}")
-        kept = order.kept
-        joints = None if self.joints is None else self.joints[kept]
-        return replace(self, t=self.t[kept], values=self.values[kept], joints=joints)
+        places = order.kept
+        joints = None if self.joints is None else self.joints[places]
+        return replace(
+            self, t=self.t[places], values=self.values[places], joints=joints
+        )
 
 
 def skin_shape(
@@ -266,8 +268,8 @@ def _check_counts(where: str, counts: NDArray[np.float64], exact: bool) -> None:
     normal = counts[..., 0]
     low = normal.min()
     high = normal.max()
-    whole = not exact or np.array_equal(normal, np.rint(normal))
-    if low < 0.0 or high > MOST_COUNTS + 0.5 or not whole:
+    is_whole = not exact or np.array_equal(normal, np.rint(normal))
+    if low < 0.0 or high > MOST_COUNTS + 0.5 or not is_whole:
         hint = "--signed, " if low < 0.0 else ""
         raise InputError(
             f"{where}: {low:g} to {high:g} are no counts (whole numbers from 0 to "

@@ -148,10 +148,10 @@ def _alike(
         _compare(trial, first)
         return trial
 
-    alike = list(tried(measured, compared, strict))
+    fitting = list(tried(measured, compared, strict))
     if first.meaning.are_all:
-        _require_taxels([trial for trial in alike if isinstance(trial, Measured)])
-    return alike
+        _require_taxels([trial for trial in fitting if isinstance(trial, Measured)])
+    return fitting
 
 
 def _compare(trial: Measured, first: Measured) -> None:

@@ -255,12 +255,12 @@ def _text(data: bytes) -> _Text:
     numbers: Sequence[int] = array(
         "q", (n for n, line in below if not skipped.match(line))
     )
-    kept = [lines[number - 1] for number in numbers]
+    chosen_lines = [lines[number - 1] for number in numbers]
     del lines
     comments = [line for line in above if line[:1] in set("#%")]
-    body = "\n".join(kept)
-    numbers = _lines_of_rows(kept, numbers, mark)
-    rows = [row for _, row in islice(_rows(kept, mark), 2)]
+    body = "\n".join(chosen_lines)
+    numbers = _lines_of_rows(chosen_lines, numbers, mark)
+    rows = [row for _, row in islice(_rows(chosen_lines, mark), 2)]
     return _Text(body, numbers, mark, rows, "".join(comments[-1:]), form)
 
 

@@ -94,8 +94,8 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
     if not frames:
         raise ValueError("it has no frame")
     t = (np.array(stamps) - stamps[0]) / 1000.0
-    kept = clock.order(t, file).kept
-    t = t[kept]
+    places = clock.order(t, file).kept
+    t = t[places]
     with_zero = np.pad(frames, ((0, 0), (0, 1)))
     rows, cols = pads.alive.shape
     layout = SkinLayout(
@@ -115,7 +115,7 @@ def _recording(root: ElementTree.Element, file: Path) -> Recording:
         "trial": file.stem,
     }
     joints = _joints(root, t, stamps[0], file)
-    return Recording(t, with_zero[kept][:, pads.places], joints, pads.alive, meta)
+    return Recording(t, with_zero[places][:, pads.places], joints, pads.alive, meta)
 
 
 @dataclass(frozen=True)

@@ -252,9 +252,9 @@ class Log:
         for name in names:
             joint = angles[angles["joint"] == name]
             joint_t = joint.iloc[:, 0].to_numpy()
-            kept = clock.order(joint_t, where, "message").kept
-            radians = joint[["angle"]].to_numpy()[kept]
-            columns.append(clock.angles_at(t, joint_t[kept], radians, release_s))
+            places = clock.order(joint_t, where, "message").kept
+            radians = joint[["angle"]].to_numpy()[places]
+            columns.append(clock.angles_at(t, joint_t[places], radians, release_s))
         at_frames = np.hstack(columns)
         unknown = ~np.isfinite(at_frames).all(axis=1)
         at_frames[unknown] = np.nan

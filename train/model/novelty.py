@@ -199,8 +199,8 @@ def _point(mean: Floats, gain: Floats, z: Floats, labels: Strings) -> NoveltyPoi
     """The constants of a decision point at which trials have the components z."""
     within = z.copy()
     for label in np.unique(labels):
-        alike = labels == label
-        within[alike] -= z[alike].mean(axis=0)
+        of_label = labels == label
+        within[of_label] -= z[of_label].mean(axis=0)
     components = z.shape[1]
     covariance = within.T @ within / len(z)
     variance = max(float(np.trace(covariance)) / components, 1.0)

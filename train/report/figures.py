@@ -130,16 +130,16 @@ def confusion(name: str, title: str, truth: Strings, answers: Strings) -> Figure
     classes = np.union1d(truth, answers)
     n = len(classes)
     counts = confusion_matrix(truth, answers, labels=classes)
-    many = n > MANY_CLASSES
+    is_large = n > MANY_CLASSES
 
     def draw(canvas: Any, phone: bool) -> None:
         axes = canvas.subplots()
-        small = phone and many
+        small = phone and is_large
         _name_sides(axes, classes, phone)
         _draw_matrix(axes, counts, fontsize=7 if small else None)
 
-    height = 2.4 + 0.3 * n if many else 2.6 + 0.45 * n
-    heights = height, 1.8 + 0.16 * n if many else 3.4
+    height = 2.4 + 0.3 * n if is_large else 2.6 + 0.45 * n
+    heights = height, 1.8 + 0.16 * n if is_large else 3.4
     return picture(name, title, draw, heights, height + 1.6, {"axes.grid": False})
 
 
@@ -147,8 +147,8 @@ def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
     """Name the rows and the columns of a confusion matrix; of very many columns, only
     some, by their row's number."""
     n = len(classes)
-    many = n > MANY_CLASSES
-    small = 7 if (phone and many) or n > MATRIX_TEXT else None
+    is_large = n > MANY_CLASSES
+    small = 7 if (phone and is_large) or n > MATRIX_TEXT else None
     answer = "answer"
     if n > MOST_NAMES:
         answer = "answer, as a row's number"
@@ -157,7 +157,9 @@ def _name_sides(axes: Any, classes: Strings, phone: bool) -> None:
         names = [f"{name}  {i}" for i, name in enumerate(classes, 1)]
     else:
         names = list(classes)
-        style = {"rotation": 90} if many or phone else {"rotation": 30, "ha": "right"}
+        style = (
+            {"rotation": 90} if is_large or phone else {"rotation": 30, "ha": "right"}
+        )
         axes.set_xticks(range(n), names, fontsize=small, **style)
     axes.set_yticks(range(n), names, fontsize=small)
     axes.set(xlabel=answer, ylabel="label")

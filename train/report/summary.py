@@ -187,9 +187,11 @@ def _outliers(fitted: Fitted) -> Iterator[str]:
     names = [name for name in names if "kernels" not in name]
     if not names:
         return
-    whole = measured.of(names)
-    X = whole.features(fitted.window_s, fitted.samples)
-    yield from outliers.by_features(whole, X, whole.widths(fitted.samples))
+    measured_of_names = measured.of(names)
+    X = measured_of_names.features(fitted.window_s, fitted.samples)
+    yield from outliers.by_features(
+        measured_of_names, X, measured_of_names.widths(fitted.samples)
+    )
 
 
 def _task_warnings(fitted: Fitted, task: str) -> Iterator[str]:

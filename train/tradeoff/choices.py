@@ -77,8 +77,10 @@ def followed(
         quick: the candidates of a quick choice.
         like: a skin whose thresholds are taken; those of the recordings where None.
     """
-    drawn = kinds_of(raw.recordings) is not None
-    usual = candidates({}, joints=raw.joints, shear=raw.shear, drawn=drawn, quick=quick)
+    are_drawn = kinds_of(raw.recordings) is not None
+    usual = candidates(
+        {}, joints=raw.joints, shear=raw.shear, drawn=are_drawn, quick=quick
+    )
     measurement = Measurement(
         expand([*features_of(usual), *features]),
         WINDOWS_S[-1],

@@ -175,9 +175,9 @@ def locate(t: Trials) -> None:
     lever = dot(point[:, None] - t.arm.origins, cross(normal[:, None], t.arm.axes))
     depth = dot(point - contact.face, normal) + t.scene.skin.radius_m
     compliance = total(lever * lever * t.arm.step_compliance)
-    none = np.zeros_like(depth)
-    contact.y_frame = np.array([depth, none])
-    contact.compliance = np.array([compliance, none, none])
+    zeros = np.zeros_like(depth)
+    contact.y_frame = np.array([depth, zeros])
+    contact.compliance = np.array([compliance, zeros, zeros])
     contact.jacobian = np.stack([lever, np.zeros_like(lever)], axis=1)
     t.arm.point = point
 

@@ -49,9 +49,9 @@ def shared(pull: Array, limits: Array) -> Array:
     )
     level = (pull - lost) / (springs - slipped)
     borne = np.minimum(limits, level)
-    whole = below[-1]
-    excess = np.where(pull > whole, pull / np.where(whole > 0.0, whole, 1.0), 1.0)
-    return np.asarray(np.where(pull > whole, limits * excess, borne))
+    lowest = below[-1]
+    excess = np.where(pull > lowest, pull / np.where(lowest > 0.0, lowest, 1.0), 1.0)
+    return np.asarray(np.where(pull > lowest, limits * excess, borne))
 
 
 def traction(t: Trials) -> Array:
