@@ -431,6 +431,7 @@ def written(tmp_path_factory):
     options = Options(scene=str(SCENE), quick=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "FEWEST", 28)
+        patch.setattr(early, "FOLDS", 4)
         patch.setattr(costs, "PARTS", (1,))
         patch.setattr(running, "WINDOWS_S", (0.4, 1.2))
         patch.setattr(choices, "CHOSEN_S", (0.4, 1.2))
