@@ -157,6 +157,14 @@ def with_gap_and_shear(trial, is_valid, axes):
     return replace(trial, valid=valid, shear=shear)
 
 
+def require_same(trial, back):
+    """The trial that was read back has the labels, counts, times and angles."""
+    assert back.labels == trial.labels
+    assert (back.frames == trial.frames * trial.valid).all()
+    assert back.t == pytest.approx(trial.t - trial.t[0])
+    assert back.joints == pytest.approx(trial.joints)
+
+
 @pytest.mark.parametrize("axes", [1, 3])
 def test_import_reads_a_table_of_recordings_back(make_touch, tmp_path, axes):
     pytest.importorskip("pyarrow")
@@ -172,10 +180,7 @@ def test_import_reads_a_table_of_recordings_back(make_touch, tmp_path, axes):
     options = ("--axes", "xyz") if axes == 3 else ()
     read = imported(table, "--joints", joints, "--shape", "16x24", *options)
     for trial, back in zip(trials, read, strict=True):
-        assert back.labels == trial.labels
-        assert (back.frames == trial.frames * trial.valid).all()
-        assert back.t == pytest.approx(trial.t - trial.t[0])
-        assert back.joints == pytest.approx(trial.joints)
+        require_same(trial, back)
     assert not read[1].valid[3, 4, 5]
     if axes == 3:
         assert (read[0].shear == trials[0].shear).all()
