@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from edge.errors import InputError
 from edge.events import Decided
+from edge.logarithm import logistic
 from edge.model.agreement import product_label
 from edge.model.info import (
     UNKNOWN,
@@ -15,7 +16,6 @@ from edge.model.info import (
     Stopping,
     StoppingRule,
     check_rate,
-    logistic,
     margin,
 )
 from edge.model.model import Decision, Model

@@ -22,13 +22,6 @@ TRIALS = 24
 """Trials whose frames a golden file holds."""
 VECTORS = 256
 """Feature vectors beyond the trials' own."""
-BOUNDS = {
-    "features": 1e-12,
-    "time_s": 1e-9,
-}
-"""Features are interpolated in a few operations, and motion passes through sines and
-cosines that differ by an ulp between C libraries: below 100 ulp of metres. The bounds
-leave a factor of 40 and more. All outputs of the graph must be equal, to the bit."""
 
 
 def trials_of(dataset: DataSet, count: int) -> list[int]:
@@ -84,7 +77,6 @@ def write(path: Path, model: Model, dataset: DataSet, X: Floats) -> None:
         arrays["decision_point_vectors"] = vectors
     meta = {
         "skin": recordings[0].meta.get("skin", {}),
-        "bounds": BOUNDS,
         "model": info.data_digest,
     }
     save_arrays(path, arrays | answers(model, arrays), meta, compress=True)

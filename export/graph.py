@@ -149,7 +149,13 @@ def _projected(
     """Nodes that project features x to a task's spaces; see `project`."""
     projections = [space.projection for space in spaces]
     columns = [space.columns for space in spaces]
-    return project(build, x, points[-1].n_features_in_, projections, columns)
+    width = points[-1].n_features_in_
+    z, off = project(build, x, width, projections, columns)
+    if min(map(len, columns)) < width:
+        # A feature that another task or decision point takes must be finite too.
+        zeros = build.node("Mul", x, 0.0)
+        off = build.node("Add", off, build.node("ReduceL1", zeros, [1], keepdims=1))
+    return z, off
 
 
 def _task(

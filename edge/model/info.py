@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from edge.arrays import Floats
 from edge.errors import InputError
+from edge.logarithm import log, logistic
 from edge.touch.features import feature_vector, widths
 from edge.touch.layout import SkinLayout, for_device
 from edge.touch.still import WatchfulTracker
@@ -102,7 +103,7 @@ class Novelty:
         """The logarithm of a score over that of half of the trained contacts; 0 below
         it."""
         typical = self.limits[decision_point][0]
-        return math.log(score / typical) if score > typical > 0.0 else 0.0
+        return log(score / typical) if score > typical > 0.0 else 0.0
 
 
 def margin(distances: Sequence[float], label: int) -> float:
@@ -121,11 +122,6 @@ def margin(distances: Sequence[float], label: int) -> float:
     rivals = [*distances[:label], *distances[label + 1 :]]
     nearest_rival = min(rivals, default=distance)
     return nearest_rival - distance if distance < math.inf else -math.inf
-
-
-def logistic(x: float) -> float:
-    """1 / (1 + exp(-x)), which never overflows."""
-    return 0.5 + 0.5 * math.tanh(0.5 * x)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from edge.config import ConfigTable, parse_json, short_text
 from edge.errors import InputError, about
@@ -11,9 +10,6 @@ from edge.model.info import FORMAT, ModelInfo, Novelty, Stopping, StoppingRule, 
 from edge.touch.contact import feature_types
 from edge.touch.feature import KERNELS
 from edge.touch.layout import SkinLayout
-
-if TYPE_CHECKING:
-    from edge.touch.kernels import KernelTable
 
 
 def from_json(text: str, name: str) -> ModelInfo:
@@ -64,6 +60,11 @@ def _read(meta: ConfigTable) -> ModelInfo:
         for task in rules.raw:
             stopping[task] = read_stopping(rules.table(task), len(points))
         novelty = read_novelty(meta.table("novelty"), len(points))
+    kernels = {}
+    if not KERNELS.keys().isdisjoint(names):
+        from edge.touch.kernels import read_tables  # few models have any
+
+        kernels = read_tables(meta.table("kernels"), names, layout)
     info = ModelInfo(
         tasks=task_of,
         layout=layout,
@@ -81,7 +82,7 @@ def _read(meta: ConfigTable) -> ModelInfo:
         stopping=stopping,
         novelty=novelty,
         joints=meta.whole("joints", 0, allowed=range(0, 1001)),
-        kernels=_kernels(meta, names, layout),
+        kernels=kernels,
         name=meta.text("name", "", empty=True),
         trials=meta.texts("trials", ()),
         usual=_usual(meta, names),
@@ -176,22 +177,6 @@ def _usual(meta: ConfigTable, names: Sequence[str]) -> dict[str, Sequence[float]
             raise table.fail(name, "two numbers that rise")
         usual[name] = lowest, highest
     return usual
-
-
-def _kernels(
-    meta: ConfigTable,
-    names: Sequence[str],
-    layout: SkinLayout,
-) -> dict[str, KernelTable]:
-    """{feature: its table} of convolution features."""
-    tables = {}
-    for name in names:
-        if name in KERNELS:
-            from edge.touch.kernels import KernelTable
-
-            table = meta.table("kernels").table(name)
-            tables[name] = KernelTable.from_table(table, name, layout)
-    return tables
 
 
 def _contradictions(info: ModelInfo) -> Iterator[str]:

@@ -16,11 +16,10 @@ by.
 | `out_of_range` | float64 (v,) | the graph's output |
 | `decision_point_vectors` | float64 (points, w, width) | vectors for each decision point |
 | `<task>_decision_point_label`, ... | | the graph's outputs for these, each at its point |
-| `meta` | JSON text | `skin`, `bounds` {`features`, `time_s`} |
+| `meta` | JSON text | `skin` |
 
-A bound b allows abs(seen - expected) <= b * max(1, abs(expected)). A quantity without a
-bound must be equal. Distances have none: they come from whole numbers, and an engine
-that computes in float32 gives others.
+Every quantity must be equal, to the last bit. An engine that computes in float32 gives
+other distances.
 """
 
 import os
@@ -45,8 +44,8 @@ OUTPUTS = ("label", "neighbours", "scores", "distances")
 OF_ALL_TASKS = ("novelty", "out_of_range")
 """Outputs that belong to no task."""
 
-Line = tuple[str, Array, Array, float]
-"""A quantity to compare: name, seen, expected, bound."""
+Line = tuple[str, Array, Array]
+"""A quantity to compare: name, seen, expected."""
 
 
 @dataclass(frozen=True)
@@ -56,24 +55,21 @@ class Check:
     Attributes:
         name: the quantity.
         rows: how many rows were compared.
-        worst: largest difference over its allowance; infinity where nothing was
-            allowed.
-        row: its row, or None where all rows are equal.
+        row: the first that differs, or None where all rows are equal.
         seen: the value there.
         expected: the golden value there.
     """
 
     name: str
     rows: int
-    worst: float
-    row: int | None
+    row: int | None = None
     seen: str = ""
     expected: str = ""
 
     @property
     def passed(self) -> bool:
-        """Within the bound."""
-        return self.worst <= 1.0
+        """Whether all rows are equal."""
+        return self.row is None
 
 
 def first_series(
@@ -110,10 +106,7 @@ def verify(model: Model, path: str | os.PathLike[str]) -> list[Check]:
         "; export it again with the model",
     ):
         SkinLayout.from_dict(meta["skin"], where=name)
-        bounds = {str(key): float(bound) for key, bound in meta["bounds"].items()}
-        lines = chain(
-            _path(model, arrays, meta, bounds), _graph(model, name, arrays, bounds)
-        )
+        lines = chain(_path(model, arrays, meta), _graph(model, name, arrays))
         checks = list(starmap(compared, lines))
     second = second_opinion(model, arrays)
     return checks if second is None else [*checks, second]
@@ -132,10 +125,10 @@ def second_opinion(model: Model, arrays: Mapping[str, Array]) -> Check | None:
     in_numpy = answers(Model(model.path, "numpy"), arrays)
     for key, answer in answers(model, arrays).items():
         answered = arrays[_answered_key(key)] >= 0
-        check = compared(key, answer[answered], in_numpy[key][answered], 0.0)
+        check = compared(key, answer[answered], in_numpy[key][answered])
         if not check.passed:
             return replace(check, name=f"{name}: {key}", rows=rows)
-    return Check(name, rows, 0.0, None)
+    return Check(name, rows)
 
 
 def _answered_key(key: str) -> str:
@@ -164,7 +157,6 @@ def _path(
     model: Model,
     arrays: dict[str, Array],
     meta: dict[str, Any],
-    bounds: dict[str, float],
 ) -> Iterator[Line]:
     """Onsets, series and feature vectors of the trials."""
     info = model.info
@@ -183,20 +175,19 @@ def _path(
     trials = len(onsets)
     at_windows = np.array(vectors).swapaxes(0, 1)
     lengths = np.array(list(map(len, integers)))
-    yield "series length", lengths, np.diff(arrays["series_start"]), 0.0
-    yield "series counts", np.concatenate(integers), arrays["series_counts"], 0.0
-    yield "onset", np.array(onsets), arrays["onset_s"], bounds["time_s"]
-    yield "features", at_windows[0], arrays["vectors"][:trials], bounds["features"]
+    yield "series length", lengths, np.diff(arrays["series_start"])
+    yield "series counts", np.concatenate(integers), arrays["series_counts"]
+    yield "onset", np.array(onsets), arrays["onset_s"]
+    yield "features", at_windows[0], arrays["vectors"][:trials]
     if info.decision_points_s:
         stored = arrays["decision_point_vectors"][:, :trials]
-        yield "features at decision points", at_windows[1:], stored, bounds["features"]
+        yield "features at decision points", at_windows[1:], stored
 
 
 def _graph(
     model: Model,
     name: str,
     arrays: dict[str, Array],
-    bounds: dict[str, float],
 ) -> Iterator[Line]:
     """The graph's outputs for the stored vectors."""
     for key in ("vectors", "decision_point_vectors"):
@@ -206,13 +197,12 @@ def _graph(
                 f"takes {model.info.width} features; export both together"
             )
     for key, answer in answers(model, arrays).items():
-        bound = next((bounds[end] for end in bounds if key.endswith(f"_{end}")), 0.0)
         label = _answered_key(key)
         if key != label:
             refused = arrays[label] < 0
             answer = answer.copy()
             answer[refused] = arrays[key][refused]
-        yield key, answer, arrays[key], bound
+        yield key, answer, arrays[key]
 
 
 def answers(model: Model, arrays: Mapping[str, Array]) -> dict[str, Array]:
@@ -258,34 +248,14 @@ def _outputs(
     return {key: np.concatenate([row[key] for row in single]) for key in single[0]}
 
 
-def compared(
-    name: str,
-    values: Array,
-    expected: Array,
-    bound: float,
-) -> Check:
-    """Compare a quantity, whose first axis is the rows; see the module for the
-    bound."""
+def compared(name: str, values: Array, expected: Array) -> Check:
+    """Compare a quantity, whose first axis is the rows; NaN is equal to NaN."""
     rows = len(expected)
     if values.shape != expected.shape:
         shapes = f"shape {values.shape}", f"{expected.shape}"
-        return Check(name, rows, np.inf, 0, *shapes)
-    if values.size == 0:
-        return Check(name, 0, 0.0, None)
-    same = (values == expected) | (np.isnan(values) & np.isnan(expected))
-    allowance = bound * np.maximum(1.0, np.abs(expected))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        # An infinite value is near no other, though its allowance is infinite.
-        gap = np.where(
-            np.isfinite(allowance),
-            np.abs(values - expected) / allowance,
-            np.inf,
-        )
-    gap[np.isnan(gap)] = np.inf
-    share = np.where(same, 0.0, gap).reshape(rows, -1)
-    row, column = divmod(int(share.argmax()), share.shape[1])
-    worst = float(share[row, column])
-    if worst == 0.0:
-        return Check(name, rows, 0.0, None)
-    texts = [str(side.reshape(share.shape)[row, column]) for side in (values, expected)]
-    return Check(name, rows, worst, row, *texts)
+        return Check(name, rows, 0, *shapes)
+    differ = (values != expected) & ~(np.isnan(values) & np.isnan(expected))
+    if not differ.any():
+        return Check(name, rows)
+    place = tuple(np.argwhere(differ)[0])
+    return Check(name, rows, int(place[0]), str(values[place]), str(expected[place]))

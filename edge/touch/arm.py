@@ -3,7 +3,7 @@ skin."""
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 from edge.arrays import Floats
 from edge.config import ConfigTable, read_toml, short_text
 from edge.errors import InputError, about
+from edge.touch.trigonometry import MOST, cos, length, sin
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 LONGEST_M = 1000.0
 """Greatest coordinate of an arm's vectors."""
 STEPS = ("origin_xyz", "origin_rpy", "translate")
+"""Of a joint, fixed."""
 MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -81,61 +83,30 @@ class Chain:
         self.limits = tuple(joint.limits for joint in moving)
         """(lower, upper) of each moving joint in radians, or metres if it slides; or
         None."""
-        self._links: list[tuple[bool, Vector, list[list[float]]]] = []
-        """Of each moving joint: whether it slides, its axis of length 1, and the fixed
-        step before it, the first three rows of a transform as plain numbers."""
-        fixed = np.eye(4)
-        for joint in self.joints:
-            _check_joint(joint)
-            fixed = fixed @ _transform(joint.origin_xyz, joint.origin_rpy)
-            if joint.kind != "fixed":
-                length = math.hypot(*joint.axis)
-                x, y, z = (component / length for component in joint.axis)
-                slides = joint.kind == "prismatic"
-                self._links.append((slides, (x, y, z), fixed[:3].tolist()))
-                fixed = np.eye(4)
-            fixed = fixed @ _transform(joint.translate, ZERO)
-        self._tip: list[list[float]] = fixed[:3].tolist()
+        self._links = [
+            (
+                joint.kind,
+                _direction(joint),
+                _step(joint.origin_xyz, joint.origin_rpy),
+                joint.translate,
+            )
+            for joint in self.joints
+        ]
+        """Of each joint: its kind, its axis of length 1, the fixed steps before and
+        after it."""
 
     def pose(self, q: ArrayLike) -> Floats:
-        """Pose of the tip in the base's frame.
+        """Pose of the tip in the base's frame; see `edge.touch.pose`."""
+        from edge.touch.pose import pose  # the board follows single points
 
-        Rotations follow Rodrigues' formula, R = I + sin(q) K + (1 - cos(q)) K^2. It is
-        computed with 1 - cos(q) = 2 sin^2(q/2), which loses no digits at small angles.
-
-        Args:
-            q: (dof,) or (..., dof) radians, or metres for a sliding joint, from base to
-                tip.
-
-        Returns:
-            (4, 4) or (..., 4, 4) homogeneous transform, metres.
-
-        Raises:
-            InputError: the number of angles is not `dof`, or one is not finite.
-        """
-        try:
-            angles = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"joint angles must be numbers, not {q!r}") from None
-        if angles.shape[-1:] != (self.dof,):
-            raise InputError(
-                f"the arm {self.base} to {self.tip} takes {self.dof} joint angles "
-                f"({', '.join(self.names)}), not an array {angles.shape}"
-            )
-        if not np.isfinite(angles).all():
-            bad = np.argwhere(~np.isfinite(angles))[0][-1]
-            raise InputError(f"the angle of joint {self.names[bad]} is not finite")
-        transform = np.zeros((*angles.shape[:-1], 4, 4))
-        transform[..., 3, 3] = 1.0
-        of_each_joint = np.moveaxis(angles, -1, 0)[..., None]
-        rows = self.carried(of_each_joint, np.eye(4), np.sin)
-        transform[..., :3, :] = np.stack(rows, axis=-2)
-        return transform
+        return pose(self.names, self.carried, q)
 
     def point(self, q: ArrayLike, position: Sequence[float]) -> Vector:
         """A point of the tip in the base's frame, as plain floats: `pose(q)` times it.
 
-        It is much faster than computing the pose.
+        It is much faster than computing the pose. Rotations follow Rodrigues' formula,
+        R = I + sin(q) K + (1 - cos(q)) K^2. It is computed with 1 - cos(q) = 2
+        sin^2(q/2), which loses no digits at small angles.
 
         Args:
             q: (dof,) as for `pose`.
@@ -145,30 +116,29 @@ class Chain:
             InputError: as `pose`.
         """
         angles = np.asarray(q).tolist()
-        if len(angles) != self.dof or not math.isfinite(sum(map(abs, angles))):
+        if len(angles) != self.dof or not sum(map(abs, angles)) <= MOST:
             self.pose(q)  # raises
-        x, y, z = self.carried(angles, (*position, 1.0), math.sin)
+        x, y, z = self.carried(angles, (*position, 1.0))
         return x, y, z
 
-    def carried(
-        self,
-        angles: Any,
-        position: Any,
-        sin: Callable[[Any], Any],
-    ) -> tuple[Any, ...]:
+    def carried(self, angles: Any, position: Any) -> tuple[Any, ...]:
         """(x, y, z) in the base's frame of coordinates (4,) in the tip's frame.
 
         Angles and coordinates are numbers, or arrays of equal shape.
         """
         x, y, z, w = position
-        x, y, z = (a * x + b * y + c * z + d * w for a, b, c, d in self._tip)
-        links = zip(reversed(angles), reversed(self._links), strict=True)
-        for angle, (slides, (kx, ky, kz), step) in links:
-            if slides:
-                x = x + angle * kx * w
-                y = y + angle * ky * w
-                z = z + angle * kz * w
-            else:
+        remaining = reversed(angles)
+        for kind, (kx, ky, kz), step, (dx, dy, dz) in reversed(self._links):
+            x = x + dx * w
+            y = y + dy * w
+            z = z + dz * w
+            if kind == "prismatic":
+                travel = next(remaining) * w
+                x = x + kx * travel
+                y = y + ky * travel
+                z = z + kz * travel
+            elif kind != "fixed":
+                angle = next(remaining)
                 half = sin(0.5 * angle)
                 f = sin(angle)
                 g = 2.0 * half * half
@@ -185,8 +155,8 @@ class Chain:
         """The chain as a JSON object, which keeps every number exactly."""
         joints = []
         for joint in self.joints:
-            entry = {"name": joint.name, "axis": list(joint.axis), "type": joint.kind}
-            for key in (*STEPS, "limits"):
+            entry: dict[str, Any] = {"name": joint.name, "type": joint.kind}
+            for key in ("axis", *STEPS, "limits"):
                 value = getattr(joint, key)
                 if value not in (ZERO, None):
                     entry[key] = list(value)
@@ -233,16 +203,15 @@ class Chain:
         Raises:
             InputError: the file cannot be read, or no chain leads from `base` to `tip`.
         """
-        from edge.touch.urdf import joints_between
+        from edge.touch.urdf import arm_between
 
-        joints = joints_between(path, base, tip)
-        return cls.from_dict(
-            {"base": base, "tip": tip, "joint": joints}, where=os.fspath(path)
-        )
+        return cls.from_dict(arm_between(path, base, tip), where=os.fspath(path))
 
 
-def _check_joint(joint: Joint) -> None:
-    if joint.kind != "fixed" and not 1e-9 <= math.hypot(*joint.axis) < math.inf:
+def _direction(joint: Joint) -> Vector:
+    """The axis of a joint, of length 1."""
+    size = length(joint.axis)
+    if not 1e-9 <= size < math.inf:
         raise InputError(
             f"joint {joint.name}: its axis is zero or too long; give a direction"
         )
@@ -251,20 +220,19 @@ def _check_joint(joint: Joint) -> None:
             f"joint {joint.name}: its lower limit {joint.limits[0]:g} exceeds its "
             f"upper limit {joint.limits[1]:g}"
         )
+    x, y, z = (component / size for component in joint.axis)
+    return x, y, z
 
 
-def _transform(xyz: Vector, rpy: Vector) -> Floats:
-    """Homogeneous transform of a URDF origin: roll, pitch, yaw about fixed axes x, y,
+def _step(xyz: Vector, rpy: Vector) -> tuple[tuple[float, ...], ...]:
+    """The transform (3, 4) of a URDF origin: roll, pitch, yaw about fixed axes x, y,
     z."""
-    cr, cp, cy = map(math.cos, rpy)
-    sr, sp, sy = map(math.sin, rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
-            [-sp, cp * sr, cp * cr, xyz[2]],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
+    cr, cp, cy = map(cos, rpy)
+    sr, sp, sy = map(sin, rpy)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]),
+        (-sp, cp * sr, cp * cr, xyz[2]),
     )
 
 

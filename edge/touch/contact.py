@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from operator import sub
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -16,6 +17,7 @@ from edge.touch.active import ActiveTaxels, Region
 from edge.touch.feature import OF_PAPER, PAPER, Feature
 from edge.touch.frame import Frame
 from edge.touch.layout import SkinLayout
+from edge.touch.trigonometry import length
 
 if TYPE_CHECKING:
     from edge.touch.arm import Chain, Vector
@@ -299,7 +301,8 @@ class Contact:
         if position is None:
             self.missing_pose = True
             return math.nan
-        return math.dist(position, self._starts.setdefault(name, position))
+        start = self._starts.setdefault(name, position)
+        return length(map(sub, position, start))
 
     def _located(
         self,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from edge.arrays import Array, Floats
-from edge.errors import InputError, OutOfRange
+from edge.errors import InputError
 from edge.touch.contact import FeatureSeries, feature_types
 from edge.touch.feature import PAPER, Feature, not_measured
 from edge.touch.layout import SkinLayout
@@ -111,7 +111,6 @@ def feature_vector(
         InputError: the window or the number of samples makes no sense, the series is
             empty, a feature does not exist or was not measured, or its table is
             missing.
-        OutOfRange: a feature is too large for a float.
     """
     if not (math.isfinite(window_s) and window_s > 0.0):
         raise InputError(f"the window must be above 0 seconds, not {window_s!r}")
@@ -122,8 +121,8 @@ def feature_vector(
     if series.t.size == 0:
         raise InputError("the contact has no frame")
     course = _Course(series, window_s, tables or {})
-    # Overflow to infinity is refused by `_Course.sampled` and by the model.
-    with np.errstate(over="ignore"):
+    # What is too large for a float is refused by the model.
+    with np.errstate(all="ignore"):
         groups = [tuple(group) for _, group in groupby(types, key=_kind)]
         return np.concatenate([course.block(group, samples) for group in groups])
 
@@ -187,18 +186,12 @@ class _Course:
             values = self._measured(first).T
         else:
             values = np.array(list(map(self._measured, group)), dtype=np.float64)
-        finite = np.isfinite(values)
-        complete = finite.all(axis=1)
-        for feature, row in zip(group, values, strict=False):
-            if np.isinf(row).any():
-                raise OutOfRange(
-                    f"{feature.name} is too large for a number of 64 bits; look at the "
-                    "skin's counts_per_newton and pitch_m"
-                )
+        known = ~np.isnan(values)
+        complete = known.all(axis=1)
         sampled = np.zeros((len(values), len(times)))
         sampled[complete] = _resample(times, t, values[complete])
-        for i in np.flatnonzero(~complete & finite.any(axis=1)):
-            sampled[i] = _resample(times, t[finite[i]], values[i, finite[i]])
+        for i in np.flatnonzero(~complete & known.any(axis=1)):
+            sampled[i] = _resample(times, t[known[i]], values[i, known[i]])
         if first.quantity == "taxel_force":
             return sampled / self._scale
         return sampled - sampled[:, :1] if first.quantity == "joint_change" else sampled

@@ -73,24 +73,27 @@ class KernelTable:
     shifts: tuple[int, ...]
     biases: tuple[int, ...]
 
-    @classmethod
-    def from_table(
-        cls,
-        table: ConfigTable,
-        name: str,
-        layout: SkinLayout,
-    ) -> KernelTable:
-        """Read the table of a feature from a model's metadata, which holds its `vars`.
 
-        Raises:
-            InputError: the table has another number of channels or biases.
-        """
-        channels = channels_of(name, layout)
-        biases = KERNELS[name]
-        shifts = table.numbers("shifts", channels, low=-48, high=BITS)
-        limits = table.numbers("biases", biases, low=-(2**BIAS_BITS), high=2**BIAS_BITS)
-        table.refuse_unknown()
-        return cls(tuple(map(int, shifts)), tuple(map(int, limits)))
+def read_tables(
+    tables: ConfigTable,
+    names: Sequence[str],
+    layout: SkinLayout,
+) -> dict[str, KernelTable]:
+    """{feature: its table} of the features that have one, from a model's metadata.
+
+    Raises:
+        InputError: a table has another number of channels or biases.
+    """
+    read = {}
+    for name in names:
+        if name in KERNELS:
+            table = tables.table(name)
+            channels = channels_of(name, layout)
+            shifts = table.numbers("shifts", channels, low=-48, high=BITS)
+            limits = table.numbers("biases", KERNELS[name], low=LOWEST, high=-LOWEST)
+            table.refuse_unknown()
+            read[name] = KernelTable(tuple(map(int, shifts)), tuple(map(int, limits)))
+    return read
 
 
 @lru_cache

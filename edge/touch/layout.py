@@ -12,6 +12,7 @@ import numpy as np
 from edge.arrays import Booleans
 from edge.config import ConfigTable
 from edge.errors import InputError, about
+from edge.touch.trigonometry import cos, sin
 
 RELEASE_S = 0.3
 """Longer than an arm bounces off a rigid object, and shorter than the time to a second
@@ -123,8 +124,8 @@ class SkinLayout:
             return col * around, row * along, 0.0
         angle = self._angle(col)
         return (
-            self.radius_m * math.cos(angle),
-            self.radius_m * math.sin(angle),
+            self.radius_m * cos(angle),
+            self.radius_m * sin(angle),
             self.row0_z_m - row * along,
         )
 

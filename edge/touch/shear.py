@@ -62,7 +62,7 @@ def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
     scale = layout.counts_per_newton or 1.0
     _, _, force, rows, cols, *_ = sums.T
     along, around, rows_around, cols_along = sums.T[-WIDTH:]
-    size = np.hypot(along, around)
+    size = np.sqrt(along.astype(np.float64) ** 2 + around.astype(np.float64) ** 2)
     ratio = np.divide(size, force, out=np.zeros_like(size), where=force > 0)
     return {
         "shear_along": along / scale,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from edge.arrays import Array, Floats
+from edge.logarithm import log
 from edge.touch.feature import Feature
 from edge.touch.layout import SkinLayout
 
@@ -57,7 +58,7 @@ def _transformed(
     """A transform of samples (rows, times); `wide` rows are those of one feature."""
     if transform == "log":
         above = values + floors
-        return np.asarray(np.log(np.where(above > 0.0, above, 1.0)))
+        return np.asarray(log(np.where(above > 0.0, above, 1.0)))
     if transform == "sqrt":
         return np.asarray(np.copysign(np.sqrt(np.abs(values)), values))
     # The cells or joints of one feature share one largest value.

@@ -8,12 +8,12 @@ from edge.errors import InputError
 from edge.files import parsing, read_bytes
 
 
-def joints_between(
+def arm_between(
     path: str | os.PathLike[str],
     base: str,
     tip: str,
-) -> list[dict[str, Any]]:
-    """The joints from link `base` to link `tip`, as tables for
+) -> dict[str, Any]:
+    """The joints from link `base` to link `tip`, as a table for
     `edge.touch.arm.Chain.from_dict`.
 
     Raises:
@@ -42,7 +42,7 @@ def joints_between(
         element = parents.pop(link)  # taken out, so that a loop of links ends
         joints.append(_joint(path, element))
         link = _link(path, element, "parent")
-    return joints[::-1]
+    return {"base": base, "tip": tip, "joint": joints[::-1]}
 
 
 def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
@@ -108,7 +108,9 @@ def _joint(
             ("origin", "rpy", "origin_rpy"),
         ):
             child = element.find(tag)
-            if child is not None and attribute in child.attrib:
+            if child is None or (key == "axis" and kind == "fixed"):
+                continue  # which may have the axis 0 0 0
+            if attribute in child.attrib:
                 joint[key] = list(map(float, child.attrib[attribute].split()))
         limit = element.find("limit")
         if limit is not None and kind in ("revolute", "prismatic"):

@@ -133,7 +133,8 @@ def quantities(sums: Integers, layout: SkinLayout) -> dict[str, Array]:
         (f * products - a * b).astype(np.float64) / total / total
         for products, a, b in ((rr, r, r), (cc, c, c), (rc, r, c))
     )
-    larger = 0.5 * (rows + cols + np.hypot(rows - cols, 2.0 * slant))
+    across = rows - cols
+    larger = 0.5 * (rows + cols + np.sqrt(across * across + 4.0 * slant * slant))
     # The smaller eigenvalue is the determinant over the larger one: the difference of
     # the eigenvalues' terms would cancel. For a perfect line, rounding leaves less than
     # 2^-25 of the skin's larger side.

@@ -13,7 +13,7 @@ from onnxruntime import GraphOptimizationLevel
 import train
 from edge.classifier import Classifier
 from edge.early import stopping_rules
-from edge.errors import InputError
+from edge.errors import InputError, OutOfRange
 from edge.events import Decided
 from edge.model.model import Model
 from edge.model.verify import first_series, verify
@@ -143,6 +143,20 @@ def test_a_far_feature_matters_only_where_a_decision_point_takes_it(
     far[0, 0] = 1e6
     outside = [model.run(far, point)["out_of_range"].tolist() for point in range(3)]
     assert outside == [[0.0], [0.0], [1.0]]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_not_finite_is_refused_at_points_that_do_not_take_it(
+    with_early_settings, value
+):
+    X, sequential, model = with_early_settings
+    wrong = X[0, 0].copy()
+    wrong[0] = value
+    for point in range(3):
+        answers = model.run(wrong[None], point)
+        assert all(answers[f"{task}_label"] == -1 for task in sequential.choices)
+        with pytest.raises(OutOfRange):
+            model.decide(wrong, point)
 
 
 def test_early_settings_are_the_same_bits_in_numpy(with_early_settings):

@@ -1,7 +1,5 @@
 """The contents of a golden file."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -57,5 +55,3 @@ def test_the_vectors_are_trials_training_rows_mixtures_and_two_that_are_not_fini
         assert ((golden[f"{task}_label"] == -1) == ~finite).all()
     assert (golden["object_distances"][: trials + 16, 0] == 0.0).all()
     assert golden["frames"].dtype == np.uint16
-    bounds = json.loads(str(golden["meta"]))["bounds"]
-    assert set(bounds) == {"features", "time_s"}

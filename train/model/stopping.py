@@ -34,6 +34,7 @@ import numpy as np
 
 from edge.arrays import Booleans, Floats, Integers
 from edge.errors import InputError
+from edge.logarithm import log
 from edge.model.info import (
     NOVELTY_RATE,
     Novelty,
@@ -74,7 +75,7 @@ def excess_of(novelty: Novelty, scores: Floats) -> Floats:
     half of the trials; 0 below."""
     typical = np.array([row[0] for row in novelty.limits])[:, None]
     ratios = np.maximum(np.nan_to_num(scores), typical) / typical
-    return np.asarray(np.log(ratios))
+    return np.asarray(log(ratios))
 
 
 def unlike(novelty: Novelty, scores: Floats) -> Booleans:

@@ -16,6 +16,7 @@ from edge.touch.kernels import (
     channels_of,
     convolution_of_bias,
     kernel_channels,
+    read_tables,
     shares,
 )
 from edge.touch.layout import SkinLayout
@@ -184,7 +185,11 @@ def test_kernels_without_their_table_or_their_measurements_are_refused():
 def test_a_damaged_table_is_refused(wrong):
     skin = SkinLayout(1, 2)
     right = KernelTable((0, -3), (5,) * 1008)
-    stored = ConfigTable(vars(right), "m")
-    assert KernelTable.from_table(stored, "taxel_kernels", skin) == right
+
+    def read(table):
+        tables = ConfigTable({"taxel_kernels": table}, "m")
+        return read_tables(tables, ["taxel_kernels", "max_force"], skin)
+
+    assert read(vars(right)) == {"taxel_kernels": right}
     with pytest.raises(InputError, match="^m: "):
-        KernelTable.from_table(ConfigTable(wrong, "m"), "taxel_kernels", skin)
+        read(wrong)

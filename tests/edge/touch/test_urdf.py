@@ -5,7 +5,7 @@ import pytest
 
 from edge.errors import InputError
 from edge.touch.arm import Chain
-from edge.touch.urdf import joints_between
+from edge.touch.urdf import arm_between
 
 ARM = """<?xml version="1.0"?>
 <robot name="r">
@@ -15,7 +15,7 @@ ARM = """<?xml version="1.0"?>
     <origin xyz="0.3 0 -1e-3" rpy="0.4 -0.5 0.6"/><axis xyz="0 0.6 0.8"/>
     <limit lower="-2.5" upper="0" effort="1" velocity="1"/></joint>
   <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/></joint>
-  <joint name="bracket" type="fixed"><parent link="upper"/><child link="mount"/>
+  <joint name="bracket" type="fixed"><axis xyz="0 0 0"/><parent link="upper"/><child link="mount"/>
     <origin xyz="0 0.02 0.25"/></joint>
   <joint name="camera" type="fixed"><parent link="upper"/><child link="aside"/></joint>
   <joint name="slide" type="prismatic"><parent link="lower"/><child link="tool"/>
@@ -28,14 +28,14 @@ def test_a_urdf_gives_the_joints_from_base_to_tip_whatever_their_order_in_the_fi
     urdf,
 ):
     def names(tip):
-        return [joint["name"] for joint in joints_between(urdf, "base", tip)]
+        return [joint["name"] for joint in arm_between(urdf, "base", tip)["joint"]]
 
     assert names("lower") == ["shoulder", "bracket", "elbow"]
     assert names("aside") == ["shoulder", "camera"]
     with pytest.raises(
         InputError, match="link 'upper' is both base and tip; name the arm's two"
     ):
-        joints_between(urdf, "upper", "upper")
+        arm_between(urdf, "upper", "upper")
 
 
 @pytest.mark.parametrize(
