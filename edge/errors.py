@@ -30,7 +30,7 @@ class EdgeError(Exception):
     ...     edge.Chain([]).pose([0.0])
     ... except edge.EdgeError as error:
     ...     print(error)
-    the arm base to tip takes 0 joint angles (), not an array (1,)
+    the arm takes 0 joint angles (), not an array (1,)
     """
 
     def __str__(self) -> str:
